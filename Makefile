@@ -236,7 +236,7 @@ corpus: programs
 BENCH_SRC := $(wildcard tests/bench/*.c)
 $(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(BENCH_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
-BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk,--wrap=full_path_visible
+BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk,--wrap=full_path_edge_is_visible
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
 

@@ -19,9 +19,9 @@ int main(int argc, char **argv)
 {
 	struct server_config c;
 	struct error e;
-	mem_keep(128 << 20);
+	mem_retain_freed(128 << 20);
 	server_config_init(&c);
-	program_options(&server_program, argc, argv, &c);
+	program_parse_options(&server_program, argc, argv, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);
 	if (geteuid() == 0)
 		log_event(

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { ALIGNMENT = 64, BLOCK = 1 << 18 };
+enum { ALIGNMENT = 64, BLOCK_BYTES = 1 << 18 };
 
 struct arena_block {
 	struct arena_block *next;
@@ -17,7 +17,7 @@ struct arena_block {
 	char *bytes;
 };
 
-static char *aligned(char *p)
+static char *align_up(char *p)
 {
 	return p + (-(uintptr_t)p & (ALIGNMENT - 1));
 }
@@ -33,14 +33,14 @@ void *arena_alloc(struct arena *a, size_t count, size_t size)
 		return NULL;
 	struct arena_block *b = a->blocks;
 	if (!b || b->size - b->used < need) {
-		size_t room = need > BLOCK ? need : BLOCK;
-		b = mem_alloc(1, sizeof *b + room + ALIGNMENT);
+		size_t capacity = need > BLOCK_BYTES ? need : BLOCK_BYTES;
+		b = mem_alloc(1, sizeof *b + capacity + ALIGNMENT);
 		if (!b)
 			return NULL;
-		b->bytes = aligned((char *)(b + 1));
-		b->size = room;
+		b->bytes = align_up((char *)(b + 1));
+		b->size = capacity;
 		/* A block for one large request goes second: later small requests still use the room in the first. */
-		if (need > BLOCK && a->blocks) {
+		if (need > BLOCK_BYTES && a->blocks) {
 			b->next = a->blocks->next;
 			a->blocks->next = b;
 		} else {
@@ -63,26 +63,26 @@ char *arena_strdup(struct arena *a, const char *s)
 	return p;
 }
 
-struct slot {
+struct share_slot {
 	size_t hash;
 	struct arena_share *share; /* NULL: free */
 };
 
 /* A hash table with open addressing, in the arena; it doubles when it is half full. It may miss some of what is
- * shared: a search takes at most SHARE_STEPS steps and compares the bytes of SHARE_ALIKE entries, so that bytes chosen
- * to have one hash take no time that grows with their number. */
+ * shared: a search takes at most SHARE_PROBES_MAX steps and compares the bytes of SHARE_COMPARES_MAX entries, so that
+ * bytes chosen to have one hash take no time that grows with their number. */
 struct arena_shares {
-	size_t room, count; /* room: a power of two */
-	struct slot *at;
+	size_t capacity, count; /* capacity: a power of two */
+	struct share_slot *slots;
 };
 
-enum { SHARES_FIRST = 64, SHARE_SAMPLES = 32, SHARE_ALIKE = 8, SHARE_STEPS = 256 };
+enum { SHARE_SLOTS_INITIAL = 64, SHARE_SAMPLES = 32, SHARE_COMPARES_MAX = 8, SHARE_PROBES_MAX = 256 };
 
 /* Of the size and of parts of the bytes: whether they are equal is compared, but for few. */
 static size_t share_hash(const void *bytes, size_t size)
 {
 	const char *p = bytes;
-	uint64_t h = fnv_add(FNV_BEGIN, &size, sizeof size);
+	uint64_t h = fnv_add(FNV_OFFSET_BASIS, &size, sizeof size);
 	if (size <= SHARE_SAMPLES * sizeof h)
 		return (size_t)fnv_add(h, p, size);
 	for (size_t i = 0; i < SHARE_SAMPLES; i++)
@@ -91,52 +91,53 @@ static size_t share_hash(const void *bytes, size_t size)
 }
 
 /* Adds an entry, unless the place where it would be searched is full. */
-static void add(struct arena_shares *s, size_t hash, struct arena_share *share)
+static void insert_share(struct arena_shares *s, size_t hash, struct arena_share *share)
 {
-	for (size_t k = 0; k < SHARE_STEPS; k++) {
-		struct slot *at = &s->at[(hash + k) & (s->room - 1)];
-		if (at->share)
+	for (size_t k = 0; k < SHARE_PROBES_MAX; k++) {
+		struct share_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
+		if (slot->share)
 			continue;
-		*at = (struct slot){hash, share};
+		*slot = (struct share_slot){hash, share};
 		s->count++;
 		return;
 	}
 }
 
 /* Returns the entry with these bytes, or NULL. *full: so many entries have this hash that another is not added. */
-static struct arena_share *find(const struct arena_shares *s, size_t hash, const void *bytes, size_t size, bool *full)
+static struct arena_share *find_share(const struct arena_shares *s, size_t hash, const void *bytes, size_t size,
+				      bool *full)
 {
-	size_t alike = 0;
-	for (size_t k = 0; k < SHARE_STEPS && alike < SHARE_ALIKE; k++) {
-		const struct slot *at = &s->at[(hash + k) & (s->room - 1)];
-		if (!at->share)
+	size_t equal_hashes = 0;
+	for (size_t k = 0; k < SHARE_PROBES_MAX && equal_hashes < SHARE_COMPARES_MAX; k++) {
+		const struct share_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
+		if (!slot->share)
 			break;
-		if (at->hash != hash)
+		if (slot->hash != hash)
 			continue;
-		if (at->share->size == size && (size == 0 || memcmp(at->share->bytes, bytes, size) == 0))
-			return at->share;
-		alike++;
+		if (slot->share->size == size && (size == 0 || memcmp(slot->share->bytes, bytes, size) == 0))
+			return slot->share;
+		equal_hashes++;
 	}
-	*full = alike == SHARE_ALIKE;
+	*full = equal_hashes == SHARE_COMPARES_MAX;
 	return NULL;
 }
 
-static bool make_room(struct arena *a)
+static bool grow_share_table(struct arena *a)
 {
 	struct arena_shares *old = a->shares;
-	if (old && 2 * old->count < old->room)
+	if (old && 2 * old->count < old->capacity)
 		return true;
 	struct arena_shares *s = arena_alloc(a, 1, sizeof *s);
 	if (!s)
 		return false;
-	s->room = old ? 2 * old->room : SHARES_FIRST;
+	s->capacity = old ? 2 * old->capacity : SHARE_SLOTS_INITIAL;
 	s->count = 0;
-	s->at = arena_alloc(a, s->room, sizeof *s->at);
-	if (!s->at)
+	s->slots = arena_alloc(a, s->capacity, sizeof *s->slots);
+	if (!s->slots)
 		return false;
-	for (size_t i = 0; old && i < old->room; i++)
-		if (old->at[i].share)
-			add(s, old->at[i].hash, old->at[i].share);
+	for (size_t i = 0; old && i < old->capacity; i++)
+		if (old->slots[i].share)
+			insert_share(s, old->slots[i].hash, old->slots[i].share);
 	a->shares = s;
 	return true;
 }
@@ -145,10 +146,10 @@ struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size)
 {
 	size_t hash = share_hash(bytes, size);
 	bool full = false;
-	struct arena_share *known = a->shares ? find(a->shares, hash, bytes, size, &full) : NULL;
-	if (known)
-		return known;
-	if (!make_room(a))
+	struct arena_share *existing = a->shares ? find_share(a->shares, hash, bytes, size, &full) : NULL;
+	if (existing)
+		return existing;
+	if (!grow_share_table(a))
 		return NULL;
 	struct arena_share *new = arena_alloc(a, 1, sizeof *new);
 	void *copy = new ? arena_alloc(a, size, 1) : NULL;
@@ -158,7 +159,7 @@ struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size)
 		memcpy(copy, bytes, size);
 	*new = (struct arena_share){.bytes = copy, .size = size};
 	if (!full)
-		add(a->shares, hash, new);
+		insert_share(a->shares, hash, new);
 	return new;
 }
 

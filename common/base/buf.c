@@ -11,14 +11,14 @@ bool buf_reserve(struct buf *b, size_t count)
 		return false;
 	if (count <= b->capacity - b->size)
 		return true;
-	size_t want = b->capacity < 256 ? 256 : b->capacity;
-	while (want - b->size < count)
-		want = want > b->limit / 2 ? b->limit : want * 2;
-	unsigned char *bytes = mem_grow(b->bytes, b->capacity, want);
+	size_t new_capacity = b->capacity < 256 ? 256 : b->capacity;
+	while (new_capacity - b->size < count)
+		new_capacity = new_capacity > b->limit / 2 ? b->limit : new_capacity * 2;
+	unsigned char *bytes = mem_grow(b->bytes, b->capacity, new_capacity);
 	if (!bytes)
 		return false;
 	b->bytes = bytes;
-	b->capacity = want;
+	b->capacity = new_capacity;
 	return true;
 }
 

@@ -9,7 +9,7 @@
 #include <fcntl.h>
 #include <string.h>
 
-enum { BUFFER = 1 << 16, CRC = 4 };
+enum { BUFFER_SIZE = 1 << 16, CRC_SIZE = 4 };
 
 static int set_file_error(const struct checked_file *s, int code, struct error *e)
 {
@@ -21,7 +21,7 @@ static int open_file(struct checked_file *s, const char *path, int flags, struct
 	*s = (struct checked_file){.path = path, .fd = disk_open(path, flags | O_CLOEXEC, 0666)};
 	if (s->fd < 0)
 		return set_file_error(s, errno, e);
-	s->buffer = mem_alloc(BUFFER, 1);
+	s->buffer = mem_alloc(BUFFER_SIZE, 1);
 	if (s->buffer)
 		return 0;
 	disk_close(s->fd);
@@ -33,10 +33,10 @@ int checked_file_create(struct checked_file *s, const char *path, struct error *
 	return open_file(s, path, O_WRONLY | O_CREAT | O_TRUNC, e);
 }
 
-static int flush(struct checked_file *s, struct error *e)
+static int flush_buffer(struct checked_file *s, struct error *e)
 {
-	int rc = disk_write_all(s->fd, s->buffer, s->filled);
-	s->filled = 0;
+	int rc = disk_write_all(s->fd, s->buffer, s->buffered);
+	s->buffered = 0;
 	return rc ? set_file_error(s, -rc, e) : 0;
 }
 
@@ -44,14 +44,14 @@ static int flush(struct checked_file *s, struct error *e)
 int checked_file_write_numbers(struct checked_file *s, const void *numbers, size_t width, size_t count, struct error *e)
 {
 	for (const unsigned char *p = numbers; count;) {
-		size_t room = (BUFFER - s->filled) / width, n = count < room ? count : room, size = width * n;
-		copy_numbers(s->buffer + s->filled, p, width, n);
-		s->crc = crc32c(s->crc, s->buffer + s->filled, size);
-		s->filled += size;
-		s->bytes += size;
+		size_t room = (BUFFER_SIZE - s->buffered) / width, n = count < room ? count : room, size = width * n;
+		copy_numbers(s->buffer + s->buffered, p, width, n);
+		s->crc = crc32c(s->crc, s->buffer + s->buffered, size);
+		s->buffered += size;
+		s->bytes_written += size;
 		p += size;
 		count -= n;
-		int rc = BUFFER - s->filled < width ? flush(s, e) : 0;
+		int rc = BUFFER_SIZE - s->buffered < width ? flush_buffer(s, e) : 0;
 		if (rc)
 			return rc;
 	}
@@ -65,15 +65,15 @@ int checked_file_write(struct checked_file *s, const void *bytes, size_t size, s
 
 int checked_file_finish(struct checked_file *s, struct error *e)
 {
-	unsigned char crc[CRC];
+	unsigned char crc[CRC_SIZE];
 	put32(crc, s->crc);
 	int rc = checked_file_write(s, crc, sizeof crc, e);
 	if (!rc)
-		rc = flush(s, e);
+		rc = flush_buffer(s, e);
 	if (!rc && disk_fsync(s->fd))
 		rc = set_file_error(s, errno, e);
 	if (!rc)
-		disk_forget(s->fd);
+		disk_drop_cache(s->fd);
 	if (disk_close(s->fd) && !rc)
 		rc = set_file_error(s, errno, e);
 	mem_free(s->buffer);
@@ -86,67 +86,68 @@ static int refill_buffer(struct checked_file *s, struct error *e)
 {
 	ssize_t n;
 	do
-		n = disk_pread(s->fd, s->buffer, BUFFER, (off_t)s->from);
+		n = disk_pread(s->fd, s->buffer, BUFFER_SIZE, (off_t)s->file_offset);
 	while (n < 0 && errno == EINTR);
-	s->at = 0;
-	s->filled = n > 0 ? (size_t)n : 0;
-	s->from += s->filled;
+	s->buffer_offset = 0;
+	s->buffered = n > 0 ? (size_t)n : 0;
+	s->file_offset += s->buffered;
 	if (n < 0)
 		return set_file_error(s, errno, e);
-	return s->progress ? s->progress(s->user, s->filled, e) : 0;
+	return s->progress ? s->progress(s->user, s->buffered, e) : 0;
 }
 
 static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
 	for (unsigned char *p = bytes; size;) {
-		int rc = s->at == s->filled ? refill_buffer(s, e) : 0;
+		int rc = s->buffer_offset == s->buffered ? refill_buffer(s, e) : 0;
 		if (rc)
 			return rc;
-		size_t n = s->filled - s->at < size ? s->filled - s->at : size;
+		size_t n = s->buffered - s->buffer_offset < size ? s->buffered - s->buffer_offset : size;
 		if (n == 0)
 			return error_set(e, EBADMSG, "%s: ends too early", s->path);
-		memcpy(p, s->buffer + s->at, n);
-		s->at += n;
+		memcpy(p, s->buffer + s->buffer_offset, n);
+		s->buffer_offset += n;
 		p += n;
 		size -= n;
 	}
 	return 0;
 }
 
-/* Reads the whole file and compares the CRC at its end. Sets the number of bytes before the CRC. */
-static int check(struct checked_file *s, struct error *e)
+/* Reads the whole file and compares the CRC_SIZE at its end. Sets the number of bytes before the CRC_SIZE. */
+static int verify_crc(struct checked_file *s, struct error *e)
 {
 	struct stat st;
-	unsigned char want[CRC];
+	unsigned char expected[CRC_SIZE];
 	uint32_t crc = 0;
 	if (disk_fstat(s->fd, &st))
 		return set_file_error(s, errno, e);
-	if ((uint64_t)st.st_size < sizeof want)
+	if ((uint64_t)st.st_size < sizeof expected)
 		return error_set(e, EBADMSG, "%s: too short", s->path);
-	s->left = (uint64_t)st.st_size - sizeof want;
-	for (uint64_t left = s->left; left;) {
-		int rc = s->at == s->filled ? refill_buffer(s, e) : 0;
-		size_t n = s->filled - s->at < left ? s->filled - s->at : (size_t)left;
+	s->remaining = (uint64_t)st.st_size - sizeof expected;
+	for (uint64_t remaining = s->remaining; remaining;) {
+		int rc = s->buffer_offset == s->buffered ? refill_buffer(s, e) : 0;
+		size_t n =
+			s->buffered - s->buffer_offset < remaining ? s->buffered - s->buffer_offset : (size_t)remaining;
 		if (rc || n == 0)
 			return rc ? rc : error_set(e, EBADMSG, "%s: ends too early", s->path);
-		crc = crc32c(crc, s->buffer + s->at, n);
-		s->at += n;
-		left -= n;
+		crc = crc32c(crc, s->buffer + s->buffer_offset, n);
+		s->buffer_offset += n;
+		remaining -= n;
 	}
-	int rc = read_bytes(s, want, sizeof want, e);
-	return rc ? rc : get32(want) == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
+	int rc = read_bytes(s, expected, sizeof expected, e);
+	return rc ? rc : get32(expected) == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
-int checked_file_open_watched(struct checked_file *s, const char *path, checked_file_progress *progress, void *user,
-			      struct error *e)
+int checked_file_open_with_progress(struct checked_file *s, const char *path, checked_file_progress *progress,
+				    void *user, struct error *e)
 {
 	int rc = open_file(s, path, O_RDONLY, e);
 	if (rc)
 		return rc;
 	s->progress = progress;
 	s->user = user;
-	rc = check(s, e);
-	s->at = s->filled = s->from = 0;
+	rc = verify_crc(s, e);
+	s->buffer_offset = s->buffered = s->file_offset = 0;
 	if (rc)
 		checked_file_close(s);
 	return rc;
@@ -154,14 +155,14 @@ int checked_file_open_watched(struct checked_file *s, const char *path, checked_
 
 int checked_file_open(struct checked_file *s, const char *path, struct error *e)
 {
-	return checked_file_open_watched(s, path, NULL, NULL, e);
+	return checked_file_open_with_progress(s, path, NULL, NULL, e);
 }
 
 int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
-	if (size > s->left)
+	if (size > s->remaining)
 		return error_set(e, EBADMSG, "%s: ends too early", s->path);
-	s->left -= size;
+	s->remaining -= size;
 	return read_bytes(s, bytes, size, e);
 }
 
@@ -174,10 +175,11 @@ int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t widt
 	return rc;
 }
 
-int checked_file_end(const struct checked_file *s, struct error *e)
+int checked_file_expect_end(const struct checked_file *s, struct error *e)
 {
-	return s->left ? error_set(e, EBADMSG, "%s: %llu bytes after its end", s->path, (unsigned long long)s->left)
-		       : 0;
+	return s->remaining ? error_set(e, EBADMSG, "%s: %llu bytes after its end", s->path,
+					(unsigned long long)s->remaining)
+			    : 0;
 }
 
 void checked_file_close(struct checked_file *s)

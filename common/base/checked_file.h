@@ -24,11 +24,11 @@ struct checked_file {
 	int fd;
 	uint32_t crc;
 	unsigned char *buffer;		 /* NULL: the file is closed */
-	size_t at;			 /* reading: offset of the next byte in the buffer */
-	size_t filled;			 /* bytes in the buffer */
-	uint64_t from;			 /* reading: offset in the file of the byte after the buffer's last */
-	uint64_t left;			 /* reading: bytes before the CRC that have not been read yet */
-	uint64_t bytes;			 /* writing: bytes written so far */
+	size_t buffer_offset;		 /* reading: offset of the next byte in the buffer */
+	size_t buffered;		 /* bytes in the buffer */
+	uint64_t file_offset;		 /* reading: offset in the file of the byte after the buffer's last */
+	uint64_t remaining;		 /* reading: bytes before the CRC that have not been read yet */
+	uint64_t bytes_written;		 /* writing: bytes written so far */
 	const char *path;		 /* not copied; must last as long as the file is open */
 	checked_file_progress *progress; /* called while reading; NULL: none */
 	void *user;
@@ -49,13 +49,13 @@ int checked_file_finish(struct checked_file *s, struct error *e);
 int checked_file_open(struct checked_file *s, const char *path, struct error *e);
 /* Like checked_file_open, but `progress` is told of all bytes read, each of them twice: the check reads the whole file
  * first. */
-int checked_file_open_watched(struct checked_file *s, const char *path, checked_file_progress *progress, void *user,
-			      struct error *e);
+int checked_file_open_with_progress(struct checked_file *s, const char *path, checked_file_progress *progress,
+				    void *user, struct error *e);
 /* Reads the next `size` bytes; -EBADMSG if the file has fewer. */
 int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e);
 int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t width, size_t count, struct error *e);
 /* Checks that all bytes have been read; -EBADMSG if some are left. */
-int checked_file_end(const struct checked_file *s, struct error *e);
+int checked_file_expect_end(const struct checked_file *s, struct error *e);
 /* May be called at any time, also twice. A file that was being written is left without a CRC. */
 void checked_file_close(struct checked_file *s);
 

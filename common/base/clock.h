@@ -6,7 +6,7 @@
 
 #include <time.h>
 
-static inline double clock_seconds_of(clockid_t clock)
+static inline double clock_read_seconds(clockid_t clock)
 {
 	struct timespec t;
 	clock_gettime(clock, &t);
@@ -16,19 +16,19 @@ static inline double clock_seconds_of(clockid_t clock)
 /* Seconds since 1970-01-01 UTC. */
 static inline double clock_wall_seconds(void)
 {
-	return clock_seconds_of(CLOCK_REALTIME);
+	return clock_read_seconds(CLOCK_REALTIME);
 }
 
 /* Seconds of the monotonic clock. */
 static inline double clock_seconds(void)
 {
-	return clock_seconds_of(CLOCK_MONOTONIC);
+	return clock_read_seconds(CLOCK_MONOTONIC);
 }
 
 /* Seconds of CPU time of the calling thread. */
 static inline double clock_thread_seconds(void)
 {
-	return clock_seconds_of(CLOCK_THREAD_CPUTIME_ID);
+	return clock_read_seconds(CLOCK_THREAD_CPUTIME_ID);
 }
 
 #endif

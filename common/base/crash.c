@@ -6,33 +6,33 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { STACK = 1 << 14 };
+enum { STACK_SIZE = 1 << 14 };
 
 static const struct {
 	int number;
 	const char *name;
 } signals[] = {{SIGSEGV, "SIGSEGV"}, {SIGBUS, "SIGBUS"}, {SIGFPE, "SIGFPE"}, {SIGILL, "SIGILL"}, {SIGABRT, "SIGABRT"}};
-enum { SIGNALS = sizeof signals / sizeof *signals };
+enum { SIGNAL_COUNT = sizeof signals / sizeof *signals };
 
 static _Thread_local struct {
-	const char *doing, *file;
+	const char *activity, *file;
 	int line;
-} place;
-static _Thread_local unsigned char stack[STACK];
+} context;
+static _Thread_local unsigned char handler_stack[STACK_SIZE];
 static void (*handler)(int number, const char *text);
-static struct sigaction before[SIGNALS];
+static struct sigaction previous_actions[SIGNAL_COUNT];
 static const char *program_name;
 
-void crash_place(const char *doing, const char *file, int line)
+void crash_set_context(const char *activity, const char *file, int line)
 {
-	place.doing = doing;
-	place.file = file;
-	place.line = line;
+	context.activity = activity;
+	context.file = file;
+	context.line = line;
 }
 
 const char *crash_signal_name(int number)
 {
-	for (int i = 0; i < SIGNALS; i++)
+	for (int i = 0; i < SIGNAL_COUNT; i++)
 		if (signals[i].number == number)
 			return signals[i].name;
 	return number == SIGKILL ? "SIGKILL" : "a signal";
@@ -40,13 +40,13 @@ const char *crash_signal_name(int number)
 
 static size_t append_text(char *text, size_t used, const char *more)
 {
-	while (*more && used + 1 < CRASH_TEXT)
+	while (*more && used + 1 < CRASH_TEXT_MAX)
 		text[used++] = *more++;
 	text[used] = 0;
 	return used;
 }
 
-static size_t add_number(char *text, size_t used, int n)
+static size_t append_number(char *text, size_t used, int n)
 {
 	char digits[12];
 	size_t i = sizeof digits - 1;
@@ -57,70 +57,70 @@ static size_t add_number(char *text, size_t used, int n)
 	return append_text(text, used, digits + i);
 }
 
-static void on_signal(int number)
+static void handle_signal(int number)
 {
-	char text[CRASH_TEXT];
-	int kept = errno;
+	char text[CRASH_TEXT_MAX];
+	int saved_errno = errno;
 	size_t n = append_text(text, 0, crash_signal_name(number));
-	if (place.doing) {
+	if (context.activity) {
 		n = append_text(text, n, " while ");
-		n = append_text(text, n, place.doing);
+		n = append_text(text, n, context.activity);
 	}
-	if (place.doing && place.file) {
+	if (context.activity && context.file) {
 		n = append_text(text, n, ": ");
-		n = append_text(text, n, place.file);
+		n = append_text(text, n, context.file);
 		n = append_text(text, n, ":");
-		add_number(text, n, place.line);
+		append_number(text, n, context.line);
 	}
 	handler(number, text);
-	for (int i = 0; i < SIGNALS; i++)
+	for (int i = 0; i < SIGNAL_COUNT; i++)
 		if (signals[i].number == number)
-			sigaction(number, &before[i], NULL);
-	errno = kept;
+			sigaction(number, &previous_actions[i], NULL);
+	errno = saved_errno;
 	raise(number); /* blocked until this function returns; a faulting instruction raises it again */
 }
 
-void crash_thread(void)
+void crash_init_thread(void)
 {
 	sigset_t all;
-	stack_t now;
+	stack_t current;
 	/* Sanitizers install an alternate stack in each thread and remove it when the thread ends: keep theirs. */
-	if (sigaltstack(NULL, &now) || (now.ss_flags & SS_DISABLE))
-		sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
+	if (sigaltstack(NULL, &current) || (current.ss_flags & SS_DISABLE))
+		sigaltstack(&(stack_t){.ss_sp = handler_stack, .ss_size = sizeof handler_stack}, NULL);
 	sigemptyset(&all);
-	for (int i = 0; i < SIGNALS; i++)
+	for (int i = 0; i < SIGNAL_COUNT; i++)
 		sigaddset(&all, signals[i].number);
 	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* a blocked signal would end the program without a message */
 }
 
-void crash_catch(void (*last_words)(int number, const char *text))
+void crash_install_handler(void (*on_crash)(int number, const char *text))
 {
-	struct sigaction a = {.sa_handler = on_signal, .sa_flags = SA_ONSTACK};
+	struct sigaction a = {.sa_handler = handle_signal, .sa_flags = SA_ONSTACK};
 	sigemptyset(&a.sa_mask);
-	handler = last_words;
-	crash_thread();
-	for (int i = 0; i < SIGNALS; i++)
-		sigaction(signals[i].number, &a, &before[i]);
+	handler = on_crash;
+	crash_init_thread();
+	for (int i = 0; i < SIGNAL_COUNT; i++)
+		sigaction(signals[i].number, &a, &previous_actions[i]);
 }
 
-static void write_text(const char *text)
+static void write_stderr(const char *text)
 {
 	ssize_t n = write(STDERR_FILENO, text, strlen(text));
 	(void)n;
 }
 
-static void say_and_exit(int number, const char *text)
+static void print_and_exit(int number, const char *text)
 {
 	(void)number;
-	write_text(program_name);
-	write_text(": ended by ");
-	write_text(text);
-	write_text(": a fault of this program or of a library that it uses\n");
+	write_stderr(program_name);
+	write_stderr(": ended by ");
+	write_stderr(text);
+	write_stderr(": a fault of this program or of a library that it uses\n");
 	_exit(1);
 }
 
-void crash_exit(const char *program)
+void crash_install_exit_handler(const char *program)
 {
 	program_name = program;
-	crash_catch(say_and_exit);
+	crash_install_handler(print_and_exit);
 }

@@ -69,7 +69,7 @@ const struct disk disk_system = {
 };
 const struct disk *disk_calls = &disk_system;
 
-void disk_use(const struct disk *calls)
+void disk_set_calls(const struct disk *calls)
 {
 	disk_calls = calls ? calls : &disk_system;
 }
@@ -93,7 +93,7 @@ int disk_write_all(int fd, const void *bytes, size_t size)
 
 /* Creates a new file. An existing file of that name is unlinked first, never written to: it may be a link to a file of
  * another user, or another process may have it open with wider permissions. */
-static int open_new(const char *path, mode_t mode)
+static int create_new(const char *path, mode_t mode)
 {
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
 	if (fd < 0 && errno == EEXIST && disk_unlink(path) == 0)
@@ -114,7 +114,7 @@ int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, 
 	int n = snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
-	int fd = open_new(temporary, mode);
+	int fd = create_new(temporary, mode);
 	int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
 	if (!rc && disk_fsync(fd))
 		rc = -errno;
@@ -141,8 +141,9 @@ int disk_sync_folder(const char *path, struct error *e)
 int disk_make_folder(const char *path, struct error *e)
 {
 	char parent[4096];
-	bool there = disk_mkdir(path, 0700) != 0; /* flushed again: an interrupted start may have left it not durable */
-	if (there && errno != EEXIST)
+	bool existed =
+		disk_mkdir(path, 0700) != 0; /* flushed again: an interrupted start may have left it not durable */
+	if (existed && errno != EEXIST)
 		return error_file(e, errno, path);
 	int n = snprintf(parent, sizeof parent, "%s", path);
 	if (n < 0 || (size_t)n >= sizeof parent)
@@ -155,31 +156,31 @@ int disk_make_folder(const char *path, struct error *e)
 	else if (slash)
 		*slash = 0;
 	int rc = disk_sync_folder(slash ? parent : ".", e);
-	return there && rc == -EACCES ? 0 : rc; /* the folder exists; its parent cannot be opened to be flushed */
+	return existed && rc == -EACCES ? 0 : rc; /* the folder exists; its parent cannot be opened to be flushed */
 }
 
 void disk_list_begin(struct disk_list *l, const char *path)
 {
-	*l = (struct disk_list){.path = path, .d = disk_opendir(path)};
-	l->fault = l->d ? 0 : errno;
+	*l = (struct disk_list){.path = path, .dir = disk_opendir(path)};
+	l->first_errno = l->dir ? 0 : errno;
 }
 
 const char *disk_list_next(struct disk_list *l)
 {
-	const struct dirent *f = NULL;
+	const struct dirent *entry = NULL;
 	do {
 		errno = 0;
-		f = l->d && !l->fault ? disk_readdir(l->d) : NULL;
-		if (!f && errno)
-			l->fault = errno;
-	} while (f && (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0));
-	return f ? f->d_name : NULL;
+		entry = l->dir && !l->first_errno ? disk_readdir(l->dir) : NULL;
+		if (!entry && errno)
+			l->first_errno = errno;
+	} while (entry && (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0));
+	return entry ? entry->d_name : NULL;
 }
 
 int disk_list_end(struct disk_list *l, int rc, struct error *e)
 {
-	if (l->d)
-		closedir(l->d);
-	l->d = NULL;
-	return !rc && l->fault ? error_file(e, l->fault, l->path) : rc;
+	if (l->dir)
+		closedir(l->dir);
+	l->dir = NULL;
+	return !rc && l->first_errno ? error_file(e, l->first_errno, l->path) : rc;
 }

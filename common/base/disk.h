@@ -3,7 +3,7 @@
  * All file I/O of data that must survive a crash: the coordinator's spool, blob stores, film files, checked files. The
  * functions are the system's, with its conventions (-1 and errno), called through a table; tests replace the table by a
  * disk that is full, fails, or loses data that was not flushed. tests/lint/disk.sh checks that these files are accessed
- * in no other way; SQLite has its own layer (its VFS). Any thread; call disk_use before there is more than one.
+ * in no other way; SQLite has its own layer (its VFS). Any thread; call disk_set_calls before there is more than one.
  * Allocates nothing.
  *
  * Flushing a file makes its bytes and its length durable; flushing its folder makes its name durable. A flush that
@@ -56,7 +56,7 @@ struct disk {
 #undef DISK_MEMBER
 
 extern const struct disk *disk_calls;
-void disk_use(const struct disk *calls); /* NULL: the system's functions */
+void disk_set_calls(const struct disk *calls); /* NULL: the system's functions */
 extern const struct disk disk_system;
 
 #define DISK_WRAPPER(result, name, parameters, arguments) \
@@ -74,13 +74,13 @@ static inline bool disk_is_full(int code)
 }
 
 /* Advises the kernel to drop the file from the page cache: it is read again only after a crash. */
-static inline void disk_forget(int fd)
+static inline void disk_drop_cache(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
 }
 
 /* Advises the kernel that the whole file will soon be read, sequentially. */
-static inline void disk_read_through(int fd)
+static inline void disk_prefetch(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
 	posix_fadvise(fd, 0, 0, POSIX_FADV_WILLNEED);
@@ -102,8 +102,8 @@ int disk_make_folder(const char *path, struct error *e);
  * reports such an error. Names may be removed while a list is open. */
 struct disk_list {
 	const char *path; /* not copied */
-	DIR *d;
-	int fault; /* errno of the first error; 0: none */
+	DIR *dir;
+	int first_errno; /* errno of the first error; 0: none */
 };
 void disk_list_begin(struct disk_list *l, const char *path);
 /* Returns the next name, valid until the next call; NULL at the end or after an error. */

@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define FNV_BEGIN 0xcbf29ce484222325u
+#define FNV_OFFSET_BASIS 0xcbf29ce484222325u
 
-/* Continues `hash`, the hash of the preceding bytes or FNV_BEGIN, with `size` more bytes. */
+/* Continues `hash`, the hash of the preceding bytes or FNV_OFFSET_BASIS, with `size` more bytes. */
 static inline uint64_t fnv_add(uint64_t hash, const void *bytes, size_t size)
 {
 	const unsigned char *p = bytes;

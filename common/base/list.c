@@ -5,29 +5,29 @@
 
 void *list_push(struct list *l)
 {
-	if (l->count == l->room) {
-		size_t room = l->room ? 2 * l->room : 256;
-		void *more = mem_grow(l->items, l->room * l->size, room * l->size);
-		if (!more)
+	if (l->count == l->capacity) {
+		size_t capacity = l->capacity ? 2 * l->capacity : 256;
+		void *grown = mem_grow(l->items, l->capacity * l->item_size, capacity * l->item_size);
+		if (!grown)
 			return NULL;
-		l->items = more;
-		l->room = room;
+		l->items = grown;
+		l->capacity = capacity;
 	}
-	return (char *)l->items + l->size * l->count++;
+	return (char *)l->items + l->item_size * l->count++;
 }
 
-void list_free(struct list *l)
+void list_fini(struct list *l)
 {
 	mem_free(l->items);
-	*l = (struct list){.size = l->size};
+	*l = (struct list){.item_size = l->item_size};
 }
 
-void *list_room(void *items, size_t count, size_t size)
+void *list_grow_array(void *items, size_t count, size_t size)
 {
 	return count & (count - 1) ? items : mem_grow(items, count * size, (count ? 2 * count : 1) * size);
 }
 
-int double_compare(const void *a, const void *b)
+int compare_doubles(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x > y) - (x < y);

@@ -23,8 +23,8 @@
 #include <unistd.h>
 
 enum {
-	LINE_MAX_BYTES = 2048,
-	PATIENCE_MS = 100, /* the longest wait for a slow reader of stderr */
+	LINE_BYTES_MAX = 2048,
+	WRITE_TIMEOUT_MS = 100, /* the longest wait for a slow reader of stderr */
 };
 
 static const struct {
@@ -37,20 +37,20 @@ static const struct {
 };
 
 /* Rate-limited events: anyone who can connect to the port, or a worker by its messages, can cause them. */
-static const enum log_event limited[] = {LOG_PEER_ACCEPT,  LOG_PEER_HELLO,     LOG_PEER_REFUSED,
-					 LOG_PEER_CLOSED,  LOG_PEER_FAULT,     LOG_PEER_GARBLED,
-					 LOG_LEASE_FAILED, LOG_BATCH_REPEATED, LOG_BATCH_REFUSED};
-enum { LIMITED = sizeof limited / sizeof *limited };
-static struct log_bucket buckets[LIMITED];
+static const enum log_event limited_events[] = {LOG_PEER_ACCEPT,  LOG_PEER_HELLO,     LOG_PEER_REFUSED,
+						LOG_PEER_CLOSED,  LOG_PEER_FAULT,     LOG_PEER_GARBLED,
+						LOG_LEASE_FAILED, LOG_BATCH_REPEATED, LOG_BATCH_REFUSED};
+enum { LIMITED_COUNT = sizeof limited_events / sizeof *limited_events };
+static struct log_bucket buckets[LIMITED_COUNT];
 static pthread_mutex_t bucket_lock = PTHREAD_MUTEX_INITIALIZER;
 
-static const char *const levels[] = {"debug", "info", "warn", "error"};
+static const char *const level_names[] = {"debug", "info", "warn", "error"};
 
-static atomic_int least_level = LOG_LEVEL_INFO;
+static atomic_int min_level = LOG_LEVEL_INFO;
 
-void log_set_level(enum log_level least)
+void log_set_level(enum log_level level)
 {
-	atomic_store(&least_level, (int)least);
+	atomic_store(&min_level, (int)level);
 }
 
 struct log_value log_quote(const char *text)
@@ -78,36 +78,36 @@ size_t log_format(char *line, size_t size, enum log_event event, const char *fie
 	gmtime_r(&now.tv_sec, &utc);
 	strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
 	int n = snprintf(line, size, "time=%s.%03ldZ level=%s event=%s%s%s", stamp, now.tv_nsec / 1000000,
-			 levels[events[event].level], events[event].name, *fields ? " " : "", fields);
+			 level_names[events[event].level], events[event].name, *fields ? " " : "", fields);
 	if (n < 0)
 		return 0;
 	return (size_t)n < size ? (size_t)n : size - 1;
 }
 
-static bool is_shown(enum log_event event)
+static bool is_enabled(enum log_event event)
 {
-	return (int)events[event].level >= atomic_load(&least_level);
+	return (int)events[event].level >= atomic_load(&min_level);
 }
 
-static bool may_say(enum log_event event)
+static bool take_log_token(enum log_event event)
 {
-	bool may = true;
-	for (int i = 0; i < LIMITED && atomic_load(&least_level) > LOG_LEVEL_DEBUG; i++) {
-		if (limited[i] != event)
+	bool allowed = true;
+	for (int i = 0; i < LIMITED_COUNT && atomic_load(&min_level) > LOG_LEVEL_DEBUG; i++) {
+		if (limited_events[i] != event)
 			continue;
 		pthread_mutex_lock(&bucket_lock);
-		may = log_bucket_take(&buckets[i], clock_seconds());
+		allowed = log_bucket_take(&buckets[i], clock_seconds());
 		pthread_mutex_unlock(&bucket_lock);
 	}
-	return may;
+	return allowed;
 }
 
 /* ---- writing ---- */
 
 static pthread_mutex_t output_lock = PTHREAD_MUTEX_INITIALIZER;
-static int output = -1;
-static bool stuck;	 /* the last line was dropped */
-static uint64_t dropped; /* lines dropped since the last line that was written */
+static int output_fd = -1;
+static bool is_stuck;	       /* the last line was dropped */
+static uint64_t dropped_count; /* lines dropped since the last line that was written */
 
 /* Pipes and terminals are opened a second time, because O_NONBLOCK on the inherited descriptor would also apply to the
  * other programs that share it. A file that cannot be reopened (a socket) is used as it is; write then blocks only if
@@ -122,28 +122,29 @@ static int open_output(void)
 }
 
 /* Writes one line. Returns false if it was dropped; otherwise *before is the number of lines dropped just before. */
-static bool write_out(const char *line, size_t size, uint64_t *before)
+static bool write_or_drop(const char *line, size_t size, uint64_t *dropped_before)
 {
 	pthread_mutex_lock(&output_lock);
-	if (output < 0)
-		output = open_output();
-	struct pollfd p = {.fd = output, .events = POLLOUT};
-	stuck = poll(&p, 1, stuck ? 0 : PATIENCE_MS) == 0 || (write(output, line, size) < 0 && errno == EAGAIN);
-	*before = stuck ? 0 : dropped;
-	dropped = stuck ? dropped + 1 : 0;
-	bool written = !stuck;
+	if (output_fd < 0)
+		output_fd = open_output();
+	struct pollfd p = {.fd = output_fd, .events = POLLOUT};
+	is_stuck = poll(&p, 1, is_stuck ? 0 : WRITE_TIMEOUT_MS) == 0 ||
+		   (write(output_fd, line, size) < 0 && errno == EAGAIN);
+	*dropped_before = is_stuck ? 0 : dropped_count;
+	dropped_count = is_stuck ? dropped_count + 1 : 0;
+	bool written = !is_stuck;
 	pthread_mutex_unlock(&output_lock);
 	return written;
 }
 
-static void put_back(uint64_t lines)
+static void restore_dropped(uint64_t lines)
 {
 	pthread_mutex_lock(&output_lock);
-	dropped += lines;
+	dropped_count += lines;
 	pthread_mutex_unlock(&output_lock);
 }
 
-static size_t print_dropped(char *line, size_t size, uint64_t lines)
+static size_t format_dropped(char *line, size_t size, uint64_t lines)
 {
 	char text[32];
 	snprintf(text, sizeof text, "more=%llu", log_u64(lines));
@@ -154,33 +155,34 @@ static size_t print_dropped(char *line, size_t size, uint64_t lines)
 
 static void write_line(const char *line, size_t size)
 {
-	char more[160];
-	uint64_t before, none;
-	if (!write_out(line, size, &before) || !before)
+	char report[160];
+	uint64_t dropped_before, ignored;
+	if (!write_or_drop(line, size, &dropped_before) || !dropped_before)
 		return;
-	size_t n = print_dropped(more, sizeof more, before);
-	if (!write_out(more, n, &none))
-		put_back(before - 1); /* write_out has counted the report itself as a dropped line */
+	size_t n = format_dropped(report, sizeof report, dropped_before);
+	if (!write_or_drop(report, n, &ignored))
+		restore_dropped(dropped_before - 1); /* write_or_drop has counted the report itself as a dropped line */
 }
 
-void log_tick(void)
+void log_report_withheld(void)
 {
-	for (int i = 0; i < LIMITED; i++) {
+	for (int i = 0; i < LIMITED_COUNT; i++) {
 		pthread_mutex_lock(&bucket_lock);
-		uint64_t n = log_bucket_withheld(&buckets[i], clock_seconds());
+		uint64_t n = log_bucket_take_withheld(&buckets[i], clock_seconds());
 		pthread_mutex_unlock(&bucket_lock);
-		if (n && is_shown(limited[i]))
-			log_event(LOG_LOG_WITHHELD, "of=%s more=%llu", events[limited[i]].name, (unsigned long long)n);
+		if (n && is_enabled(limited_events[i]))
+			log_event(LOG_LOG_WITHHELD, "of=%s more=%llu", events[limited_events[i]].name,
+				  (unsigned long long)n);
 	}
 }
 
 bool log_event(enum log_event event, const char *fields, ...)
 {
-	if (!may_say(event))
+	if (!take_log_token(event))
 		return false;
-	if (!is_shown(event))
+	if (!is_enabled(event))
 		return true;
-	char text[LINE_MAX_BYTES], line[LINE_MAX_BYTES];
+	char text[LINE_BYTES_MAX], line[LINE_BYTES_MAX];
 	va_list ap;
 	va_start(ap, fields);
 	vsnprintf(text, sizeof text, fields, ap);

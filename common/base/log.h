@@ -74,7 +74,7 @@ enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERRO
 void log_set_level(enum log_level least);
 
 /* Writes one line. `fields` is a format such as "job=j%llu name=%s"; text from outside must go through log_quote. A
- * line has at most 2,047 bytes. Returns false if the rate limit of its kind suppressed it (see log_tick). */
+ * line has at most 2,047 bytes. Returns false if the rate limit of its kind suppressed it (see log_report_withheld). */
 __attribute__((format(printf, 2, 3))) bool log_event(enum log_event event, const char *fields, ...);
 
 enum { LOG_VALUE_MAX = 512 };
@@ -90,9 +90,9 @@ static inline unsigned long long log_u64(uint64_t n)
 }
 
 /* Events that a peer can cause are rate-limited, each kind on its own: a burst of 100 lines, then 5 a second; the rest
- * are only counted (log_limit.h). With LOG_LEVEL_DEBUG all are written. Call log_tick regularly: it logs how
+ * are only counted (log_limit.h). With LOG_LEVEL_DEBUG all are written. Call log_report_withheld regularly: it logs how
  * many lines of each kind were suppressed. */
-void log_tick(void);
+void log_report_withheld(void);
 
 /* Formats the line that log_event would write, without the newline, for the logs of jobs. Returns its length. */
 size_t log_format(char *line, size_t size, enum log_event event, const char *fields);

@@ -3,29 +3,29 @@
 
 static void refill_bucket(struct log_bucket *b, double now)
 {
-	double back = now > b->at ? (now - b->at) * LOG_PER_SECOND : 0;
-	b->used = b->used > back ? b->used - back : 0;
-	b->at = now > b->at ? now : b->at;
+	double refilled = now > b->last_time ? (now - b->last_time) * LOG_PER_SECOND : 0;
+	b->used_tokens = b->used_tokens > refilled ? b->used_tokens - refilled : 0;
+	b->last_time = now > b->last_time ? now : b->last_time;
 }
 
 bool log_bucket_take(struct log_bucket *b, double now)
 {
 	refill_bucket(b, now);
-	if (b->used + 1 > LOG_BURST) {
+	if (b->used_tokens + 1 > LOG_BURST) {
 		b->withheld++;
 		return false;
 	}
-	b->used++;
+	b->used_tokens++;
 	return true;
 }
 
-uint64_t log_bucket_withheld(struct log_bucket *b, double now)
+uint64_t log_bucket_take_withheld(struct log_bucket *b, double now)
 {
 	uint64_t n = b->withheld;
 	refill_bucket(b, now);
-	if (!n || b->used + 1 > LOG_BURST)
+	if (!n || b->used_tokens + 1 > LOG_BURST)
 		return 0;
-	b->used++; /* the line that reports this */
+	b->used_tokens++; /* the line that reports this */
 	b->withheld = 0;
 	return n;
 }

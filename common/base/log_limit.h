@@ -12,15 +12,15 @@
 enum { LOG_BURST = 100, LOG_PER_SECOND = 5 };
 
 struct log_bucket {
-	double used;	   /* tokens used at time `at`; zeroed: a full bucket */
-	double at;	   /* time of the last call, s */
-	uint64_t withheld; /* lines suppressed since log_bucket_withheld last reported any */
+	double used_tokens; /* tokens used at time `last_time`; zeroed: a full bucket */
+	double last_time;   /* time of the last call, s */
+	uint64_t withheld;  /* lines suppressed since log_bucket_take_withheld last reported any */
 };
 
 /* Returns whether the line may be written; if not, it is counted. `now` is in s and never decreases. */
 bool log_bucket_take(struct log_bucket *b, double now);
 /* Once lines are allowed again, returns how many were suppressed, resets that count and takes a token for the line that
  * reports it; otherwise returns 0. */
-uint64_t log_bucket_withheld(struct log_bucket *b, double now);
+uint64_t log_bucket_take_withheld(struct log_bucket *b, double now);
 
 #endif

@@ -33,10 +33,10 @@ void mem_free(void *p)
 	free(p);
 }
 
-void mem_keep(size_t bytes)
+void mem_retain_freed(size_t bytes)
 {
-	enum { MAPPED_MOST = 32 << 20 }; /* glibc's maximum */
+	enum { MMAP_THRESHOLD_MAX = 32 << 20 }; /* glibc's maximum */
 	int limit = bytes < INT_MAX ? (int)bytes : INT_MAX;
 	mallopt(M_TRIM_THRESHOLD, limit);
-	mallopt(M_MMAP_THRESHOLD, limit < MAPPED_MOST ? limit : MAPPED_MOST);
+	mallopt(M_MMAP_THRESHOLD, limit < MMAP_THRESHOLD_MAX ? limit : MMAP_THRESHOLD_MAX);
 }

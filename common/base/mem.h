@@ -19,6 +19,6 @@ void mem_free(void *p);
  * than that (or than 32 MiB) are returned to the kernel as soon as they are freed. Without this call, a daemon that
  * allocates and frees buffers of megabytes spends a fifth of its time on page faults, and one that reads large meshes
  * keeps half as much memory again unused, because the C library adapts its thresholds by itself. */
-void mem_keep(size_t bytes);
+void mem_retain_freed(size_t bytes);
 
 #endif

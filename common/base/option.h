@@ -16,27 +16,27 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The kind of an option's argument. From OPTION_IS_HELP on: the options that every program has. */
+/* The kind of an option's argument. From OPTION_KIND_HELP on: the options that every program has. */
 enum option_kind {
-	OPTION_IS_END,	  /* no option: marks the end of a table */
-	OPTION_IS_FLAG,	  /* no argument */
-	OPTION_IS_TEXT,	  /* any text; points into argv */
-	OPTION_IS_OUTPUT, /* the path of an output file, like a text, but "-" becomes /dev/stdout */
-	OPTION_IS_NAME,	  /* a text to be displayed: 1 to `most` bytes of UTF-8 without control characters */
-	OPTION_IS_NUMBER, /* a floating point number from least to most */
-	OPTION_IS_COUNT,  /* a whole number: 4000, 1.5k */
-	OPTION_IS_SIZE,	  /* a number of `unit` bytes, or 500k, 64M, 20G, 2T; stored in bytes */
-	OPTION_IS_TIME,	  /* a number of `unit` seconds, or 90s, 5m, 2h, 3d; stored in seconds */
-	OPTION_IS_RATIO,  /* 0.05 or 5%, at most 1 */
-	OPTION_IS_OTHER,  /* converted by the row's function `take` */
-	OPTION_IS_HELP,
-	OPTION_IS_USAGE,
-	OPTION_IS_VERSION,
-	OPTION_IS_MAN,
-	OPTION_IS_COMPLETION,
+	OPTION_KIND_END,    /* no option: marks the end of a table */
+	OPTION_KIND_FLAG,   /* no argument */
+	OPTION_KIND_TEXT,   /* any text; points into argv */
+	OPTION_KIND_OUTPUT, /* the path of an output file, like a text, but "-" becomes /dev/stdout */
+	OPTION_KIND_NAME,   /* a text to be displayed: 1 to `max` bytes of UTF-8 without control characters */
+	OPTION_KIND_NUMBER, /* a floating point number from least to most */
+	OPTION_KIND_COUNT,  /* a whole number: 4000, 1.5k */
+	OPTION_KIND_SIZE,   /* a number of `unit` bytes, or 500k, 64M, 20G, 2T; stored in bytes */
+	OPTION_KIND_TIME,   /* a number of `unit` seconds, or 90s, 5m, 2h, 3d; stored in seconds */
+	OPTION_KIND_RATIO,  /* 0.05 or 5%, at most 1 */
+	OPTION_KIND_CUSTOM, /* converted by the row's function `parse` */
+	OPTION_KIND_HELP,
+	OPTION_KIND_USAGE,
+	OPTION_KIND_VERSION,
+	OPTION_KIND_MAN,
+	OPTION_KIND_COMPLETION,
 };
 
-enum option_store { OPTION_BOOL, OPTION_STRING, OPTION_DOUBLE, OPTION_UINT64, OPTION_UINT32, OPTION_INT };
+enum option_field_type { OPTION_BOOL, OPTION_STRING, OPTION_DOUBLE, OPTION_UINT64, OPTION_UINT32, OPTION_INT };
 
 /* Returns the i-th accepted name; NULL after the last. */
 typedef const char *option_values(size_t i);
@@ -49,20 +49,21 @@ struct option_row {
 	const char *arg;  /* name of the argument; NULL: the option takes none */
 	const char *help; /* without a full stop at the end, and without the default */
 	enum option_kind kind;
-	enum option_store store;
-	size_t offset;		  /* of the field in the struct that the table fills */
-	double least, most, unit; /* the bounds, in units (1 for numbers); most = DBL_MAX: no upper bound */
-	bool above, below;	  /* `least` or `most` itself is not allowed */
-	bool needed;		  /* for a text: a NULL after parsing is a usage error */
-	const char *standard;	  /* the default, parsed like an argument; NULL: the field is left as it is */
-	const char *environment;  /* environment variable used if the option is not given; NULL: none */
-	option_values *values;	  /* the only accepted arguments; NULL: any */
-	int (*take)(void *target, char *arg, struct error *e); /* arg may be changed; may be NULL */
-	void (*more)(char *text, size_t size); /* appends a default known only at run time to the help; NULL: none */
+	enum option_field_type field_type;
+	size_t offset;			 /* of the field in the struct that the table fills */
+	double min, max, unit;		 /* the bounds, in units (1 for numbers); max = DBL_MAX: no upper bound */
+	bool min_excluded, max_excluded; /* `min` or `max` itself is not allowed */
+	bool required;			 /* for a text: a NULL after parsing is a usage error */
+	const char *default_value;	 /* the default, parsed like an argument; NULL: the field is left as it is */
+	const char *environment;	 /* environment variable used if the option is not given; NULL: none */
+	option_values *values;		 /* the only accepted arguments; NULL: any */
+	int (*parse)(void *target, char *arg, struct error *e); /* arg may be changed; may be NULL */
+	void (*append_default)(char *text,
+			       size_t size); /* appends a default known only at run time to the help; NULL: none */
 };
 
-#define OPTION_STORE(type, field) \
-	.offset = offsetof(type, field), .store = _Generic(((type *)0)->field, bool                                    \
+#define OPTION_FIELD(type, field) \
+	.offset = offsetof(type, field), .field_type = _Generic(((type *)0)->field, bool                                    \
 							   : OPTION_BOOL, const char *                                 \
 							   : OPTION_STRING, double                                     \
 							   : OPTION_DOUBLE, uint64_t                                   \
@@ -70,22 +71,22 @@ struct option_row {
 							   : OPTION_UINT32, int                                        \
 							   : OPTION_INT)
 /* The last part of a row: the kind of the argument, and the field that it fills. */
-#define OPTION_FLAG(type, field) .kind = OPTION_IS_FLAG, OPTION_STORE(type, field)
-#define OPTION_TEXT(type, field) .kind = OPTION_IS_TEXT, OPTION_STORE(type, field)
-#define OPTION_OUTPUT(type, field) .kind = OPTION_IS_OUTPUT, OPTION_STORE(type, field)
-#define OPTION_NAME(type, field, bytes) .kind = OPTION_IS_NAME, OPTION_STORE(type, field), .most = (bytes)
+#define OPTION_FLAG(type, field) .kind = OPTION_KIND_FLAG, OPTION_FIELD(type, field)
+#define OPTION_TEXT(type, field) .kind = OPTION_KIND_TEXT, OPTION_FIELD(type, field)
+#define OPTION_OUTPUT(type, field) .kind = OPTION_KIND_OUTPUT, OPTION_FIELD(type, field)
+#define OPTION_NAME(type, field, bytes) .kind = OPTION_KIND_NAME, OPTION_FIELD(type, field), .max = (bytes)
 #define OPTION_NUMBER(type, field, from, to) \
-	.kind = OPTION_IS_NUMBER, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = 1
+	.kind = OPTION_KIND_NUMBER, OPTION_FIELD(type, field), .min = (from), .max = (to), .unit = 1
 #define OPTION_SIZE(type, field, from, to, bytes) \
-	.kind = OPTION_IS_SIZE, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = (bytes)
+	.kind = OPTION_KIND_SIZE, OPTION_FIELD(type, field), .min = (from), .max = (to), .unit = (bytes)
 #define OPTION_COUNT(type, field, from, to) \
-	.kind = OPTION_IS_COUNT, OPTION_STORE(type, field), .least = (from), .most = (to)
+	.kind = OPTION_KIND_COUNT, OPTION_FIELD(type, field), .min = (from), .max = (to)
 #define OPTION_TIME(type, field, from, to, seconds) \
-	.kind = OPTION_IS_TIME, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = (seconds)
+	.kind = OPTION_KIND_TIME, OPTION_FIELD(type, field), .min = (from), .max = (to), .unit = (seconds)
 #define OPTION_SECONDS(type, field, from, to) OPTION_TIME(type, field, from, to, 1)
 #define OPTION_RATIO(type, field, from, to) \
-	.kind = OPTION_IS_RATIO, OPTION_STORE(type, field), .least = (from), .most = (to)
-#define OPTION_TAKE(function) .kind = OPTION_IS_OTHER, .take = (function)
+	.kind = OPTION_KIND_RATIO, OPTION_FIELD(type, field), .min = (from), .max = (to)
+#define OPTION_CUSTOM(function) .kind = OPTION_KIND_CUSTOM, .parse = (function)
 
 struct option_group {
 	const char *title; /* NULL: none */
@@ -101,29 +102,30 @@ struct option_table {
 /* A program as its help describes it. Each line of a text is wrapped on its own, except in the examples. */
 struct program {
 	const char *name;
-	const char *words;    /* the words after the options, one line per form of the command; NULL: nothing */
-	const char *summary;  /* one sentence */
-	const char *examples; /* one per line */
-	const char *details;  /* further text */
-	const char *exits;    /* "0 done, 1 failed, 2 usage" */
-	struct option_table own;
-	const struct option_table *shared; /* options of several programs: fill the struct's first member; NULL: none */
-	option_values *verbs;		   /* accepted first words; NULL: any */
+	const char *synopsis;	/* the words after the options, one line per form of the command; NULL: nothing */
+	const char *summary;	/* one sentence */
+	const char *examples;	/* one per line */
+	const char *details;	/* further text */
+	const char *exit_codes; /* "0 done, 1 failed, 2 usage" */
+	struct option_table options;
+	const struct option_table
+		*shared_options; /* options of several programs: fill the struct's first member; NULL: none */
+	option_values *verbs;	 /* accepted first words; NULL: any */
 	/* Called with the index-th word that is not an option; NULL: such words are errors. */
-	int (*word)(void *target, size_t index, char *word, struct error *e);
+	int (*parse_word)(void *target, size_t index, char *word, struct error *e);
 };
 
 /* Stores the defaults of a table; does not read the environment. */
-int option_defaults(const struct option_table *t, void *target, struct error *e);
+int option_set_defaults(const struct option_table *t, void *target, struct error *e);
 
 /* Stores the defaults, then reads the environment and the command line, then runs the checks. Returns -EINVAL with a
  * sentence for the user after a usage error. If an option that every program has was given, *asked is its kind and the
- * words after it have not been parsed; otherwise *asked is OPTION_IS_END. */
+ * words after it have not been parsed; otherwise *asked is OPTION_KIND_END. */
 int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
 		  struct error *e);
 
 /* Returns the i-th row of a program, NULL after the last: its own rows, the shared ones, then those that every program
  * has. *group is the group of the row; group may be NULL. */
-const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group);
+const struct option_row *option_row_at(const struct program *p, size_t i, const struct option_group **group);
 
 #endif

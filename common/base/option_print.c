@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Prints what option_print.h lists. The help and the manual page have the same sentences in two layouts: describe()
- * builds the text of an option from its help, values, default and environment variable. The completion script offers
- * the names of options and, as arguments, an option's values, or files or folders if the argument's name says so.
+ * Prints what option_print.h lists. The help and the manual page have the same sentences in two layouts:
+ * describe_option() builds the text of an option from its help, values, default and environment variable. The
+ * completion script offers the names of options and, as arguments, an option's values, or files or folders if the
+ * argument's name says so.
  *
  * Nothing here returns an error: a description is cut after 4,096 bytes, --usage prints nothing if memory is out, and
  * output lost on stdout is reported when the program ends (program.c).
@@ -15,37 +16,38 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MARGIN = 79, HELP_COLUMN = 29, DESCRIPTION = 4096 };
+enum { LINE_WIDTH = 79, HELP_COLUMN = 29, DESCRIPTION_MAX = 4096 };
 
 /* Appends the values as "path, bdpt or hslt". */
-static void put_values(struct text *t, option_values *values)
+static void append_values(struct text *t, option_values *values)
 {
 	const char *name;
 	for (size_t i = 0; (name = values(i)) != NULL; i++)
-		text_put(t, "%s%s", i == 0 ? "" : values(i + 1) ? ", " : " or ", name);
+		text_appendf(t, "%s%s", i == 0 ? "" : values(i + 1) ? ", " : " or ", name);
 }
 
-static void describe(const struct option_row *r, char *text, size_t size)
+static void describe_option(const struct option_row *r, char *text, size_t size)
 {
 	struct text t = {text, size};
 	*text = 0;
 	if (r->values) {
-		put_values(&t, r->values);
-		text_put(&t, " ");
+		append_values(&t, r->values);
+		text_appendf(&t, " ");
 	}
-	text_put(&t, "%s", r->help);
-	if (r->standard || r->environment)
-		text_put(&t, " (%s%s%s%s)", r->standard ? r->standard : "", r->standard && r->environment ? "; " : "",
-			 r->environment ? "or $" : "", r->environment ? r->environment : "");
-	if (r->more)
-		r->more(t.at, t.left);
+	text_appendf(&t, "%s", r->help);
+	if (r->default_value || r->environment)
+		text_appendf(&t, " (%s%s%s%s)", r->default_value ? r->default_value : "",
+			     r->default_value && r->environment ? "; " : "", r->environment ? "or $" : "",
+			     r->environment ? r->environment : "");
+	if (r->append_default)
+		r->append_default(t.end, t.remaining);
 }
 
 /* ---- help ---- */
 
-/* Prints the words of a line of n bytes, wrapped at MARGIN. The output is at `column`; further lines are indented to
- * column `indent`. */
-static void print_filled(FILE *out, const char *line, size_t n, size_t column, size_t indent)
+/* Prints the words of a line of n bytes, wrapped at LINE_WIDTH. The output is at `column`; further lines are indented
+ * to column `indent`. */
+static void print_wrapped(FILE *out, const char *line, size_t n, size_t column, size_t indent)
 {
 	const char *end = line + n;
 	bool first = true;
@@ -53,7 +55,7 @@ static void print_filled(FILE *out, const char *line, size_t n, size_t column, s
 		size_t word = 0;
 		while (line + word < end && line[word] != ' ')
 			word++;
-		if (!first && column + 1 + word > MARGIN) {
+		if (!first && column + 1 + word > LINE_WIDTH) {
 			fprintf(out, "\n%*s", (int)indent, "");
 			column = indent;
 		} else if (!first) {
@@ -70,44 +72,44 @@ static void print_filled(FILE *out, const char *line, size_t n, size_t column, s
 	fputc('\n', out);
 }
 
-static void fill_lines(FILE *out, const char *text)
+static void print_wrapped_lines(FILE *out, const char *text)
 {
 	while (*text) {
 		size_t n = strcspn(text, "\n");
-		print_filled(out, text, n, 0, 0);
+		print_wrapped(out, text, n, 0, 0);
 		text += n + (text[n] == '\n');
 	}
 }
 
-/* Prints each line of `text` after the prefix `before`, without wrapping. */
-static void print_lines(FILE *out, const char *before, const char *text)
+/* Prints each line of `text` after the prefix `prefix`, without wrapping. */
+static void print_lines(FILE *out, const char *prefix, const char *text)
 {
 	while (*text) {
 		size_t n = strcspn(text, "\n");
-		fprintf(out, "%s%.*s\n", before, (int)n, text);
+		fprintf(out, "%s%.*s\n", prefix, (int)n, text);
 		text += n + (text[n] == '\n');
 	}
 }
 
-static void print_row(FILE *out, const struct option_row *r)
+static void print_option(FILE *out, const struct option_row *r)
 {
-	char text[DESCRIPTION], left[128];
-	describe(r, text, sizeof text);
-	text_print(left, sizeof left, "  %c%c%s --%s%s%s", r->key ? '-' : ' ', r->key ? r->key : ' ',
+	char text[DESCRIPTION_MAX], option_column[128];
+	describe_option(r, text, sizeof text);
+	text_print(option_column, sizeof option_column, "  %c%c%s --%s%s%s", r->key ? '-' : ' ', r->key ? r->key : ' ',
 		   r->key ? "," : " ", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
-	size_t n = strlen(left);
-	fputs(left, out);
+	size_t n = strlen(option_column);
+	fputs(option_column, out);
 	if (n + 2 > HELP_COLUMN) {
 		fputc('\n', out);
 		n = 0;
 	}
 	fprintf(out, "%*s", (int)(HELP_COLUMN - n), "");
-	print_filled(out, text, strlen(text), HELP_COLUMN, HELP_COLUMN);
+	print_wrapped(out, text, strlen(text), HELP_COLUMN, HELP_COLUMN);
 }
 
-static void print_forms(FILE *out, const struct program *p)
+static void print_usage_forms(FILE *out, const struct program *p)
 {
-	const char *words = p->words ? p->words : "";
+	const char *words = p->synopsis ? p->synopsis : "";
 	for (bool first = true; first || *words; first = false) {
 		size_t n = strcspn(words, "\n");
 		fprintf(out, "%s%s [OPTION...]%s%.*s\n", first ? "Usage: " : "  or:  ", p->name, n ? " " : "", (int)n,
@@ -120,39 +122,39 @@ static void print_help(FILE *out, const struct program *p)
 {
 	const struct option_group *group, *last = NULL;
 	const struct option_row *r;
-	print_forms(out, p);
-	fill_lines(out, p->summary);
-	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
+	print_usage_forms(out, p);
+	print_wrapped_lines(out, p->summary);
+	for (size_t i = 0; (r = option_row_at(p, i, &group)) != NULL; i++) {
 		if (group != last)
 			fprintf(out, "\n%s%s%s", group->title ? " " : "", group->title ? group->title : "",
 				group->title ? "\n" : "");
 		last = group;
-		print_row(out, r);
+		print_option(out, r);
 	}
 	fprintf(out, "\nExamples:\n");
 	print_lines(out, "  ", p->examples);
 	fputc('\n', out);
 	if (p->details)
-		fill_lines(out, p->details);
-	char exits[DESCRIPTION];
-	text_print(exits, sizeof exits, "Exit codes: %s.", p->exits);
-	fill_lines(out, exits);
+		print_wrapped_lines(out, p->details);
+	char exits[DESCRIPTION_MAX];
+	text_print(exits, sizeof exits, "Exit codes: %s.", p->exit_codes);
+	print_wrapped_lines(out, exits);
 }
 
 static void print_usage(FILE *out, const struct program *p)
 {
 	struct text t;
-	char *line = malloc(DESCRIPTION);
+	char *line = malloc(DESCRIPTION_MAX);
 	const struct option_row *r;
 	if (!line)
 		return;
-	t = (struct text){line, DESCRIPTION};
-	text_put(&t, "Usage: %s", p->name);
-	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
-		text_put(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
-	if (p->words)
-		text_put(&t, " %.*s", (int)strcspn(p->words, "\n"), p->words);
-	print_filled(out, line, strlen(line), 0, 12);
+	t = (struct text){line, DESCRIPTION_MAX};
+	text_appendf(&t, "Usage: %s", p->name);
+	for (size_t i = 0; (r = option_row_at(p, i, NULL)) != NULL; i++)
+		text_appendf(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
+	if (p->synopsis)
+		text_appendf(&t, " %.*s", (int)strcspn(p->synopsis, "\n"), p->synopsis);
+	print_wrapped(out, line, strlen(line), 0, 12);
 	free(line);
 }
 
@@ -160,7 +162,7 @@ static void print_usage(FILE *out, const struct program *p)
 
 /* Prints text escaped for roff: nothing in it is a request or an escape, and dashes, quotes and the like stay what they
  * are. */
-static void roff(FILE *out, const char *text, size_t n)
+static void print_roff(FILE *out, const char *text, size_t n)
 {
 	static const char special[] = "\\-'`^~";
 	static const char *const escapes[] = {"\\e", "\\-", "\\(aq", "\\(ga", "\\(ha", "\\(ti"};
@@ -173,65 +175,65 @@ static void roff(FILE *out, const char *text, size_t n)
 	}
 }
 
-static void roff_lines(FILE *out, const char *text)
+static void print_roff_lines(FILE *out, const char *text)
 {
 	while (*text) {
 		size_t n = strcspn(text, "\n");
-		roff(out, text, n);
+		print_roff(out, text, n);
 		fputs(text[n] ? "\n.PP\n" : "\n", out);
 		text += n + (text[n] == '\n');
 	}
 }
 
-static void roff_sentence(FILE *out, const char *text)
+static void print_roff_sentence(FILE *out, const char *text)
 {
-	roff(out, text, strlen(text));
+	print_roff(out, text, strlen(text));
 	fputs(".\n", out);
 }
 
-static void roff_row(FILE *out, const struct option_row *r)
+static void print_roff_option(FILE *out, const struct option_row *r)
 {
-	char text[DESCRIPTION];
-	describe(r, text, sizeof text);
+	char text[DESCRIPTION_MAX];
+	describe_option(r, text, sizeof text);
 	fputs(".TP\n", out);
 	if (r->key)
 		fprintf(out, "\\fB\\-%c\\fR, ", r->key);
 	fputs("\\fB\\-\\-", out);
-	roff(out, r->name, strlen(r->name));
+	print_roff(out, r->name, strlen(r->name));
 	fputs("\\fR", out);
 	if (r->arg) {
 		fputs("=\\fI", out);
-		roff(out, r->arg, strlen(r->arg));
+		print_roff(out, r->arg, strlen(r->arg));
 		fputs("\\fR", out);
 	}
 	fputc('\n', out);
-	roff_sentence(out, text);
+	print_roff_sentence(out, text);
 }
 
-static void roff_synopsis(FILE *out, const struct program *p)
+static void print_roff_synopsis(FILE *out, const struct program *p)
 {
-	const char *words = p->words ? p->words : "";
+	const char *words = p->synopsis ? p->synopsis : "";
 	fputs(".SH SYNOPSIS\n", out);
 	for (bool first = true; first || *words; first = false) {
 		size_t n = strcspn(words, "\n");
 		fputs(first ? "\\fB" : ".br\n\\fB", out);
-		roff(out, p->name, strlen(p->name));
+		print_roff(out, p->name, strlen(p->name));
 		fputs("\\fR [\\fIOPTION\\fR]... ", out);
-		roff(out, words, n);
+		print_roff(out, words, n);
 		fputc('\n', out);
 		words += n + (words[n] == '\n');
 	}
 }
 
-static void roff_environment(FILE *out, const struct program *p)
+static void print_roff_environment(FILE *out, const struct program *p)
 {
 	const struct option_row *r;
 	bool first = true;
-	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_row_at(p, i, NULL)) != NULL; i++)
 		if (r->environment) {
 			fprintf(out, "%s.TP\n\\fB%s\\fR\nStands in for \\fB\\-\\-", first ? ".SH ENVIRONMENT\n" : "",
 				r->environment);
-			roff(out, r->name, strlen(r->name));
+			print_roff(out, r->name, strlen(r->name));
 			fputs("\\fR.\n", out);
 			first = false;
 		}
@@ -242,35 +244,35 @@ static void print_man(FILE *out, const struct program *p)
 	const struct option_group *group, *last = NULL;
 	const struct option_row *r;
 	fputs(".TH \"", out);
-	roff(out, p->name, strlen(p->name));
+	print_roff(out, p->name, strlen(p->name));
 	fputs("\" 1 \"\" \"HSLT Farm ", out);
-	roff(out, HSLT_VERSION, strlen(HSLT_VERSION));
+	print_roff(out, HSLT_VERSION, strlen(HSLT_VERSION));
 	fputs("\" \"User Commands\"\n.SH NAME\n", out);
-	roff(out, p->name, strlen(p->name));
+	print_roff(out, p->name, strlen(p->name));
 	fputs(" \\- ", out);
-	roff_lines(out, p->summary);
-	roff_synopsis(out, p);
+	print_roff_lines(out, p->summary);
+	print_roff_synopsis(out, p);
 	if (p->details) {
 		fputs(".SH DESCRIPTION\n", out);
-		roff_lines(out, p->details);
+		print_roff_lines(out, p->details);
 	}
 	fputs(".SH OPTIONS\n", out);
-	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
+	for (size_t i = 0; (r = option_row_at(p, i, &group)) != NULL; i++) {
 		if (group != last && group->title) {
 			fputs(".SS \"", out);
-			roff(out, group->title, strcspn(group->title, ":"));
+			print_roff(out, group->title, strcspn(group->title, ":"));
 			fputs("\"\n", out);
 		} else if (group != last && last) {
 			fputs(".SS \"General\"\n", out);
 		}
 		last = group;
-		roff_row(out, r);
+		print_roff_option(out, r);
 	}
-	roff_environment(out, p);
+	print_roff_environment(out, p);
 	fputs(".SH EXIT STATUS\n", out);
-	roff_sentence(out, p->exits);
+	print_roff_sentence(out, p->exit_codes);
 	fputs(".SH EXAMPLES\n.nf\n", out);
-	roff(out, p->examples, strlen(p->examples));
+	print_roff(out, p->examples, strlen(p->examples));
 	fputs("\n.fi\n", out);
 }
 
@@ -286,7 +288,7 @@ static bool names_folder(const char *arg)
 	return strstr(arg, "DIR") || strstr(arg, "FOLDER");
 }
 
-static void print_case(FILE *out, const struct option_row *r)
+static void print_completion_case(FILE *out, const struct option_row *r)
 {
 	const char *name;
 	if (r->key)
@@ -321,32 +323,32 @@ static void print_completion(FILE *out, const struct program *p)
 		"\telif [[ $option == = ]]; then\n\t\toption=${COMP_WORDS[COMP_CWORD - 2]}\n\tfi\n"
 		"\tcase $option in\n",
 		p->name, p->name, function);
-	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_row_at(p, i, NULL)) != NULL; i++)
 		if (r->arg)
-			print_case(out, r);
+			print_completion_case(out, r);
 	fputs("\t*)\n\t\tif [[ $word == -* ]]; then\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);
-	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_row_at(p, i, NULL)) != NULL; i++)
 		fprintf(out, "%s--%s", i ? " " : "", r->name);
 	fputs("\" -- \"$word\")\n\t\telse\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);
 	for (size_t i = 0; p->verbs && (name = p->verbs(i)) != NULL; i++)
 		fprintf(out, "%s%s", i ? " " : "", name);
 	fprintf(out, "\" %s -- \"$word\")\n\t\tfi\n\t\t;;\n\tesac\n}\ncomplete -o filenames -F _%s %s\n",
-		p->words && names_file(p->words) ? "-f" : "", function, p->name);
+		p->synopsis && names_file(p->synopsis) ? "-f" : "", function, p->name);
 }
 
-void option_print(const struct program *p, enum option_kind what, FILE *out)
+void option_print(const struct program *p, enum option_kind request, FILE *out)
 {
-	switch (what) {
-	case OPTION_IS_HELP:
+	switch (request) {
+	case OPTION_KIND_HELP:
 		print_help(out, p);
 		break;
-	case OPTION_IS_USAGE:
+	case OPTION_KIND_USAGE:
 		print_usage(out, p);
 		break;
-	case OPTION_IS_MAN:
+	case OPTION_KIND_MAN:
 		print_man(out, p);
 		break;
-	case OPTION_IS_COMPLETION:
+	case OPTION_KIND_COMPLETION:
 		print_completion(out, p);
 		break;
 	default:

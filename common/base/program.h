@@ -10,9 +10,9 @@
  * - SIGXFSZ is ignored, so that a write beyond the limit of a file's size fails with EFBIG.
  * When the program exits (other than by _exit) and part of its output on stdout was lost, such as on a full disk, an
  * error is printed and exit code 0 becomes 1. */
-void program_options(const struct program *p, int argc, char **argv, void *target);
+void program_parse_options(const struct program *p, int argc, char **argv, void *target);
 
 /* option_row.take of --verbose: shows debug events in the log. */
-int program_take_verbose(void *target, char *arg, struct error *e);
+int program_parse_verbose(void *target, char *arg, struct error *e);
 
 #endif

@@ -11,23 +11,23 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-enum { BAR_MOST = 40, BAR_LEAST = 10, COLUMNS_ELSE = 80 };
-static const double line_seconds = 10, line_seconds_most = 60, line_fraction = 0.1;
+enum { BAR_WIDTH_MAX = 40, BAR_WIDTH_MIN = 10, COLUMNS_DEFAULT = 80 };
+static const double min_line_seconds = 10, max_line_seconds = 60, min_line_fraction = 0.1;
 
-void progress_start(struct progress *p)
+void progress_begin(struct progress *p)
 {
 	memset(p, 0, sizeof *p);
-	p->terminal = terminal_moves_cursor(STDERR_FILENO);
-	p->shown = -1;
+	p->is_terminal = terminal_moves_cursor(STDERR_FILENO);
+	p->printed_fraction = -1;
 }
 
 static void draw_bar(double fraction, const char *state, const char *detail)
 {
 	struct winsize w;
-	int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &w) == 0 && w.ws_col ? w.ws_col : COLUMNS_ELSE;
+	int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &w) == 0 && w.ws_col ? w.ws_col : COLUMNS_DEFAULT;
 	int room = columns - (int)strlen(state) - (int)strlen(detail) - 12;
-	int width = room > BAR_MOST ? BAR_MOST : room < BAR_LEAST ? BAR_LEAST : room;
-	char bar[BAR_MOST + 1] = "";
+	int width = room > BAR_WIDTH_MAX ? BAR_WIDTH_MAX : room < BAR_WIDTH_MIN ? BAR_WIDTH_MIN : room;
+	char bar[BAR_WIDTH_MAX + 1] = "";
 	for (int i = 0; i < width; i++)
 		bar[i] = i < (int)(fraction * width) ? '#' : '.';
 	fprintf(stderr, "\r\033[K%s [%s] %5.1f %% %s", state, bar, 100 * fraction, detail);
@@ -37,49 +37,49 @@ static void draw_bar(double fraction, const char *state, const char *detail)
 void progress_show(struct progress *p, double fraction, const char *state, const char *detail)
 {
 	fraction = fraction > 0 ? fraction < 1 ? fraction : 1 : 0;
-	if (p->terminal) {
+	if (p->is_terminal) {
 		draw_bar(fraction, state, detail);
-		p->drawn = true;
+		p->is_bar_drawn = true;
 		return;
 	}
 	double t = clock_seconds();
-	bool due = p->shown < 0 || strcmp(state, p->state) != 0 || fraction >= p->shown + line_fraction ||
-		   t >= p->shown_time + line_seconds_most ||
-		   (fraction > p->shown && (t >= p->shown_time + line_seconds || fraction >= 1));
+	bool due = p->printed_fraction < 0 || strcmp(state, p->printed_state) != 0 ||
+		   fraction >= p->printed_fraction + min_line_fraction || t >= p->printed_time + max_line_seconds ||
+		   (fraction > p->printed_fraction && (t >= p->printed_time + min_line_seconds || fraction >= 1));
 	if (!due)
 		return;
 	fprintf(stderr, "%s %.1f %% %s\n", state, 100 * fraction, detail);
-	p->shown = fraction;
-	p->shown_time = t;
-	text_copy(p->state, sizeof p->state, state);
+	p->printed_fraction = fraction;
+	p->printed_time = t;
+	text_copy(p->printed_state, sizeof p->printed_state, state);
 }
 
-double progress_kept(struct progress *p, double fraction, const char *state)
+double progress_max_fraction(struct progress *p, double fraction, const char *state)
 {
-	if (strcmp(state, p->most_state) != 0) {
-		text_copy(p->most_state, sizeof p->most_state, state);
-		p->most = 0;
+	if (strcmp(state, p->max_fraction_state) != 0) {
+		text_copy(p->max_fraction_state, sizeof p->max_fraction_state, state);
+		p->max_fraction = 0;
 	}
-	p->most = fmax(p->most, fraction);
-	return p->most;
+	p->max_fraction = fmax(p->max_fraction, fraction);
+	return p->max_fraction;
 }
 
-void progress_explain_fall(struct progress *p, double fraction, const char *state, char *detail, size_t size)
+void progress_explain_decrease(struct progress *p, double fraction, const char *state, char *detail, size_t size)
 {
-	double most = progress_kept(p, fraction, state);
+	double max_fraction = progress_max_fraction(p, fraction, state);
 	size_t n = strlen(detail);
-	if (most - fraction >= 0.001 && n < size)
-		snprintf(detail + n, size - n, "; it was at %.1f %%, and more is to be done now", 100 * most);
+	if (max_fraction - fraction >= 0.001 && n < size)
+		snprintf(detail + n, size - n, "; it was at %.1f %%, and more is to be done now", 100 * max_fraction);
 }
 
 void progress_end(struct progress *p)
 {
-	if (p->drawn)
+	if (p->is_bar_drawn)
 		fputc('\n', stderr);
-	p->drawn = false;
+	p->is_bar_drawn = false;
 }
 
-void progress_number(double x, char *text, size_t size)
+void progress_format_number(double x, char *text, size_t size)
 {
 	static const char *const units[] = {"", " k", " M", " G", " T"};
 	int unit = 0;
@@ -90,7 +90,7 @@ void progress_number(double x, char *text, size_t size)
 	snprintf(text, size, x < 9.995 && unit ? "%.2f%s" : x < 99.95 && unit ? "%.1f%s" : "%.0f%s", x, units[unit]);
 }
 
-void progress_time(double seconds, char *text, size_t size)
+void progress_format_time(double seconds, char *text, size_t size)
 {
 	double s = seconds > 0 ? ceil(seconds) : 0;
 	long n = s < 1e9 ? (long)s : 1000000000;
@@ -102,7 +102,7 @@ void progress_time(double seconds, char *text, size_t size)
 		snprintf(text, size, "%ld:%02ld:%02ld", n / 3600, n / 60 % 60, n % 60);
 }
 
-void progress_duration(double seconds, char *text, size_t size)
+void progress_format_duration(double seconds, char *text, size_t size)
 {
 	static const struct {
 		double unit;

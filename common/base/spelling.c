@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static char lower(char c)
+static char to_lower(char c)
 {
 	return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
 }
@@ -14,39 +14,40 @@ static char lower(char c)
  * (optimal string alignment), ignoring case. */
 static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 {
-	size_t row[3][SPELLING_MOST + 1];
-	size_t *two = row[0], *one = row[1], *now = row[2];
+	size_t row[3][SPELLING_NAME_MAX + 1];
+	size_t *before_previous = row[0], *previous = row[1], *current = row[2];
 	for (size_t j = 0; j <= m; j++)
-		one[j] = two[j] = j;
+		previous[j] = before_previous[j] = j;
 	for (size_t i = 1; i <= n; i++) {
-		now[0] = i;
+		current[0] = i;
 		for (size_t j = 1; j <= m; j++) {
-			size_t d = one[j - 1] + (lower(a[i - 1]) != lower(b[j - 1]));
-			if (one[j] + 1 < d)
-				d = one[j] + 1;
-			if (now[j - 1] + 1 < d)
-				d = now[j - 1] + 1;
-			if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] && two[j - 2] + 1 < d)
-				d = two[j - 2] + 1;
-			now[j] = d;
+			size_t d = previous[j - 1] + (to_lower(a[i - 1]) != to_lower(b[j - 1]));
+			if (previous[j] + 1 < d)
+				d = previous[j] + 1;
+			if (current[j - 1] + 1 < d)
+				d = current[j - 1] + 1;
+			if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] &&
+			    before_previous[j - 2] + 1 < d)
+				d = before_previous[j - 2] + 1;
+			current[j] = d;
 		}
-		size_t *t = two;
-		two = one;
-		one = now;
-		now = t;
+		size_t *t = before_previous;
+		before_previous = previous;
+		previous = current;
+		current = t;
 	}
-	return one[m];
+	return previous[m];
 }
 
 void spelling_offer(struct spelling *s, const char *candidate)
 {
 	size_t n = strlen(s->wanted), m = strlen(candidate);
-	if (n > SPELLING_MOST || m > SPELLING_MOST || n == 0)
+	if (n > SPELLING_NAME_MAX || m > SPELLING_NAME_MAX || n == 0)
 		return;
 	size_t d = edit_distance(s->wanted, n, candidate, m);
 	size_t longest = n > m ? n : m;
-	bool near = d <= 1 + longest / 4 && d < longest;
-	if (near && (!s->best || d < s->distance)) {
+	bool is_near = d <= 1 + longest / 4 && d < longest;
+	if (is_near && (!s->best || d < s->distance)) {
 		memcpy(s->copy, candidate, m + 1);
 		s->best = s->copy;
 		s->distance = d;
@@ -62,7 +63,7 @@ const char *spelling_hint(const struct spelling *s, char *text, size_t size)
 	return text;
 }
 
-void spelling_list(char *text, size_t size, const char *name)
+void spelling_append_to_list(char *text, size_t size, const char *name)
 {
 	size_t used = strlen(text), n = strlen(name);
 	if (used >= 3 && strcmp(text + used - 3, "...") == 0)

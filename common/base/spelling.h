@@ -5,15 +5,15 @@
 
 #include <stddef.h>
 
-enum { SPELLING_MOST = 48 }; /* longer names are not compared */
+enum { SPELLING_NAME_MAX = 48 }; /* longer names are not compared */
 
 /* Keeps the nearest of the candidates that are near enough to `wanted` for a typing error. Set `wanted`, zero the rest.
  * Must not be copied, because `best` points into it. */
 struct spelling {
 	const char *wanted;
-	const char *best;	      /* the nearest candidate, in `copy`; NULL: none is near enough */
-	size_t distance;	      /* its edit distance */
-	char copy[SPELLING_MOST + 1]; /* so that candidates need not outlive spelling_offer */
+	const char *best;		  /* the nearest candidate, in `copy`; NULL: none is near enough */
+	size_t distance;		  /* its edit distance */
+	char copy[SPELLING_NAME_MAX + 1]; /* so that candidates need not outlive spelling_offer */
 };
 void spelling_offer(struct spelling *s, const char *candidate);
 
@@ -21,6 +21,6 @@ void spelling_offer(struct spelling *s, const char *candidate);
 const char *spelling_hint(const struct spelling *s, char *text, size_t size);
 
 /* Appends `name` to a comma-separated list in text, or "..." if the list is full. */
-void spelling_list(char *text, size_t size, const char *name);
+void spelling_append_to_list(char *text, size_t size, const char *name);
 
 #endif

@@ -87,8 +87,8 @@ void text_copy(char *out, size_t size, const char *from)
 }
 
 /* Prints and returns the length of the text in `out`; *cut: not all of it fitted. */
-__attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size, bool *cut, const char *format,
-							  va_list ap)
+__attribute__((format(printf, 4, 0))) static size_t print_truncated(char *out, size_t size, bool *cut,
+								    const char *format, va_list ap)
 {
 	int n = vsnprintf(out, size, format, ap);
 	size_t used = n < 0 ? 0 : (size_t)n;
@@ -105,24 +105,24 @@ void text_print(char *out, size_t size, const char *format, ...)
 	bool cut;
 	va_list ap;
 	va_start(ap, format);
-	print(out, size, &cut, format, ap);
+	print_truncated(out, size, &cut, format, ap);
 	va_end(ap);
 }
 
-void text_put(struct text *t, const char *format, ...)
+void text_appendf(struct text *t, const char *format, ...)
 {
 	bool cut;
 	va_list ap;
-	if (t->left == 0)
+	if (t->remaining == 0)
 		return;
 	va_start(ap, format);
-	size_t used = print(t->at, t->left, &cut, format, ap);
+	size_t used = print_truncated(t->end, t->remaining, &cut, format, ap);
 	va_end(ap);
-	t->at += used;
-	t->left = cut ? 1 : t->left - used;
+	t->end += used;
+	t->remaining = cut ? 1 : t->remaining - used;
 }
 
-bool text_ratio(const char *text, double *ratio)
+bool text_parse_ratio(const char *text, double *ratio)
 {
 	char *end;
 	double x = strtod(text, &end);
@@ -137,7 +137,8 @@ bool text_ratio(const char *text, double *ratio)
 }
 
 /* Reads a non-negative number, and at most one letter of `units`, which selects the factor at the same index. */
-static bool read_unit(const char *text, const char *units, const double *factors, double *number, double *factor)
+static bool parse_number_and_unit(const char *text, const char *units, const double *factors, double *number,
+				  double *factor)
 {
 	char *end;
 	if ((!(*text >= '0' && *text <= '9') && *text != '.') || text[strcspn(text, "xX")])
@@ -151,16 +152,16 @@ static bool read_unit(const char *text, const char *units, const double *factors
 	return isfinite(x * *factor);
 }
 
-static bool with_unit(const char *text, const char *units, const double *factors, double *value)
+static bool parse_with_unit(const char *text, const char *units, const double *factors, double *value)
 {
 	double number, factor;
-	if (!read_unit(text, units, factors, &number, &factor))
+	if (!parse_number_and_unit(text, units, factors, &number, &factor))
 		return false;
 	*value = number * factor;
 	return true;
 }
 
-bool text_count(const char *text, uint64_t *count)
+bool text_parse_count(const char *text, uint64_t *count)
 {
 	static const double thousands[] = {1e3, 1e3, 1e6, 1e9};
 	if (text[strspn(text, "0123456789")] == 0) { /* digits alone: exact also beyond 2^53 */
@@ -170,7 +171,7 @@ bool text_count(const char *text, uint64_t *count)
 		return *text && !errno;
 	}
 	double number, factor;
-	if (!read_unit(text, "kKMG", thousands, &number, &factor))
+	if (!parse_number_and_unit(text, "kKMG", thousands, &number, &factor))
 		return false;
 	/* 1.001 times 1000 is not 1001 in floating point. 1.001k is accepted as 1001 because 1001 / 1000 is 1.001. */
 	double x = rint(number * factor);
@@ -180,33 +181,33 @@ bool text_count(const char *text, uint64_t *count)
 	return true;
 }
 
-bool text_counts(const char *text, const char *separators, uint32_t *out, size_t count)
+bool text_parse_counts(const char *text, const char *separators, uint32_t *out, size_t count)
 {
-	const char *at = text;
+	const char *next = text;
 	for (size_t i = 0; i < count; i++) {
-		char one[32], ends[] = {i + 1 < count ? separators[i] : 0, 0};
-		size_t n = strcspn(at, ends);
+		char number[32], ends[] = {i + 1 < count ? separators[i] : 0, 0};
+		size_t n = strcspn(next, ends);
 		uint64_t x;
-		if (n >= sizeof one || (*ends && !at[n]))
+		if (n >= sizeof number || (*ends && !next[n]))
 			return false;
-		memcpy(one, at, n);
-		one[n] = 0;
-		if (!text_count(one, &x) || x > UINT32_MAX)
+		memcpy(number, next, n);
+		number[n] = 0;
+		if (!text_parse_count(number, &x) || x > UINT32_MAX)
 			return false;
 		out[i] = (uint32_t)x;
-		at += n + 1;
+		next += n + 1;
 	}
 	return true;
 }
 
-bool text_time(const char *text, double unit, double *seconds)
+bool text_parse_time(const char *text, double unit, double *seconds)
 {
 	static const double units[] = {1, 60, 3600, 86400};
 	bool bare = text[strcspn(text, "smhd")] == 0;
-	return with_unit(text, "smhd", units, seconds) && (!bare || isfinite(*seconds *= unit));
+	return parse_with_unit(text, "smhd", units, seconds) && (!bare || isfinite(*seconds *= unit));
 }
 
-bool text_bytes(const char *text, double unit, double *bytes)
+bool text_parse_bytes(const char *text, double unit, double *bytes)
 {
 	static const double units[] = {1e3, 1e3, 1e6, 1e6, 1e9, 1e9, 1e12, 1e12};
 	char plain[40];
@@ -217,7 +218,7 @@ bool text_bytes(const char *text, double unit, double *bytes)
 	if (n > 1 && plain[n - 1] == 'B' && strchr("kKmMgGtT", plain[n - 2]))
 		plain[n - 1] = 0;
 	bool bare = plain[strcspn(plain, "kKmMgGtT")] == 0;
-	return with_unit(plain, "kKmMgGtT", units, bytes) && (!bare || isfinite(*bytes *= unit));
+	return parse_with_unit(plain, "kKmMgGtT", units, bytes) && (!bare || isfinite(*bytes *= unit));
 }
 
 bool text_is_among(const char *text, const char *const *list, size_t count)
@@ -228,13 +229,13 @@ bool text_is_among(const char *text, const char *const *list, size_t count)
 	return false;
 }
 
-void text_lines(char *out, size_t size, const char *const *texts, size_t count)
+void text_join_lines(char *out, size_t size, const char *const *texts, size_t count)
 {
-	enum { MORE = 40 }; /* bytes of "\nand N more" */
+	enum { MORE_SIZE = 40 }; /* bytes of "\nand N more" */
 	size_t used = 0;
 	*out = 0;
 	for (size_t i = 0; i < count; i++) {
-		size_t n = strlen(texts[i]) + (i > 0), rest = i + 1 < count ? MORE : 0;
+		size_t n = strlen(texts[i]) + (i > 0), rest = i + 1 < count ? MORE_SIZE : 0;
 		if (used + n + rest >= size) {
 			text_print(out + used, size - used, "%sand %zu more", i ? "\n" : "", count - i);
 			return;
@@ -244,7 +245,7 @@ void text_lines(char *out, size_t size, const char *const *texts, size_t count)
 	}
 }
 
-char *text_borrow(const char *text)
+char *text_unconst(const char *text)
 {
 	union {
 		const char *from;

@@ -5,10 +5,10 @@
  * as missing, until a quarter of all entries are: one large file may evict thousands of a million small ones, and each
  * removal from the array would move the rest.
  *
- * Writing: blob_write_begin creates a temporary file; blob_write_add makes room, appends and hashes; blob_write_commit
- * compares the hash, flushes (unless the store is a cache), renames, and adds the entry. Until then the blob does not
- * exist. Instead of blob_write_commit, blob_write_keep leaves flushing and renaming to a batch; the entry then exists
- * at once, but is marked as missing until blob_enter.
+ * Writing: blob_write_begin creates a temporary file; blob_write_append makes room, appends and hashes;
+ * blob_write_commit compares the hash, flushes (unless the store is a cache), renames, and adds the entry. Until then
+ * the blob does not exist. Instead of blob_write_commit, blob_write_defer leaves flushing and renaming to a batch; the
+ * entry then exists at once, but is marked as missing until blob_deferred_enter.
  *
  * Failures: more bytes than announced are -EMSGSIZE, a wrong hash is -EBADMSG, and the temporary file is removed. A
  * full disk is -ENOSPC, once every blob that is not held has been evicted and the owner of the store has found no more
@@ -30,30 +30,30 @@
 #include <unistd.h>
 
 enum {
-	BLOCK = 4096,  /* bytes that even the smallest file takes on the disk */
-	EVICTIONS = 8, /* evictions at a time that are always allowed */
+	DISK_BLOCK_SIZE = 4096, /* bytes that even the smallest file takes on the disk */
+	EVICTIONS_MIN = 8,	/* evictions at a time that are always allowed */
 };
 
 struct blob_writer {
 	struct blob_store *store;
 	struct blob_hash hash;
-	uint64_t size, at;	   /* bytes announced; bytes written so far */
-	int fd;			   /* of the temporary file; -1: not open */
-	bool made;		   /* the temporary file has been created */
-	uint64_t number;	   /* of the temporary file */
-	char path[BLOB_PATH_MOST]; /* of the temporary file */
+	uint64_t size, offset;	  /* bytes announced; bytes written so far */
+	int fd;			  /* of the temporary file; -1: not open */
+	bool is_created;	  /* the temporary file has been created */
+	uint64_t temp_number;	  /* of the temporary file */
+	char path[BLOB_PATH_MAX]; /* of the temporary file */
 	EVP_MD_CTX *md;
 };
 
 /* ---- the store ---- */
 
-static void path_of(const struct blob_store *s, const char *name, char path[BLOB_PATH_MOST])
+static void file_path(const struct blob_store *s, const char *name, char path[BLOB_PATH_MAX])
 {
-	snprintf(path, BLOB_PATH_MOST, "%s/%s", s->folder, name);
+	snprintf(path, BLOB_PATH_MAX, "%s/%s", s->folder, name);
 }
 
 /* Returns the index of the first entry whose hash is h or above; s->count if there is none. */
-static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
+static size_t lower_bound(const struct blob_store *s, const struct blob_hash *h)
 {
 	size_t low = 0, high = s->count;
 	while (low < high) {
@@ -68,69 +68,69 @@ static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 
 struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h)
 {
-	size_t i = place_of(s, h);
+	size_t i = lower_bound(s, h);
 	return i < s->count && blob_hash_equal(&s->entries[i]->hash, h) ? s->entries[i] : NULL;
 }
 
 /* Like blob_find, but returns NULL also for an entry that is marked as missing. */
-static struct blob_entry *find_there(struct blob_store *s, const struct blob_hash *h)
+static struct blob_entry *find_present(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = blob_find(s, h);
-	return n && !n->gone ? n : NULL;
+	return n && !n->is_missing ? n : NULL;
 }
 
-static int reserve(struct blob_store *s, size_t count, struct error *e)
+static int reserve_entries(struct blob_store *s, size_t count, struct error *e)
 {
 	if (count <= s->capacity)
 		return 0;
-	size_t want = count > 2 * s->capacity ? count : 2 * s->capacity;
-	struct blob_entry **grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
+	size_t new_capacity = count > 2 * s->capacity ? count : 2 * s->capacity;
+	struct blob_entry **grown = mem_grow(s->entries, s->capacity * sizeof *grown, new_capacity * sizeof *grown);
 	if (!grown)
 		return error_set(e, ENOMEM, "no memory for the list of blobs");
 	s->entries = grown;
-	s->capacity = want;
+	s->capacity = new_capacity;
 	return 0;
 }
 
 /* Inserts an entry, marked as missing, at index i. Returns NULL if memory is out. */
 static struct blob_entry *add_entry(struct blob_store *s, size_t i, const struct blob_hash *h, struct error *e)
 {
-	struct blob_entry *n = reserve(s, s->count + 1, e) ? NULL : mem_alloc(1, sizeof *n);
+	struct blob_entry *n = reserve_entries(s, s->count + 1, e) ? NULL : mem_alloc(1, sizeof *n);
 	if (!n) {
 		error_set(e, ENOMEM, "no memory for the list of blobs");
 		return NULL;
 	}
 	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
 	s->entries[i] = n;
-	*n = (struct blob_entry){.hash = *h, .gone = true};
+	*n = (struct blob_entry){.hash = *h, .is_missing = true};
 	return n;
 }
 
-static int by_hash(const void *a, const void *b)
+static int compare_hashes(const void *a, const void *b)
 {
 	const struct blob_entry *const *x = a, *const *y = b;
 	return memcmp((*x)->hash.bytes, (*y)->hash.bytes, BLOB_HASH_SIZE);
 }
 
 /* A file found in the folder, and when it was last used. */
-struct found {
+struct found_file {
 	struct blob_hash hash;
 	uint64_t size;
-	struct timespec used;
+	struct timespec last_used;
 };
 
-static int by_age(const void *a, const void *b)
+static int compare_use_times(const void *a, const void *b)
 {
-	const struct found *x = a, *y = b;
-	if (x->used.tv_sec != y->used.tv_sec)
-		return x->used.tv_sec < y->used.tv_sec ? -1 : 1;
-	return (x->used.tv_nsec > y->used.tv_nsec) - (x->used.tv_nsec < y->used.tv_nsec);
+	const struct found_file *x = a, *y = b;
+	if (x->last_used.tv_sec != y->last_used.tv_sec)
+		return x->last_used.tv_sec < y->last_used.tv_sec ? -1 : 1;
+	return (x->last_used.tv_nsec > y->last_used.tv_nsec) - (x->last_used.tv_nsec < y->last_used.tv_nsec);
 }
 
 /* Reads the folder, oldest use first, so that the order of use survives a restart. */
 static int read_folder(struct blob_store *s, struct error *e)
 {
-	struct found *all = NULL;
+	struct found_file *files = NULL;
 	size_t count = 0;
 	int rc = 0;
 	struct disk_list l;
@@ -138,11 +138,11 @@ static int read_folder(struct blob_store *s, struct error *e)
 	for (const char *name; !rc && (name = disk_list_next(&l));) {
 		struct stat st;
 		struct blob_hash h;
-		char path[BLOB_PATH_MOST];
-		path_of(s, name, path);
+		char path[BLOB_PATH_MAX];
+		file_path(s, name, path);
 		if (strncmp(name, "tmp.", 4) == 0)
 			disk_unlink(path);
-		if (!blob_from_hex(name, &h))
+		if (!blob_hash_from_hex(name, &h))
 			continue;
 		if (disk_stat(path, &st)) { /* fails the whole opening: the blob must not be taken for missing */
 			rc = error_file(e, errno, path);
@@ -150,47 +150,47 @@ static int read_folder(struct blob_store *s, struct error *e)
 		}
 		if (!S_ISREG(st.st_mode))
 			continue;
-		struct found *grown = list_room(all, count, sizeof *all);
+		struct found_file *grown = list_grow_array(files, count, sizeof *files);
 		if (!grown) {
 			rc = error_set(e, ENOMEM, "%s: no memory for its list of files", s->folder);
 			break;
 		}
-		all = grown;
-		all[count++] = (struct found){h, (uint64_t)st.st_size, st.st_mtim};
+		files = grown;
+		files[count++] = (struct found_file){h, (uint64_t)st.st_size, st.st_mtim};
 	}
 	rc = disk_list_end(&l, rc, e);
 	if (count)
-		qsort(all, count, sizeof *all, by_age);
+		qsort(files, count, sizeof *files, compare_use_times);
 	if (!rc)
-		rc = reserve(s, count, e);
+		rc = reserve_entries(s, count, e);
 	for (size_t i = 0; !rc && i < count; i++) {
-		struct blob_entry *n = add_entry(s, i, &all[i].hash, e);
+		struct blob_entry *n = add_entry(s, i, &files[i].hash, e);
 		rc = n ? 0 : -ENOMEM;
 		if (n) {
-			s->bytes += n->size = all[i].size;
-			n->gone = false;
-			blob_idle_enter(s, n);
+			s->bytes += n->size = files[i].size;
+			n->is_missing = false;
+			blob_idle_add(s, n);
 		}
 	}
 	if (s->count)
-		qsort(s->entries, s->count, sizeof *s->entries, by_hash);
-	mem_free(all);
+		qsort(s->entries, s->count, sizeof *s->entries, compare_hashes);
+	mem_free(files);
 	return rc;
 }
 
 bool blob_store_evict(struct blob_store *s)
 {
 	struct blob_entry *oldest = TAILQ_FIRST(&s->idle);
-	char path[BLOB_PATH_MOST];
+	char path[BLOB_PATH_MAX];
 	if (!oldest)
 		return false;
 	blob_path(s, &oldest->hash, path, sizeof path);
 	disk_unlink(path);
-	blob_idle_leave(s, oldest);
+	blob_idle_remove(s, oldest);
 	s->bytes -= oldest->size;
 	oldest->size = 0;
-	oldest->gone = true;
-	if (++s->evicted > s->count / 4)
+	oldest->is_missing = true;
+	if (++s->evicted_count > s->count / 4)
 		blob_store_sweep(s);
 	return true;
 }
@@ -198,28 +198,28 @@ bool blob_store_evict(struct blob_store *s)
 static int refuse_excess(const struct blob_store *s, uint64_t need, struct error *e)
 {
 	return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use", s->folder,
-			 (unsigned long long)need, (unsigned long long)s->limit);
+			 (unsigned long long)need, (unsigned long long)s->max_bytes);
 }
 
 /* Returns 0 if `need` more bytes would fit into the limit beside the blobs that are held. */
-static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
+static int check_fits(const struct blob_store *s, uint64_t need, struct error *e)
 {
 	uint64_t used = s->bytes - s->idle_bytes;
-	if (!s->limit)
+	if (!s->max_bytes)
 		return 0;
-	if (need > s->limit)
+	if (need > s->max_bytes)
 		return error_set(e, EMSGSIZE, "%s: a file of %llu bytes exceeds its limit of %llu", s->folder,
-				 (unsigned long long)need, (unsigned long long)s->limit);
-	return used > s->limit - need ? refuse_excess(s, need, e) : 0;
+				 (unsigned long long)need, (unsigned long long)s->max_bytes);
+	return used > s->max_bytes - need ? refuse_excess(s, need, e) : 0;
 }
 
 /* Evicts blobs until `need` more bytes fit into the limit, but no more files than take that much space on the disk,
  * where each takes at least a block. Otherwise, a megabyte could mean evicting tens of thousands of files of a few
  * bytes, which takes seconds. An excess over the limit is then evicted when the next bytes arrive. */
-static int make_room(struct blob_store *s, uint64_t need, struct error *e)
+static int evict_for_limit(struct blob_store *s, uint64_t need, struct error *e)
 {
-	uint64_t most = need / BLOCK + EVICTIONS;
-	while (s->limit && s->bytes + s->arrived + need > s->limit && most--)
+	uint64_t max_evictions = need / DISK_BLOCK_SIZE + EVICTIONS_MIN;
+	while (s->max_bytes && s->bytes + s->partial_bytes + need > s->max_bytes && max_evictions--)
 		if (!blob_store_evict(s))
 			return refuse_excess(s, need, e);
 	return 0;
@@ -232,9 +232,9 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 		mem_free(s);
 		return error_set(e, ENOMEM, "no memory for a blob store");
 	}
-	s->limit = limit;
+	s->max_bytes = limit;
 	TAILQ_INIT(&s->idle);
-	int rc = strlen(folder) < BLOB_PATH_MOST - 2 * BLOB_HEX_SIZE
+	int rc = strlen(folder) < BLOB_PATH_MAX - 2 * BLOB_HEX_SIZE
 			 ? disk_make_folder(folder, e)
 			 : error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
 	if (!rc)
@@ -259,25 +259,25 @@ void blob_store_close(struct blob_store *s)
 
 void blob_store_use_as_cache(struct blob_store *s)
 {
-	s->cache = true;
+	s->is_cache = true;
 }
 
-void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user)
+void blob_store_set_full_handler(struct blob_store *s, bool (*more_room)(void *user), void *user)
 {
-	s->more_room = more_room;
+	s->free_space = more_room;
 	s->user = user;
 }
 
 /* Makes room on a full disk; false if there is nothing left to remove. */
-static bool make_disk_room(struct blob_store *s)
+static bool free_disk_space(struct blob_store *s)
 {
-	return (s->limit && blob_store_evict(s)) || (s->more_room && s->more_room(s->user));
+	return (s->max_bytes && blob_store_evict(s)) || (s->free_space && s->free_space(s->user));
 }
 
 bool blob_store_trim(struct blob_store *s)
 {
-	for (int i = 0; s->limit && s->bytes + s->arrived > s->limit; i++)
-		if (i == BLOB_TRIM_MOST)
+	for (int i = 0; s->max_bytes && s->bytes + s->partial_bytes > s->max_bytes; i++)
+		if (i == BLOB_TRIM_MAX)
 			return true;
 		else if (!blob_store_evict(s))
 			break;
@@ -286,29 +286,29 @@ bool blob_store_trim(struct blob_store *s)
 
 uint64_t blob_store_bytes(const struct blob_store *s)
 {
-	return s->bytes + s->arrived;
+	return s->bytes + s->partial_bytes;
 }
 
 /* Marks a blob as the most recently used one, also on the disk for the next start. Returns NULL if it is missing. */
-static struct blob_entry *use_blob(struct blob_store *s, const struct blob_hash *h)
+static struct blob_entry *touch_blob(struct blob_store *s, const struct blob_hash *h)
 {
-	struct blob_entry *n = find_there(s, h);
+	struct blob_entry *n = find_present(s, h);
 	if (!n)
 		return NULL;
-	char path[BLOB_PATH_MOST];
+	char path[BLOB_PATH_MAX];
 	blob_path(s, h, path, sizeof path);
-	if (!n->holds) {
-		blob_idle_leave(s, n);
-		blob_idle_enter(s, n);
+	if (!n->hold_count) {
+		blob_idle_remove(s, n);
+		blob_idle_add(s, n);
 	}
-	if (s->limit)
+	if (s->max_bytes)
 		disk_touch(path);
 	return n;
 }
 
-bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
+bool blob_is_stored(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 {
-	struct blob_entry *n = find_there(s, h);
+	struct blob_entry *n = find_present(s, h);
 	if (n && size)
 		*size = n->size;
 	return n != NULL;
@@ -316,62 +316,62 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 
 bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 {
-	struct blob_entry *n = find_there(s, h);
+	struct blob_entry *n = find_present(s, h);
 	/* A held blob has been marked as used by its first holder: skips thousands of files that an upload held before
 	 * its job. */
-	if (n && !n->holds)
-		use_blob(s, h);
+	if (n && !n->hold_count)
+		touch_blob(s, h);
 	if (n)
-		blob_take(s, n);
+		blob_entry_hold(s, n);
 	return n != NULL;
 }
 
 void blob_release(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = blob_find(s, h);
-	if (n && n->holds)
-		blob_put(s, n);
+	if (n && n->hold_count)
+		blob_entry_release(s, n);
 }
 
 bool blob_is_held(struct blob_store *s, const struct blob_hash *h)
 {
 	const struct blob_entry *n = blob_find(s, h);
-	return n && n->holds;
+	return n && n->hold_count;
 }
 
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
 {
-	char path[BLOB_PATH_MOST], hex[BLOB_HEX_SIZE];
+	char path[BLOB_PATH_MAX], hex[BLOB_HEX_SIZE];
 	blob_path(s, h, path, sizeof path);
-	blob_hex(h, hex);
-	struct blob_entry *n = use_blob(s, h);
+	blob_hash_to_hex(h, hex);
+	struct blob_entry *n = touch_blob(s, h);
 	int fd = n ? disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0) : -1;
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
 	*size = n->size;
-	n->given = true;
+	n->opened_since_check = true;
 	return fd;
 }
 
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size)
 {
 	char hex[BLOB_HEX_SIZE];
-	blob_hex(h, hex);
+	blob_hash_to_hex(h, hex);
 	snprintf(path, size, "%s/%s", s->folder, hex);
 }
 
 /* ---- blobs that are expected ---- */
 
-int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)
+int blob_hold_expected(struct blob_store *s, const struct blob_hash *h, struct error *e)
 {
 	if (blob_hold(s, h))
 		return 0;
 	struct blob_entry *n = blob_find(s, h);
 	if (!n)
-		n = add_entry(s, place_of(s, h), h, e);
+		n = add_entry(s, lower_bound(s, h), h, e);
 	if (!n)
 		return -ENOMEM;
-	blob_take(s, n);
+	blob_entry_hold(s, n);
 	return 0;
 }
 
@@ -380,7 +380,7 @@ int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e
 int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e)
 {
-	int rc = could_fit(s, size, e);
+	int rc = check_fits(s, size, e);
 	if (rc)
 		return rc;
 	struct blob_writer *w = mem_alloc(1, sizeof *w);
@@ -390,13 +390,13 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->hash = *h;
 	w->size = size;
 	w->md = EVP_MD_CTX_new();
-	w->number = ++s->temporary;
-	blob_temporary_path(s, w->number, w->path, sizeof w->path);
+	w->temp_number = ++s->last_temp_number;
+	blob_temporary_path(s, w->temp_number, w->path, sizeof w->path);
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0 && errno == ENOENT && disk_make_folder(s->folder, e) == 0) /* the folder has been removed */
 		w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-	w->made = w->fd >= 0;
-	if (!w->made)
+	w->is_created = w->fd >= 0;
+	if (!w->is_created)
 		rc = error_file(e, errno, s->folder);
 	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)
 		rc = error_set(e, ENOMEM, "SHA-256 cannot start");
@@ -407,9 +407,9 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	return rc;
 }
 
-uint64_t blob_write_at(const struct blob_writer *w)
+uint64_t blob_write_offset(const struct blob_writer *w)
 {
-	return w->at;
+	return w->offset;
 }
 
 void blob_write_pause(struct blob_writer *w)
@@ -419,33 +419,33 @@ void blob_write_pause(struct blob_writer *w)
 	w->fd = -1;
 }
 
-static int go_on(struct blob_writer *w, struct error *e)
+static int reopen_file(struct blob_writer *w, struct error *e)
 {
 	if (w->fd < 0)
 		w->fd = disk_open(w->path, O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0);
 	return w->fd < 0 ? error_file(e, errno, w->store->folder) : 0;
 }
 
-int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e)
+int blob_write_append(struct blob_writer *w, const void *bytes, size_t size, struct error *e)
 {
-	if (size > w->size - w->at)
+	if (size > w->size - w->offset)
 		return error_set(e, EMSGSIZE, "more bytes than were announced");
-	int rc = make_room(w->store, size, e);
+	int rc = evict_for_limit(w->store, size, e);
 	if (!rc)
-		rc = go_on(w, e);
+		rc = reopen_file(w, e);
 	if (rc)
 		return rc;
 	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
 	while (size) {
 		struct iovec part = {(void *)(uintptr_t)bytes, size};
-		ssize_t n = disk_pwritev(w->fd, &part, 1, (off_t)w->at);
-		if (n < 0 && (errno == EINTR || (disk_is_full(-errno) && make_disk_room(w->store))))
+		ssize_t n = disk_pwritev(w->fd, &part, 1, (off_t)w->offset);
+		if (n < 0 && (errno == EINTR || (disk_is_full(-errno) && free_disk_space(w->store))))
 			continue;
 		if (n < 0)
 			return error_file(e, errno, w->store->folder);
-		w->at += (uint64_t)n;
-		w->store->arrived += (uint64_t)n;
+		w->offset += (uint64_t)n;
+		w->store->partial_bytes += (uint64_t)n;
 		bytes = (const char *)bytes + n;
 		size -= (size_t)n;
 	}
@@ -454,34 +454,34 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 
 static int check_written(struct blob_writer *w, struct error *e)
 {
-	struct blob_hash got;
+	struct blob_hash actual;
 	char hex[BLOB_HEX_SIZE];
-	if (w->at != w->size)
-		return error_set(e, EBADMSG, "a blob of %llu bytes instead of %llu", (unsigned long long)w->at,
+	if (w->offset != w->size)
+		return error_set(e, EBADMSG, "a blob of %llu bytes instead of %llu", (unsigned long long)w->offset,
 				 (unsigned long long)w->size);
-	if (EVP_DigestFinal_ex(w->md, got.bytes, NULL) != 1)
+	if (EVP_DigestFinal_ex(w->md, actual.bytes, NULL) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
-	blob_hex(&w->hash, hex);
-	if (!blob_hash_equal(&got, &w->hash))
+	blob_hash_to_hex(&w->hash, hex);
+	if (!blob_hash_equal(&actual, &w->hash))
 		return error_set(e, EBADMSG, "the bytes do not match the blob %s", hex);
 	return 0;
 }
 
 /* Marks a held entry as present: its file has been written and its hash checked. */
-static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
+static void mark_present(struct blob_store *s, struct blob_entry *n, uint64_t size)
 {
-	n->gone = n->given = false;
+	n->is_missing = n->opened_since_check = false;
 	n->size = size;
 	s->bytes += size;
-	n->checked = clock_seconds();
+	n->check_time = clock_seconds();
 }
 
 /* Makes a written file durable. The file of a cache is not flushed, because it is hashed before its first use after a
  * restart. It is closed, though: only close reports errors of network file systems; local ones report them in write. */
-static int make_safe(struct blob_writer *w)
+static int make_durable(struct blob_writer *w)
 {
 	int fd = w->fd;
-	if (!w->store->cache)
+	if (!w->store->is_cache)
 		return disk_fsync(fd);
 	w->fd = -1;
 	return disk_close(fd);
@@ -490,10 +490,10 @@ static int make_safe(struct blob_writer *w)
 static int finish_writing(struct blob_writer *w, struct error *e)
 {
 	struct blob_store *s = w->store;
-	char path[BLOB_PATH_MOST];
+	char path[BLOB_PATH_MAX];
 	int rc = check_written(w, e);
 	if (!rc)
-		rc = go_on(w, e);
+		rc = reopen_file(w, e);
 	if (rc)
 		return rc;
 	if (blob_hold(s, &w->hash)) { /* another writer stored it meanwhile */
@@ -501,19 +501,19 @@ static int finish_writing(struct blob_writer *w, struct error *e)
 		return 0;
 	}
 	blob_path(s, &w->hash, path, sizeof path);
-	if (make_safe(w) || disk_rename(w->path, path))
+	if (make_durable(w) || disk_rename(w->path, path))
 		return error_file(e, errno, s->folder);
-	rc = s->cache ? 0 : disk_sync_folder(s->folder, e);
+	rc = s->is_cache ? 0 : disk_sync_folder(s->folder, e);
 	if (!rc)
-		rc = blob_expect(s, &w->hash, e);
+		rc = blob_hold_expected(s, &w->hash, e);
 	if (!rc)
-		come_back(s, blob_find(s, &w->hash), w->size);
+		mark_present(s, blob_find(s, &w->hash), w->size);
 	return rc;
 }
 
 static void writer_free(struct blob_writer *w)
 {
-	w->store->arrived -= w->at;
+	w->store->partial_bytes -= w->offset;
 	blob_write_pause(w);
 	EVP_MD_CTX_free(w->md);
 	mem_free(w);
@@ -530,7 +530,7 @@ int blob_write_commit(struct blob_writer *w, struct error *e)
 
 void blob_write_abort(struct blob_writer *w)
 {
-	if (w->made)
+	if (w->is_created)
 		disk_unlink(w->path);
 	writer_free(w);
 }
@@ -542,46 +542,47 @@ void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path
 	snprintf(path, size, "%s/tmp.%ld.%llu", s->folder, (long)getpid(), (unsigned long long)number);
 }
 
-int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e)
+int blob_write_defer(struct blob_writer *w, struct blob_deferred *deferred, struct error *e)
 {
 	int rc = check_written(w, e);
 	if (!rc)
-		rc = blob_expect(w->store, &w->hash, e);
+		rc = blob_hold_expected(w->store, &w->hash, e);
 	if (rc) {
 		blob_write_abort(w);
 		return rc;
 	}
-	*kept = (struct blob_kept){w->hash, w->size, w->number};
-	w->at = 0; /* so that writer_free does not subtract the bytes from `arrived`; blob_let_go will */
+	*deferred = (struct blob_deferred){w->hash, w->size, w->temp_number};
+	w->offset = 0; /* so that writer_free does not subtract the bytes from `partial_bytes`; blob_deferred_release
+			  will */
 	writer_free(w);
 	return 0;
 }
 
-void blob_enter(struct blob_store *s, const struct blob_kept *kept)
+void blob_deferred_enter(struct blob_store *s, const struct blob_deferred *deferred)
 {
-	struct blob_entry *n = blob_find(s, &kept->hash);
-	if (n->gone)
-		come_back(s, n, kept->size);
+	struct blob_entry *n = blob_find(s, &deferred->hash);
+	if (n->is_missing)
+		mark_present(s, n, deferred->size);
 }
 
-bool blob_let_go(struct blob_store *s, const struct blob_kept *kept)
+bool blob_deferred_release(struct blob_store *s, const struct blob_deferred *deferred)
 {
-	s->arrived -= kept->size;
-	struct blob_entry *n = blob_find(s, &kept->hash); /* exists, because it is held */
-	blob_put(s, n);
-	return n->holds == 0 && n->gone;
+	s->partial_bytes -= deferred->size;
+	struct blob_entry *n = blob_find(s, &deferred->hash); /* exists, because it is held */
+	blob_entry_release(s, n);
+	return n->hold_count == 0 && n->is_missing;
 }
 
 void blob_store_sweep(struct blob_store *s)
 {
-	size_t left = 0;
+	size_t remaining = 0;
 	for (size_t i = 0; i < s->count; i++) {
 		struct blob_entry *n = s->entries[i];
-		if (n->gone && !n->holds)
+		if (n->is_missing && !n->hold_count)
 			mem_free(n);
 		else
-			s->entries[left++] = n;
+			s->entries[remaining++] = n;
 	}
-	s->count = left;
-	s->evicted = 0;
+	s->count = remaining;
+	s->evicted_count = 0;
 }

@@ -28,17 +28,17 @@ bool blob_store_evict(struct blob_store *s);
 uint64_t blob_store_bytes(const struct blob_store *s);
 /* Sets a function that is called when the disk is full and nothing is left to evict. It may make room elsewhere; it
  * returns false if it cannot. */
-void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
+void blob_store_set_full_handler(struct blob_store *s, bool (*more_room)(void *user), void *user);
 /* Call if files that are lost in a power failure can be fetched again. They are then not flushed to the disk, and after
  * a restart no file may be used before blob_check has read it. */
 void blob_store_use_as_cache(struct blob_store *s);
-/* Evicts blobs beyond the limit, at most BLOB_TRIM_MOST at once. Call it once everything needed is held, and again
+/* Evicts blobs beyond the limit, at most BLOB_TRIM_MAX at once. Call it once everything needed is held, and again
  * while it returns true. */
-enum { BLOB_TRIM_MOST = 64 /* takes about a millisecond */ };
+enum { BLOB_TRIM_MAX = 64 /* takes about a millisecond */ };
 bool blob_store_trim(struct blob_store *s);
 
 /* Returns whether a blob is in the store, and its size, unless `size` is NULL. */
-bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size);
+bool blob_is_stored(struct blob_store *s, const struct blob_hash *h, uint64_t *size);
 /* Holds a blob, which is then not evicted until as many calls of blob_release. Returns false if it is not stored. */
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
@@ -46,7 +46,7 @@ bool blob_is_held(struct blob_store *s, const struct blob_hash *h); /* also true
 
 /* Like blob_hold, but also for a blob that is not in the store, which is then held as soon as it is written. Returns 0
  * or -ENOMEM. */
-int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);
+int blob_hold_expected(struct blob_store *s, const struct blob_hash *h, struct error *e);
 
 /* Returns a file descriptor to read from, which the caller closes, or -ENOENT. */
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e);
@@ -57,36 +57,36 @@ struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h);
 /* Returns the path of a held blob, for callers that map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
 
-/* Writing a blob: blob_write_begin, blob_write_add in order, blob_write_commit. Room is made as bytes arrive, so that a
- * peer that announces much and sends nothing costs others nothing; blob_write_begin only checks that the announced size
- * fits beside the blobs that are held. End each writer with commit or abort. A committed blob is held once.
- * Errors: -EFBIG if the announced size does not fit, or if the bytes to be added do not fit now (then none of them is
- * added, and the caller may try again); -EMSGSIZE for more bytes than announced, or an announced size above the limit;
- * -EBADMSG if the hash does not match the name; -errno of the disk. */
+/* Writing a blob: blob_write_begin, blob_write_append in order, blob_write_commit. Room is made as bytes arrive, so
+ * that a peer that announces much and sends nothing costs others nothing; blob_write_begin only checks that the
+ * announced size fits beside the blobs that are held. End each writer with commit or abort. A committed blob is held
+ * once. Errors: -EFBIG if the announced size does not fit, or if the bytes to be added do not fit now (then none of
+ * them is added, and the caller may try again); -EMSGSIZE for more bytes than announced, or an announced size above the
+ * limit; -EBADMSG if the hash does not match the name; -errno of the disk. */
 struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e);
-uint64_t blob_write_at(const struct blob_writer *w); /* bytes written so far */
-void blob_write_pause(struct blob_writer *w);	     /* closes the file until more is added */
-int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
+uint64_t blob_write_offset(const struct blob_writer *w); /* bytes written so far */
+void blob_write_pause(struct blob_writer *w);		 /* closes the file until more is added */
+int blob_write_append(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
 int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writer in any case */
 void blob_write_abort(struct blob_writer *w);
 
 /* For blob_batch.c: a file that is complete and checked, but neither flushed nor renamed. Its entry is held and marked
  * as missing, so that nothing is evicted under its name. Paths may be asked for on any thread. */
-struct blob_kept {
+struct blob_deferred {
 	struct blob_hash hash;
-	uint64_t size, number; /* number: of the temporary file */
+	uint64_t size, temp_number; /* temp_number: of the temporary file */
 };
 
 void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);
 /* Ends a writer without flushing and renaming the file. Frees the writer in any case. */
-int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e);
+int blob_write_defer(struct blob_writer *w, struct blob_deferred *deferred, struct error *e);
 /* Marks the blob as present: its file has been flushed and renamed. */
-void blob_enter(struct blob_store *s, const struct blob_kept *kept);
-/* Ends the hold that blob_write_keep took; to be called once for each kept file. Returns true if the blob is missing
+void blob_deferred_enter(struct blob_store *s, const struct blob_deferred *deferred);
+/* Ends the hold that blob_write_defer took; to be called once for each kept file. Returns true if the blob is missing
  * and no longer held: then call blob_store_sweep after the last one. */
-bool blob_let_go(struct blob_store *s, const struct blob_kept *kept);
+bool blob_deferred_release(struct blob_store *s, const struct blob_deferred *deferred);
 /* Removes the entries of all blobs that are missing and not held, in one pass. */
 void blob_store_sweep(struct blob_store *s);
 

@@ -12,48 +12,48 @@
 
 #include <stdatomic.h>
 
-enum { PATH_MOST = 4096 };
+enum { PATH_SIZE = 4096 };
 
 struct blob_batch {
 	struct blob_store *store;
-	struct list kept;     /* struct blob_kept */
-	size_t renamed;	      /* files that have got their names */
-	atomic_bool unwanted; /* set by blob_batch_give_up */
+	struct list deferred;  /* struct blob_deferred */
+	size_t renamed_count;  /* files that have got their names */
+	atomic_bool cancelled; /* set by blob_batch_cancel */
 };
 
 struct blob_batch *blob_batch_new(struct blob_store *s)
 {
 	struct blob_batch *b = mem_alloc(1, sizeof *b);
 	if (b)
-		*b = (struct blob_batch){.store = s, .kept.size = sizeof(struct blob_kept)};
+		*b = (struct blob_batch){.store = s, .deferred.item_size = sizeof(struct blob_deferred)};
 	return b;
 }
 
-static struct blob_kept *kept_of(const struct blob_batch *b, size_t i)
+static struct blob_deferred *deferred_at(const struct blob_batch *b, size_t i)
 {
-	return (struct blob_kept *)b->kept.items + i;
+	return (struct blob_deferred *)b->deferred.items + i;
 }
 
 int blob_batch_add(struct blob_batch *b, struct blob_writer *w, struct error *e)
 {
-	struct blob_kept *kept = list_push(&b->kept);
-	if (!kept) {
+	struct blob_deferred *deferred = list_push(&b->deferred);
+	if (!deferred) {
 		blob_write_abort(w);
 		return error_set(e, ENOMEM, "no memory for the list of blobs");
 	}
-	int rc = blob_write_keep(w, kept, e);
-	b->kept.count -= rc != 0;
+	int rc = blob_write_defer(w, deferred, e);
+	b->deferred.count -= rc != 0;
 	return rc;
 }
 
 size_t blob_batch_count(const struct blob_batch *b)
 {
-	return b->kept.count;
+	return b->deferred.count;
 }
 
 const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i)
 {
-	return &kept_of(b, i)->hash;
+	return &deferred_at(b, i)->hash;
 }
 
 static int flush_file(const char *path, struct error *e)
@@ -67,16 +67,16 @@ static int flush_file(const char *path, struct error *e)
 
 int blob_batch_flush(struct blob_batch *b, struct error *e)
 {
-	char from[PATH_MOST], to[PATH_MOST];
+	char from[PATH_SIZE], to[PATH_SIZE];
 	int rc = 0;
-	for (size_t i = 0; !rc && i < b->kept.count; i++) {
-		blob_temporary_path(b->store, kept_of(b, i)->number, from, sizeof from);
-		rc = atomic_load(&b->unwanted) ? error_set(e, ECANCELED, "nobody waits for the files")
-					       : flush_file(from, e);
+	for (size_t i = 0; !rc && i < b->deferred.count; i++) {
+		blob_temporary_path(b->store, deferred_at(b, i)->temp_number, from, sizeof from);
+		rc = atomic_load(&b->cancelled) ? error_set(e, ECANCELED, "nobody waits for the files")
+						: flush_file(from, e);
 	}
-	for (; !rc && b->renamed < b->kept.count; b->renamed += !rc) {
-		const struct blob_kept *k = kept_of(b, b->renamed);
-		blob_temporary_path(b->store, k->number, from, sizeof from);
+	for (; !rc && b->renamed_count < b->deferred.count; b->renamed_count += !rc) {
+		const struct blob_deferred *k = deferred_at(b, b->renamed_count);
+		blob_temporary_path(b->store, k->temp_number, from, sizeof from);
 		blob_path(b->store, &k->hash, to, sizeof to);
 		if (disk_rename(from, to))
 			rc = error_file(e, errno, to);
@@ -84,22 +84,22 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 	return rc ? rc : disk_sync_folder(b->store->folder, e);
 }
 
-void blob_batch_give_up(struct blob_batch *b)
+void blob_batch_cancel(struct blob_batch *b)
 {
-	atomic_store(&b->unwanted, true);
+	atomic_store(&b->cancelled, true);
 }
 
-void blob_batch_enter(struct blob_batch *b)
+void blob_batch_commit(struct blob_batch *b)
 {
-	for (size_t i = 0; i < b->kept.count; i++)
-		blob_enter(b->store, kept_of(b, i));
+	for (size_t i = 0; i < b->deferred.count; i++)
+		blob_deferred_enter(b->store, deferred_at(b, i));
 }
 
 void blob_batch_discard(struct blob_batch *b)
 {
-	char path[PATH_MOST];
-	for (; b->renamed < b->kept.count; b->renamed++) {
-		blob_temporary_path(b->store, kept_of(b, b->renamed)->number, path, sizeof path);
+	char path[PATH_SIZE];
+	for (; b->renamed_count < b->deferred.count; b->renamed_count++) {
+		blob_temporary_path(b->store, deferred_at(b, b->renamed_count)->temp_number, path, sizeof path);
 		disk_unlink(path);
 	}
 }
@@ -110,10 +110,10 @@ void blob_batch_free(struct blob_batch *b)
 	if (!b)
 		return;
 	blob_batch_discard(b);
-	for (size_t i = 0; i < b->kept.count; i++)
-		missing |= blob_let_go(b->store, kept_of(b, i));
+	for (size_t i = 0; i < b->deferred.count; i++)
+		missing |= blob_deferred_release(b->store, deferred_at(b, i));
 	if (missing)
 		blob_store_sweep(b->store);
-	list_free(&b->kept);
+	list_fini(&b->deferred);
 	mem_free(b);
 }

@@ -13,23 +13,23 @@ int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struc
 	return 0;
 }
 
-void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE])
+void blob_hash_to_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE])
 {
 	for (int i = 0; i < BLOB_HASH_SIZE; i++)
 		snprintf(hex + 2 * i, 3, "%02x", h->bytes[i]);
 }
 
-static int digit(char c)
+static int hex_digit_value(char c)
 {
 	return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-bool blob_from_hex(const char *hex, struct blob_hash *h)
+bool blob_hash_from_hex(const char *hex, struct blob_hash *h)
 {
 	if (strlen(hex) != 2 * BLOB_HASH_SIZE)
 		return false;
 	for (int i = 0; i < BLOB_HASH_SIZE; i++) {
-		int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
+		int high = hex_digit_value(hex[2 * i]), low = hex_digit_value(hex[2 * i + 1]);
 		if (high < 0 || low < 0)
 			return false;
 		h->bytes[i] = (uint8_t)(high << 4 | low);

@@ -16,8 +16,8 @@ struct blob_hash {
 };
 
 int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e); /* 0, or -EIO of OpenSSL */
-void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
+void blob_hash_to_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
 bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
-bool blob_from_hex(const char *hex, struct blob_hash *h); /* false if it is not 64 digits 0-9 and a-f */
+bool blob_hash_from_hex(const char *hex, struct blob_hash *h); /* false if it is not 64 digits 0-9 and a-f */
 
 #endif

@@ -6,26 +6,26 @@
  */
 #include "common/blob/blob_state.h"
 
-void blob_idle_enter(struct blob_store *s, struct blob_entry *n)
+void blob_idle_add(struct blob_store *s, struct blob_entry *n)
 {
 	TAILQ_INSERT_TAIL(&s->idle, n, order);
 	s->idle_bytes += n->size;
 }
 
-void blob_idle_leave(struct blob_store *s, struct blob_entry *n)
+void blob_idle_remove(struct blob_store *s, struct blob_entry *n)
 {
 	TAILQ_REMOVE(&s->idle, n, order);
 	s->idle_bytes -= n->size;
 }
 
-void blob_take(struct blob_store *s, struct blob_entry *n)
+void blob_entry_hold(struct blob_store *s, struct blob_entry *n)
 {
-	if (n->holds++ == 0 && !n->gone)
-		blob_idle_leave(s, n);
+	if (n->hold_count++ == 0 && !n->is_missing)
+		blob_idle_remove(s, n);
 }
 
-void blob_put(struct blob_store *s, struct blob_entry *n)
+void blob_entry_release(struct blob_store *s, struct blob_entry *n)
 {
-	if (--n->holds == 0 && !n->gone)
-		blob_idle_enter(s, n);
+	if (--n->hold_count == 0 && !n->is_missing)
+		blob_idle_add(s, n);
 }

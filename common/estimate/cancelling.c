@@ -15,32 +15,32 @@
 #include <math.h>
 
 /* Only channels darker than this share of the pixel's brightest channel count as cancelling. */
-static const double cancelled = 0.125;
+static const double max_cancelling_share = 0.125;
 
 static size_t index_of_brightest(const double *b)
 {
-	size_t most = fabs(b[1]) > fabs(b[0]) ? 1 : 0;
-	return fabs(b[2]) > fabs(b[most]) ? 2 : most;
+	size_t brightest = fabs(b[1]) > fabs(b[0]) ? 1 : 0;
+	return fabs(b[2]) > fabs(b[brightest]) ? 2 : brightest;
 }
 
 /* Returns M, the value of the pixel's brightest channel. */
-static double most_of(const struct tile_error *t, size_t pixel)
+static double brightest_value(const struct tile_error *t, size_t pixel)
 {
 	return t->brightness[pixel][index_of_brightest(t->brightness[pixel])];
 }
 
-bool cancelling_channel(const struct tile_error *t, size_t pixel, size_t k)
+bool channel_is_cancelling(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const double *b = t->brightness[pixel];
-	size_t most = index_of_brightest(b);
-	if (t->groups < BASE_GROUPS || !(fabs(b[k]) < cancelled * fabs(b[most])) ||
-	    !brightness_is_known(t, b[most], t->square[pixel][most]))
+	size_t brightest = index_of_brightest(b);
+	if (t->groups < BASE_GROUPS_MIN || !(fabs(b[k]) < max_cancelling_share * fabs(b[brightest])) ||
+	    !brightness_is_reliable(t, b[brightest], t->variance[pixel][brightest]))
 		return false;
-	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
+	const float *deviations = tile_error_deviations(t, pixel) + k * t->groups;
 	uint32_t above = 0, below = 0;
 	for (uint32_t g = 0; g < t->groups; g++) {
-		above += b[k] + (double)apart[g] > 0;
-		below += b[k] + (double)apart[g] < 0;
+		above += b[k] + (double)deviations[g] > 0;
+		below += b[k] + (double)deviations[g] < 0;
 	}
 	return above >= t->groups / 8 && below >= t->groups / 8;
 }
@@ -50,14 +50,14 @@ void cancelling_find_spread(struct tile_error *t)
 	for (size_t k = 0; k < 3; k++) {
 		double sum = 0, variance = 0, bright = 0;
 		for (size_t p = 0; p < (size_t)t->width * t->height; p++) {
-			if (!t->cancels[p][k])
+			if (!t->is_cancelling[p][k])
 				continue;
 			/* Divided by the floor, so that no square leaves the range of doubles. */
-			double most = most_of(t, p), v = t->square[p][k] / t->floor_square,
+			double brightest = brightest_value(t, p), v = t->variance[p][k] / t->floor_square,
 			       truth = t->brightness[p][k] * t->brightness[p][k] / t->floor_square - v;
 			sum += truth;
 			variance += 2 * v * v + 4 * fmax(0, truth) * v;
-			bright += most * most / t->floor_square;
+			bright += brightest * brightest / t->floor_square;
 		}
 		t->cancelling_spread[k] = bright > 0 ? sqrt(fmax(sum, 0.5 * sqrt(variance)) / bright) : 0;
 	}
@@ -65,7 +65,8 @@ void cancelling_find_spread(struct tile_error *t)
 
 struct inverse_square cancelling_weight(const struct tile_error *t, size_t pixel, size_t k)
 {
-	double b = t->brightness[pixel][k], v = t->square[pixel][k],
-	       spread = t->cancelling_spread[k] * most_of(t, pixel), share = spread * spread / (spread * spread + v);
-	return inverse_square_expect(share * b, sqrt(share * v), sqrt(t->floor_square));
+	double b = t->brightness[pixel][k], v = t->variance[pixel][k],
+	       spread = t->cancelling_spread[k] * brightest_value(t, pixel),
+	       share = spread * spread / (spread * spread + v);
+	return inverse_square_moments(share * b, sqrt(share * v), sqrt(t->floor_square));
 }

@@ -11,7 +11,7 @@
 #include "common/estimate/tile_error.h"
 
 /* Returns whether colours cancel in channel k of the pixel. */
-bool cancelling_channel(const struct tile_error *t, size_t pixel, size_t k);
+bool channel_is_cancelling(const struct tile_error *t, size_t pixel, size_t k);
 
 /* Sets t->cancelling_spread from the pixels and channels that are marked in t->cancels. */
 void cancelling_find_spread(struct tile_error *t);

@@ -4,38 +4,38 @@
 #include "common/base/color.h"
 #include "common/film/canvas_films.h"
 
-static double ratio(double a, double b)
+static double ratio_or_zero(double a, double b)
 {
 	return b > 0 ? a / b : 0;
 }
 
 /* Returns the factor from sums on the grid to X, Y, Z of the group's image. The image of chains is scaled by the
  * group's own b. */
-static double factor_of(const struct canvas *c, uint32_t group)
+static double group_factor(const struct canvas *c, uint32_t group)
 {
 	const struct plan *p = &c->plan;
 	if (p->kind != PLAN_CHAINS)
-		return ratio(c->quantum, (double)p->epoch * (double)c->rounds);
-	struct exact_sum sum = c->prefix.group[group].sum;
-	exact_sum_merge(&sum, &c->bootstrap.group[group].sum);
-	uint64_t independent = c->prefix.group[group].independent + c->bootstrap.group[group].independent;
-	return ratio(exact_sum_value(&sum), (double)independent) *
-	       ratio(c->quantum, (double)c->prefix.group[group].samples);
+		return ratio_or_zero(c->quantum, (double)p->epoch * (double)c->rounds);
+	struct exact_sum sum = c->prefix.groups[group].independent_sum;
+	exact_sum_merge(&sum, &c->bootstrap.groups[group].independent_sum);
+	uint64_t independent = c->prefix.groups[group].independent + c->bootstrap.groups[group].independent;
+	return ratio_or_zero(exact_sum_value(&sum), (double)independent) *
+	       ratio_or_zero(c->quantum, (double)c->prefix.groups[group].samples);
 }
 
 /* Returns X, Y, Z of a pixel on the grid; NULL if nothing was added to its tile. */
-static const int64_t *pixel(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
+static const int64_t *pixel_channels(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
 {
 	size_t tile = (size_t)(y / TILE_SIZE) * c->tiles_across + x / TILE_SIZE;
-	if (!(*canvas_flags(c, film, tile) & TILE_USED))
+	if (!(*canvas_tile_flags(c, film, tile) & TILE_USED))
 		return NULL;
-	return canvas_slot(c, film, tile) + (size_t)(y % TILE_SIZE) * SLOT_ROW +
+	return canvas_slot(c, film, tile) + (size_t)(y % TILE_SIZE) * SLOT_ROW_VALUES +
 	       (size_t)(x % TILE_SIZE) * TILE_CHANNELS;
 }
 
 static double pixel_sum(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
 {
-	const int64_t *v = pixel(c, film, x, y);
+	const int64_t *v = pixel_channels(c, film, x, y);
 	return v ? (double)v[0] + (double)v[1] + (double)v[2] : 0;
 }
 
@@ -43,7 +43,7 @@ void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down,
 {
 	uint32_t width = c->plan.crop_width, height = c->plan.crop_height;
 	for (uint32_t g = 0; g < c->plan.groups; g++) {
-		double *block = out + (size_t)g * (across * down + 1), factor = factor_of(c, g), all = 0;
+		double *block = out + (size_t)g * (across * down + 1), factor = group_factor(c, g), total = 0;
 		for (uint32_t k = 0; k < across * down; k++) {
 			uint64_t x0 = (uint64_t)width * (k % across) / across,
 				 x1 = (uint64_t)width * (k % across + 1) / across;
@@ -52,27 +52,28 @@ void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down,
 			double sum = 0;
 			for (uint64_t y = y0; y < y1; y++)
 				for (uint64_t x = x0; x < x1; x++)
-					sum += pixel_sum(c, canvas_film(g, FILM_PREFIX), (uint32_t)x, (uint32_t)y);
-			all += sum;
+					sum += pixel_sum(c, canvas_film_index(g, FILM_PREFIX), (uint32_t)x,
+							 (uint32_t)y);
+			total += sum;
 			block[k] = factor * sum / (double)((x1 - x0) * (y1 - y0));
 		}
-		block[across * down] = factor * all / ((double)width * height);
+		block[across * down] = factor * total / ((double)width * height);
 	}
 }
 
 void canvas_group_distances(const struct canvas *c, const double *weight, double *out)
 {
 	uint32_t groups = c->plan.groups, width = c->plan.crop_width, height = c->plan.crop_height;
-	double factor[PLAN_MAX_GROUPS], rgb[PLAN_MAX_GROUPS][3];
+	double factor[PLAN_GROUPS_MAX], rgb[PLAN_GROUPS_MAX][3];
 	for (uint32_t g = 0; g < groups; g++) {
-		factor[g] = factor_of(c, g);
+		factor[g] = group_factor(c, g);
 		out[g] = 0;
 	}
 	for (size_t i = 0; i < (size_t)width * height; i++) {
 		double mean[3] = {0};
 		for (uint32_t g = 0; g < groups; g++) {
-			const int64_t *v =
-				pixel(c, canvas_film(g, FILM_PREFIX), (uint32_t)(i % width), (uint32_t)(i / width));
+			const int64_t *v = pixel_channels(c, canvas_film_index(g, FILM_PREFIX), (uint32_t)(i % width),
+							  (uint32_t)(i / width));
 			double xyz[3] = {0};
 			for (int k = 0; v && k < 3; k++)
 				xyz[k] = factor[g] * (double)v[k];

@@ -8,6 +8,6 @@
 
 /* Fills in the standard errors and the relMSE of an image whose rgb is complete. Needs two or more groups and no open
  * rounds. Returns 0 or -ENOMEM. */
-int canvas_error(struct image_builder *m, struct error *e);
+int canvas_estimate_error(struct image_builder *m, struct error *e);
 
 #endif

@@ -8,7 +8,7 @@
 
 /* Makes the image of the complete rounds; with open_rounds, a preview of everything merged, without errors. Allocates
  * img's arrays, which canvas_image_fini frees. Returns 0 or -ENOMEM. */
-int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
+int canvas_image_init(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
 void canvas_image_fini(struct canvas_image *img);
 
 #endif

@@ -7,10 +7,10 @@
  * groups - 1.
  *
  * Distribution. The estimate is approximately its expectation times chi-square over its degrees of freedom. These
- * follow from the spread of the groups' distances (Satterthwaite 1946), but are at most what own_degrees allows: 16
- * distances may lie close together by chance, which the products of pairs hardly do. The error of the image at hand,
- * divided by the estimate, follows an F distribution with `own` and own * (groups - 1) degrees, where `own` is
- * own_degrees reduced
+ * follow from the spread of the groups' distances (Satterthwaite 1946), but are at most what effective_degrees allows:
+ * 16 distances may lie close together by chance, which the products of pairs hardly do. The error of the image at hand,
+ * divided by the estimate, follows an F distribution with `degrees` and own * (groups - 1) degrees, where `degrees` is
+ * effective_degrees reduced
  * - by (groups - 1) / (groups + 2), because it is estimated from few groups itself; this is the factor by which
  *   Student's t is wider than the normal distribution;
  * - by the doubt of the weights, counted twice, since a brightness that comes in rare hits is skewed;
@@ -34,11 +34,11 @@
 
 #include <math.h>
 
-static const double tail_power = 1.5, dark_most = 0.5, one_group_most = 0.4;
-/* The ratio of the interval's upper to its lower end may be up to `widest`, and up to `widest_of_known` times the ratio
- * that it would have without heavy tails and uncertain brightness: an error that all pixels share may happen to be
- * nearly zero, and then the interval is wide for this reason alone. */
-static const double widest = 100, widest_of_known = 4;
+static const double tail_power = 1.5, max_dark_share = 0.5, max_one_group_share = 0.4;
+/* The ratio of the interval's upper to its lower end may be up to `max_end_ratio`, and up to `max_end_ratio_factor`
+ * times the ratio that it would have without heavy tails and uncertain brightness: an error that all pixels share may
+ * happen to be nearly zero, and then the interval is wide for this reason alone. */
+static const double max_end_ratio = 100, max_end_ratio_factor = 4;
 
 /*
  * Returns how many errors vary independently in the error image of a group: (sum l)^2 / sum l^2 over the eigenvalues l
@@ -47,10 +47,10 @@ static const double widest = 100, widest_of_known = 4;
  * ((e1 - e2) . (e3 - e4))^2 / 4, averaged over all sets of four groups. No fourth power of a group's own error occurs,
  * so a firefly does not look like an error of the whole image. The second sum never exceeds the first.
  */
-static double own_degrees(const struct error_sums *s)
+static double effective_degrees(const struct error_sums *s)
 {
-	uint32_t n = s->groups < ERROR_FOLDED ? s->groups : ERROR_FOLDED;
-	double total = 0, square = 0, k[ERROR_FOLDED][ERROR_FOLDED];
+	uint32_t n = s->groups < ERROR_GROUPS_FOLDED ? s->groups : ERROR_GROUPS_FOLDED;
+	double total = 0, square_total = 0, k[ERROR_GROUPS_FOLDED][ERROR_GROUPS_FOLDED];
 	for (uint32_t i = 0; i < n; i++)
 		for (uint32_t j = i; j < n; j++)
 			k[i][j] = k[j][i] = s->gram[i][j];
@@ -61,11 +61,11 @@ static double own_degrees(const struct error_sums *s)
 					if (c == b || d == b)
 						continue;
 					double cross = k[a][c] - k[a][d] - k[b][c] + k[b][d];
-					square += cross * cross;
+					square_total += cross * cross;
 					total += (k[a][a] + k[b][b] - 2 * k[a][b]) * (k[c][c] + k[d][d] - 2 * k[c][d]);
 				}
-	double most = 1e6;
-	return !(total > square) ? 1 : total < most * square ? total / square : most;
+	double max_degrees = 1e6;
+	return !(total > square_total) ? 1 : total < max_degrees * square_total ? total / square_total : max_degrees;
 }
 
 /* Returns the relative variance of the groups' distances, which is 2 over the degrees of freedom of one group. Dividing
@@ -80,61 +80,66 @@ static double distance_spread(const struct error_sums *s, double mean)
 }
 
 /* Returns the factor by which heavy tails reduce the degrees of freedom; at least 1. */
-static double heavier_than_normal(const struct error_sums *s)
+static double heavy_tail_factor(const struct error_sums *s)
 {
-	double n = s->groups, kurtosis = s->share > 0 ? s->kurtosis / s->share * (n + 1) / (n - 1) : 3;
+	double n = s->groups, kurtosis = s->total > 0 ? s->kurtosis_total / s->total * (n + 1) / (n - 1) : 3;
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
 /* Tail index of errors below which their squares, whose mean the relMSE is, have no expectation. */
-static const double finite_variance = 2;
+static const double finite_variance_index = 2;
 
-/* Sets the reason, if any, why the interval is not known. known: the ratio of its ends without heavy tails and
- * uncertain brightness. */
-static void find_doubt(const struct error_sums *s, double known, struct canvas_image *img)
+/* Sets the reason, if any, why the interval is not known. normal_end_ratio: the ratio of its ends without heavy tails
+ * and uncertain brightness. */
+static void set_doubt(const struct error_sums *s, double normal_end_ratio, struct canvas_image *img)
 {
-	double dark = s->share > 0 ? s->dark / s->share : 0, one_group = s->share > 0 ? s->one_group / s->share : 0;
-	if (one_group > one_group_most) {
-		img->rel_mse_doubt = ERROR_ONE_GROUP;
+	double dark = s->total > 0 ? s->dark_total / s->total : 0,
+	       one_group = s->total > 0 ? s->one_group_total / s->total : 0;
+	if (one_group > max_one_group_share) {
+		img->rel_mse_doubt = ERROR_DOUBT_ONE_GROUP;
 		img->doubtful_share = one_group;
-	} else if (dark > dark_most) {
-		img->rel_mse_doubt = ERROR_DARK;
+	} else if (dark > max_dark_share) {
+		img->rel_mse_doubt = ERROR_DOUBT_DARK;
 		img->doubtful_share = dark;
-	} else if (!(img->rel_mse_95[1] <= fmax(widest, widest_of_known * known) * img->rel_mse_95[0])) {
-		img->rel_mse_doubt = ERROR_WIDE;
-	} else if (!(s->tail > img->error_tail_least)) {
-		img->rel_mse_doubt = ERROR_TAIL;
-	} else if (s->groups < ERROR_GROUPS && s->tail == INFINITY) {
-		img->rel_mse_doubt = ERROR_FEW_GROUPS;
+	} else if (!(img->rel_mse_95[1] <=
+		     fmax(max_end_ratio, max_end_ratio_factor * normal_end_ratio) * img->rel_mse_95[0])) {
+		img->rel_mse_doubt = ERROR_DOUBT_WIDE;
+	} else if (!(s->tail_index > img->error_tail_critical)) {
+		img->rel_mse_doubt = ERROR_DOUBT_TAIL;
+	} else if (s->groups < ERROR_GROUPS_MIN && s->tail_index == INFINITY) {
+		img->rel_mse_doubt = ERROR_DOUBT_FEW_GROUPS;
 	}
 	if (img->rel_mse_doubt)
 		img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
 }
 
-void canvas_interval(struct error_sums *s, struct canvas_image *img)
+void canvas_compute_interval(struct error_sums *s, struct canvas_image *img)
 {
 	double groups = s->groups, mean = 0;
-	img->error_tail = s->tail;
-	img->error_tail_least = tail_index_least(finite_variance, s->tail_errors);
-	for (uint32_t g = 0; g < s->groups && s->groups <= ERROR_FOLDED; g++)
+	img->error_tail_index = s->tail_index;
+	img->error_tail_critical = tail_index_critical(finite_variance_index, s->tail_count);
+	for (uint32_t g = 0; g < s->groups && s->groups <= ERROR_GROUPS_FOLDED; g++)
 		s->distance[g] = s->gram[g][g];
 	for (uint32_t g = 0; g < s->groups; g++)
 		mean += s->distance[g] / groups;
-	img->rel_mse = img->rel_mse_own = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] =
+	img->rel_mse = img->rel_mse_as_measured = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] =
 		mean / (groups - 1) / (3.0 * img->width * img->height);
 	if (!(mean > 0))
 		return;
-	double doubt = s->share > 0 ? s->doubt / (s->share * s->share) : 0, own = own_degrees(s);
-	img->rel_mse_degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(s, mean)) / (groups - 1));
-	own = (groups - 1) / (groups + 2) / (1 / own + doubt);
-	own = fmax(own, 1);
-	double known = f_quantile(0.975, own, own * (groups - 1)) / f_quantile(0.025, own, own * (groups - 1));
-	own = fmax(1, own / heavier_than_normal(s));
-	double low = s->share > 0 ? fmin(1, s->low / s->share) : 1,
-	       high = s->share > 0 ? fmax(1, (s->high + s->dark) / s->share) : 1;
-	img->rel_mse_own *= low;
-	img->rel_mse_upper *= high * f_quantile(0.95, own, own * (groups - 1));
-	img->rel_mse_95[0] *= low * f_quantile(0.025, own, own * (groups - 1));
-	img->rel_mse_95[1] *= high * f_quantile(0.975, own, own * (groups - 1));
-	find_doubt(s, known, img);
+	double brightness_variance = s->total > 0 ? s->brightness_variance / (s->total * s->total) : 0,
+	       degrees = effective_degrees(s);
+	img->rel_mse_degrees =
+		1 / (0.5 * brightness_variance + fmax(1 / degrees, 0.5 * distance_spread(s, mean)) / (groups - 1));
+	degrees = (groups - 1) / (groups + 2) / (1 / degrees + brightness_variance);
+	degrees = fmax(degrees, 1);
+	double normal_end_ratio =
+		f_quantile(0.975, degrees, degrees * (groups - 1)) / f_quantile(0.025, degrees, degrees * (groups - 1));
+	degrees = fmax(1, degrees / heavy_tail_factor(s));
+	double low = s->total > 0 ? fmin(1, s->lower_bound / s->total) : 1,
+	       high = s->total > 0 ? fmax(1, (s->upper_bound + s->dark_total) / s->total) : 1;
+	img->rel_mse_as_measured *= low;
+	img->rel_mse_upper *= high * f_quantile(0.95, degrees, degrees * (groups - 1));
+	img->rel_mse_95[0] *= low * f_quantile(0.025, degrees, degrees * (groups - 1));
+	img->rel_mse_95[1] *= high * f_quantile(0.975, degrees, degrees * (groups - 1));
+	set_doubt(s, normal_end_ratio, img);
 }

@@ -5,29 +5,30 @@
 
 #include "common/estimate/image.h"
 
-enum { ERROR_FOLDED = 16 };
+enum { ERROR_GROUPS_FOLDED = 16 };
 /* With fewer groups, the values of a pixel do not show whether one group outweighs the others: of four normally
  * distributed values one nearly always does. */
-enum { ERROR_GROUPS = 5 };
+enum { ERROR_GROUPS_MIN = 5 };
 
 /* Sums of the groups' weighted errors over an image. The relMSE is a mean over pixels and channels; the parts here are
  * the terms of that mean, and sums of them are not divided by their number. */
 struct error_sums {
 	uint32_t groups;
-	double share;	    /* sum of all parts */
-	double doubt;	    /* sum of the variances of parts due to the uncertainty of their brightness */
-	double low;	    /* lower bound of share: parts divided by the brightness with all fireflies */
-	double high;	    /* upper bound of share: parts divided by the brightness that the other groups found */
-	double dark;	    /* sum of the parts whose brightness is a block's mean */
-	double one_group;   /* sum of the parts in which one group has most of the variance */
-	double kurtosis;    /* sum of the kurtosis of the groups' values, weighted by parts */
-	double tail;	    /* tail index of the groups' relative errors on the bright side; INFINITY: not known */
-	size_t tail_errors; /* number of largest errors from which it was estimated */
-	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of the errors of two groups; further groups are folded */
-	double distance[PLAN_MAX_GROUPS];	 /* squared error of each group, if there are more than ERROR_FOLDED */
+	double total;		    /* sum of all parts */
+	double brightness_variance; /* sum of the variances of parts due to the uncertainty of their brightness */
+	double lower_bound;	    /* lower bound of share: parts divided by the brightness with all fireflies */
+	double upper_bound;	/* upper bound of share: parts divided by the brightness that the other groups found */
+	double dark_total;	/* sum of the parts whose brightness is a block's mean */
+	double one_group_total; /* sum of the parts in which one group has most of the variance */
+	double kurtosis_total;	/* sum of the kurtosis of the groups' values, weighted by parts */
+	double tail_index;	/* tail index of the groups' relative errors on the bright side; INFINITY: not known */
+	size_t tail_count;	/* number of largest errors from which it was estimated */
+	double gram[ERROR_GROUPS_FOLDED]
+		   [ERROR_GROUPS_FOLDED]; /* products of the errors of two groups; further groups are folded */
+	double distance[PLAN_GROUPS_MAX]; /* squared error of each group, if there are more than ERROR_GROUPS_FOLDED */
 };
 
 /* Fills in the relMSE, its interval and the reason for doubt. */
-void canvas_interval(struct error_sums *s, struct canvas_image *img);
+void canvas_compute_interval(struct error_sums *s, struct canvas_image *img);
 
 #endif

@@ -18,35 +18,36 @@ enum convergence_verdict {
 };
 
 /* With fewer mutations per chain, chains are never said to disagree: their starting states have too much weight. */
-enum { CONVERGENCE_MUTATIONS = 10000 };
+enum { CONVERGENCE_MUTATIONS_MIN = 10000 };
 
-enum { CONVERGENCE_TEXT = 512 };
+enum { CONVERGENCE_TEXT_MAX = 512 };
 struct convergence {
 	enum convergence_verdict verdict;
-	uint32_t tiles, tiles_flagged;	  /* number of tiles; of tiles in which chains have not mixed and whose mean is
-					     therefore uncertain */
-	double energy_flagged;		  /* share of the image's energy in flagged tiles */
-	double r_hat_median, r_hat_worst; /* over tiles with light; NAN: none */
-	uint32_t worst_x, worst_y;	  /* the tile of r_hat_worst, in pixels of the full film */
-	uint32_t classes_flagged;	  /* one bit per path class: chains and bootstrap differ */
-	uint32_t classes_apart; /* one bit per path class: groups of chains differ, as if few had found the class */
-	double stuck_share;	/* share of chain epochs without an accepted mutation */
-	char text[CONVERGENCE_TEXT]; /* one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
+	uint32_t tiles, flagged_tiles;	/* number of tiles; of tiles in which chains have not mixed and whose mean is
+					   therefore uncertain */
+	double flagged_energy_share;	/* share of the image's energy in flagged tiles */
+	double r_hat_median, max_r_hat; /* over tiles with light; NAN: none */
+	uint32_t worst_x, worst_y;	/* the tile of max_r_hat, in pixels of the full film */
+	uint32_t flagged_classes;	/* one bit per path class: chains and bootstrap differ */
+	uint32_t inconsistent_classes; /* one bit per path class: groups of chains differ, as if few had found the class
+					*/
+	double stuck_share;	       /* share of chain epochs without an accepted mutation */
+	char text[CONVERGENCE_TEXT_MAX]; /* one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
 };
 
 /* Judges the chains of an image that canvas_image has made. */
 void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *out);
 const char *convergence_name(enum convergence_verdict v); /* "agree", "too short", "disagree" */
 
-/* Appends a->text to the note on the image (strategy_note). */
-void convergence_add_note(const struct convergence *a, char *note, size_t size);
+/* Appends a->text to the note on the image (strategy_print_note). */
+void convergence_append_note(const struct convergence *a, char *note, size_t size);
 
 /* Prints one row per class that has energy: its share of b in %, in the bootstrap and in the chains, with standard
  * errors, t, and whether the class is flagged or its groups differ. Lines end with '\n'; empty if no class has energy.
- * CONVERGENCE_TABLE bytes are enough. */
-enum { CONVERGENCE_TABLE = 4096 };
-void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a,
-		       char *text, size_t size);
+ * CONVERGENCE_TABLE_MAX bytes are enough. */
+enum { CONVERGENCE_TABLE_MAX = 4096 };
+void convergence_print_table(const struct path_class_energy classes[PATH_CLASSES], double b,
+			     const struct convergence *a, char *text, size_t size);
 
 /* Returns P(|T| > |t|) for Student's t with that number of degrees of freedom (at least 1). */
 double convergence_student_tail(double t, uint32_t degrees);

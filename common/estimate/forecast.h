@@ -23,7 +23,7 @@
 
 #include "common/estimate/image.h"
 
-enum { FORECAST_LOOKS = 64 };
+enum { FORECAST_LOOKS_MAX = 64 };
 
 struct forecast_look {
 	double work;				/* mutations or samples, in the units of plan_round_mutations */
@@ -40,7 +40,7 @@ struct forecast_look {
 
 struct forecast_history {
 	uint32_t count;
-	struct forecast_look looks[FORECAST_LOOKS]; /* by increasing work; if there are too many, the oldest go */
+	struct forecast_look looks[FORECAST_LOOKS_MAX]; /* by increasing work; if there are too many, the oldest go */
 };
 
 /* The median and the ends of a 90 % interval. INFINITY: beyond any simulated render. */
@@ -61,26 +61,26 @@ enum forecast_run {
 /* Adds a look, unless it is invalid (no finite error above 0, impossible numbers) or has no more work than the last. */
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l);
 /* Adds the look that an image of the render gives after these times. */
-void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,
-		  double seconds);
+void forecast_add_image(struct forecast_history *h, const struct plan *p, const struct canvas_image *img,
+			double cpu_seconds, double seconds);
 /* Returns the first look at which a render with this target would have stopped; NULL if there is none yet. */
-const struct forecast_look *forecast_reached(const struct forecast_history *h, double target);
+const struct forecast_look *forecast_stopping_look(const struct forecast_history *h, double target);
 
 /* The functions that return bool return false, and store nothing, if there are no looks. */
 
 /* Stores the relative error at the last look. */
-bool forecast_error(const struct forecast_history *h, struct forecast_range *error);
+bool forecast_current_error(const struct forecast_history *h, struct forecast_range *error);
 /* Stores the relative error that the render will have after this much work. */
 bool forecast_error_at(const struct forecast_history *h, double work, struct forecast_range *error);
 /* Returns the estimate, below the target, at which the render will stop if its error stays in doubt because light is
  * rare (stated_error_rare_stop). 0: it is not in doubt now, or made of chains, whose doubt ends. */
-double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target);
+double forecast_stopping_error(const struct forecast_history *h, const struct plan *p, double target);
 /* Stores the cost at which a render with the rounds of plan p, whose bounds are ignored, will reach this target. With
  * FORECAST_SAME, simulated renders are in doubt now if the last look is, and the cost includes that of the looks. With
  * FORECAST_NEW, a pilot that went far beyond the target is judged by its looks around the target. */
-bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
-		     struct forecast_cost *c);
+bool forecast_cost_of_target(const struct forecast_history *h, const struct plan *p, double target,
+			     enum forecast_run run, struct forecast_cost *c);
 /* Stores the cost of halving the error, counted from the last look, in rounds of plan p. */
-bool forecast_halving(const struct forecast_history *h, const struct plan *p, struct forecast_cost *c);
+bool forecast_cost_of_halving(const struct forecast_history *h, const struct plan *p, struct forecast_cost *c);
 
 #endif

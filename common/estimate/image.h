@@ -20,17 +20,19 @@ struct path_class_energy {
 
 /* Why the interval of an image's relMSE is not known; stated_error.h has sentences for these. */
 enum error_doubt {
-	ERROR_KNOWN,	  /* the interval is known */
-	ERROR_ONE_GROUP,  /* too much of relMSE comes from pixels in which one group outweighs the others: rare light */
-	ERROR_DARK,	  /* too much of it comes from pixels whose brightness, the divisor of errors, is not known */
-	ERROR_WIDE,	  /* the interval would span more than a factor of ten in relative error */
-	ERROR_TAIL,	  /* the largest errors of pixels are so unequal that larger ones may still come: error_tail is
-			     not above error_tail_least */
-	ERROR_FEW_GROUPS, /* too few groups, and too few pixels for a tail index, to tell whether larger errors may
-			     still come */
-	ERROR_NO_SPREAD,  /* a single group, which cannot be compared with others */
-	ERROR_SHORT,	  /* the chains are too short to be judged (convergence.h) */
-	ERROR_UNSEEN,	  /* light is missing that the samples so far are unlikely to have found (struct plan_unseen) */
+	ERROR_DOUBT_NONE,      /* the interval is known */
+	ERROR_DOUBT_ONE_GROUP, /* too much of relMSE comes from pixels in which one group outweighs the others: rare
+				  light */
+	ERROR_DOUBT_DARK, /* too much of it comes from pixels whose brightness, the divisor of errors, is not known */
+	ERROR_DOUBT_WIDE, /* the interval would span more than a factor of ten in relative error */
+	ERROR_DOUBT_TAIL, /* the largest errors of pixels are so unequal that larger ones may still come:
+		     error_tail_index is not above error_tail_critical */
+	ERROR_DOUBT_FEW_GROUPS,	  /* too few groups, and too few pixels for a tail index, to tell whether larger errors
+			       may   still come */
+	ERROR_DOUBT_NO_SPREAD,	  /* a single group, which cannot be compared with others */
+	ERROR_DOUBT_SHORT_CHAINS, /* the chains are too short to be judged (convergence.h) */
+	ERROR_DOUBT_UNSEEN, /* light is missing that the samples so far are unlikely to have found (struct plan_unseen)
+			     */
 };
 
 /* rel_mse_unseen may be too small by this factor, because pilots estimate it from few photons. */
@@ -43,19 +45,19 @@ struct canvas_image {
 	/* Estimate of the relMSE of rgb against the true image B of this resolution: the mean over pixels and channels
 	 * of (rgb - B)^2 / (B^2 + (0.01 m)^2), m the mean of B. NAN if groups < 2 or there is no light. */
 	double rel_mse;
-	double rel_mse_upper;	/* upper end of the 90 % interval of this image's relMSE; valid only if rel_mse_doubt is
-				   ERROR_KNOWN */
-	double rel_mse_own;	/* rel_mse if every pixel's brightness is right as it came out, without fireflies */
+	double rel_mse_upper; /* upper end of the 90 % interval of this image's relMSE; valid only if rel_mse_doubt is
+				 ERROR_DOUBT_NONE */
+	double rel_mse_as_measured; /* rel_mse if every pixel's brightness is right as it came out, without fireflies */
 	double rel_mse_degrees; /* degrees of freedom: rel_mse is distributed as its expectation times chi-square over
 				   them; NAN: not known */
 	double rel_mse_95[2];	/* contains this image's relMSE in 95 % of all cases; NAN if rel_mse_doubt is set */
 	enum error_doubt rel_mse_doubt;
-	double doubtful_share;	 /* share of rel_mse from the doubtful pixels (ERROR_ONE_GROUP, ERROR_DARK) */
-	double rel_mse_unseen;	 /* relMSE due to light that the samples so far are unlikely to have found, by the pilot
-				  */
-	double error_tail;	 /* tail index (tail.h) of the groups' relative errors; INFINITY or 0: not known */
-	double error_tail_least; /* above this the variance of errors is finite, with 95 % confidence */
-	uint64_t unvisited;	 /* pixels that no chain visited; 0 for samples */
+	double doubtful_share; /* share of rel_mse from the doubtful pixels (ERROR_DOUBT_ONE_GROUP, ERROR_DOUBT_DARK) */
+	double rel_mse_unseen; /* relMSE due to light that the samples so far are unlikely to have found, by the pilot
+				*/
+	double error_tail_index;    /* tail index (tail.h) of the groups' relative errors; INFINITY or 0: not known */
+	double error_tail_critical; /* above this the variance of errors is finite, with 95 % confidence */
+	uint64_t unvisited_count;   /* pixels that no chain visited; 0 for samples */
 	/*
 	 * Statistics of chains, from complete rounds, for each tile of TILE_SIZE from the crop's corner. NULL for
 	 * samples, previews and before the first complete round.
@@ -73,13 +75,14 @@ struct canvas_image {
 	struct path_class_energy classes[PATH_CLASSES];
 	/* For samples whose brightest contributions are spread by chains (erpt): the chains' share of b, and of its
 	 * variance between the groups; NAN where that is 0 / 0. */
-	double chains_energy, chains_variance;
-	double b, b_error;   /* pooled b; its standard error (chains), valid unless stated_b_doubt says otherwise */
-	double b_tail;	     /* tail index of the independent samples whose mean is b; 0: not known */
-	double beyond_share; /* share of the energy in paths too long for the chains' state */
-	uint64_t samples, rounds;    /* sum of COUNT_SAMPLES, and complete rounds, of this image */
+	double chains_energy_share, chains_variance_share;
+	double b, b_error;	  /* pooled b; its standard error (chains), valid unless stated_error_print_b_doubt says
+				     otherwise */
+	double b_tail_index;	  /* tail index of the independent samples whose mean is b; 0: not known */
+	double beyond_share;	  /* share of the energy in paths too long for the chains' state */
+	uint64_t samples, rounds; /* sum of COUNT_SAMPLES, and complete rounds, of this image */
 	struct canvas_counts counts; /* counters of this image, with the contributions that the bootstrap refused */
-	bool black;		     /* all pixels are 0 */
+	bool is_black;		     /* all pixels are 0 */
 };
 
 #endif

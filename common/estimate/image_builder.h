@@ -9,11 +9,11 @@
 struct image_builder {
 	const struct canvas *c;
 	struct canvas_image *img;
-	bool open_rounds;		/* a preview, which includes open rounds */
-	struct tally *all;		/* sums of prefix, bootstrap and, for a preview, open rounds */
-	double factor[PLAN_MAX_GROUPS]; /* from grid units to the group's own image; 0: the group has no samples */
+	bool includes_open_rounds;	/* a preview, which includes open rounds */
+	struct tally *totals;		/* sums of prefix, bootstrap and, for a preview, open rounds */
+	double factor[PLAN_GROUPS_MAX]; /* from grid units to the group's own image; 0: the group has no samples */
 	double pooled_factor;		/* from the sums over all groups to the image */
-	double b[PLAN_MAX_GROUPS];	/* by group */
+	double b[PLAN_GROUPS_MAX];	/* by group */
 };
 
 #endif

@@ -12,6 +12,6 @@ struct inverse_square {
 
 /* brightness, error: mean and standard error of B. error and floor must be above 0, and all arguments finite. The time
  * grows with the logarithm of error / floor, and also if the error is below a fifth of the brightness. */
-struct inverse_square inverse_square_expect(double brightness, double error, double floor);
+struct inverse_square inverse_square_moments(double brightness, double error, double floor);
 
 #endif

@@ -2,13 +2,13 @@
 /*
  * The bootstrap of a job, and the bounds that end it.
  *
- * Happy path: batches of the bootstrap are added in any order (bootstrap_add). When none is missing, bootstrap_merge
- * computes b by group and pooled, bootstrap_seeds draws each group's seeds by systematic resampling, and
- * bootstrap_to_canvas starts the film's sums. After complete rounds merge_end_of says which bound ends the job;
- * merge_error_due says at which rounds the error is estimated at all.
+ * Happy path: batches of the bootstrap are added in any order (bootstrap_add). When none is missing,
+ * bootstrap_compute_b computes b by group and pooled, bootstrap_draw_seeds draws each group's seeds by systematic
+ * resampling, and bootstrap_add_to_canvas starts the film's sums. After complete rounds merge_find_end says which bound
+ * ends the job; merge_error_is_due says at which rounds the error is estimated at all.
  *
  * Failures: a lease that was added before is -EEXIST, a damaged file of saved leases -EBADMSG, and -ENOMEM. A
- * bootstrap without light is no failure: it is `black`, and its seeds are UINT64_MAX. Exact sums make the result
+ * bootstrap without light is no failure: it is `is_black`, and its seeds are UINT64_MAX. Exact sums make the result
  * independent of the order of batches.
  */
 #include "common/estimate/merge.h"
@@ -22,14 +22,14 @@
 #include <math.h>
 #include <string.h>
 
-enum { KEY = 2, SUMS = 3 }; /* numbers of these kinds in a saved lease */
+enum { KEY_NUMBERS = 2, SUM_NUMBERS = 3 }; /* numbers of these kinds in a saved lease */
 
 struct bootstrap {
 	struct plan plan;
-	float *weights;	       /* [bootstrap], in index order */
-	struct batch *batches; /* [group][part]; only key, counters, sums and classes are kept */
-	uint32_t missing;      /* leases not added yet */
-	struct tail tail;      /* of all weights */
+	float *weights;		/* [bootstrap], in index order */
+	struct batch *batches;	/* [group][part]; only key, counters, sums and classes are kept */
+	uint32_t missing_count; /* leases not added yet */
+	struct tail tail;	/* of all weights */
 };
 
 /* Returns how many of the largest samples the tail index is estimated from: one in 512, but at least 16, for which its
@@ -46,9 +46,9 @@ int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e)
 	struct bootstrap *s = mem_alloc(1, sizeof *s);
 	if (s) {
 		s->plan = *p;
-		s->missing = p->groups * p->parts;
+		s->missing_count = p->groups * p->parts;
 		s->weights = mem_alloc(p->bootstrap, sizeof *s->weights);
-		s->batches = mem_alloc(s->missing, sizeof *s->batches);
+		s->batches = mem_alloc(s->missing_count, sizeof *s->batches);
 	}
 	if (!s || !s->weights || !s->batches || tail_init(&s->tail, tail_count(p) + 1)) {
 		bootstrap_free(s);
@@ -68,24 +68,24 @@ void bootstrap_free(struct bootstrap *s)
 	mem_free(s);
 }
 
-static struct batch *batch_of(const struct bootstrap *s, uint32_t group, uint32_t part)
+static struct batch *stored_batch(const struct bootstrap *s, uint32_t group, uint32_t part)
 {
 	return s->batches + (size_t)group * s->plan.parts + part;
 }
 
-bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part)
+bool bootstrap_has_lease(const struct bootstrap *s, uint32_t group, uint32_t part)
 {
-	return batch_of(s, group, part)->key.kind == LEASE_BOOTSTRAP;
+	return stored_batch(s, group, part)->key.kind == LEASE_BOOTSTRAP;
 }
 
-uint32_t bootstrap_missing(const struct bootstrap *s)
+uint32_t bootstrap_missing_count(const struct bootstrap *s)
 {
-	return s->missing;
+	return s->missing_count;
 }
 
-uint32_t bootstrap_done(const struct bootstrap *s)
+uint32_t bootstrap_added_count(const struct bootstrap *s)
 {
-	return s->plan.groups * s->plan.parts - s->missing;
+	return s->plan.groups * s->plan.parts - s->missing_count;
 }
 
 int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
@@ -93,32 +93,32 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	const struct lease_key *k = &b->key;
 	struct plan_range r = plan_bootstrap_range(&s->plan, k->group, k->part);
 	assert(k->kind == LEASE_BOOTSTRAP && b->weight_count == r.end - r.begin);
-	if (bootstrap_has(s, k->group, k->part))
+	if (bootstrap_has_lease(s, k->group, k->part))
 		return error_set(e, EEXIST, "the bootstrap lease has been merged before");
 	memcpy(s->weights + r.begin, b->weights, b->weight_count * sizeof *b->weights);
 	for (size_t i = 0; i < b->weight_count; i++)
 		tail_add(&s->tail, (double)b->weights[i]);
-	struct batch *kept = batch_of(s, k->group, k->part);
-	kept->key = *k;
-	memcpy(kept->counters, b->counters, sizeof kept->counters);
-	kept->independent_sum = b->independent_sum;
-	kept->independent_square = b->independent_square;
-	kept->beyond_sum = b->beyond_sum;
-	memcpy(kept->classes, b->classes, sizeof kept->classes);
-	s->missing--;
+	struct batch *stored = stored_batch(s, k->group, k->part);
+	stored->key = *k;
+	memcpy(stored->counters, b->counters, sizeof stored->counters);
+	stored->independent_sum = b->independent_sum;
+	stored->independent_square = b->independent_square;
+	stored->beyond_sum = b->beyond_sum;
+	memcpy(stored->classes, b->classes, sizeof stored->classes);
+	s->missing_count--;
 	return 0;
 }
 
 static int save_lease(const struct bootstrap *s, const struct batch *b, struct checked_file *f, struct error *e)
 {
 	struct plan_range r = plan_bootstrap_range(&s->plan, b->key.group, b->key.part);
-	const uint32_t key[KEY] = {b->key.group, b->key.part};
-	const double sums[SUMS] = {b->independent_sum, b->independent_square, b->beyond_sum};
-	int rc = checked_file_write_numbers(f, key, sizeof *key, KEY, e);
+	const uint32_t key[KEY_NUMBERS] = {b->key.group, b->key.part};
+	const double sums[SUM_NUMBERS] = {b->independent_sum, b->independent_square, b->beyond_sum};
+	int rc = checked_file_write_numbers(f, key, sizeof *key, KEY_NUMBERS, e);
 	if (!rc)
 		rc = checked_file_write_numbers(f, b->counters, sizeof *b->counters, BATCH_COUNTERS, e);
 	if (!rc)
-		rc = checked_file_write_numbers(f, sums, sizeof *sums, SUMS, e);
+		rc = checked_file_write_numbers(f, sums, sizeof *sums, SUM_NUMBERS, e);
 	if (!rc)
 		rc = checked_file_write_numbers(f, b->classes, sizeof *b->classes, PATH_CLASSES, e);
 	return rc ? rc : checked_file_write_numbers(f, s->weights + r.begin, sizeof *s->weights, r.end - r.begin, e);
@@ -126,7 +126,7 @@ static int save_lease(const struct bootstrap *s, const struct batch *b, struct c
 
 int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct error *e)
 {
-	uint32_t leases = s->plan.groups * s->plan.parts, count = bootstrap_done(s);
+	uint32_t leases = s->plan.groups * s->plan.parts, count = bootstrap_added_count(s);
 	int rc = checked_file_write_numbers(f, &count, sizeof count, 1, e);
 	for (uint32_t i = 0; i < leases && !rc; i++)
 		if (s->batches[i].key.kind == LEASE_BOOTSTRAP)
@@ -136,9 +136,9 @@ int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct err
 
 static int load_lease(struct bootstrap *s, struct checked_file *f, struct error *e)
 {
-	uint32_t key[KEY];
-	double sums[SUMS];
-	int rc = checked_file_read_numbers(f, key, sizeof *key, KEY, e);
+	uint32_t key[KEY_NUMBERS];
+	double sums[SUM_NUMBERS];
+	int rc = checked_file_read_numbers(f, key, sizeof *key, KEY_NUMBERS, e);
 	if (rc)
 		return rc;
 	if (key[0] >= s->plan.groups || key[1] >= s->plan.parts)
@@ -152,7 +152,7 @@ static int load_lease(struct bootstrap *s, struct checked_file *f, struct error 
 				 (unsigned long long)(r.end - r.begin));
 	rc = checked_file_read_numbers(f, b.counters, sizeof *b.counters, BATCH_COUNTERS, e);
 	if (!rc)
-		rc = checked_file_read_numbers(f, sums, sizeof *sums, SUMS, e);
+		rc = checked_file_read_numbers(f, sums, sizeof *sums, SUM_NUMBERS, e);
 	if (!rc)
 		rc = checked_file_read_numbers(f, b.classes, sizeof *b.classes, PATH_CLASSES, e);
 	if (!rc)
@@ -173,18 +173,18 @@ static int load_lease(struct bootstrap *s, struct checked_file *f, struct error 
 int bootstrap_load(struct bootstrap *s, struct checked_file *f, struct error *e)
 {
 	uint32_t count;
-	assert(s->missing == s->plan.groups * s->plan.parts);
+	assert(s->missing_count == s->plan.groups * s->plan.parts);
 	int rc = checked_file_read_numbers(f, &count, sizeof count, 1, e);
-	if (!rc && count > s->missing)
-		rc = error_set(e, EBADMSG, "%u bootstrap leases of %u", count, s->missing);
+	if (!rc && count > s->missing_count)
+		rc = error_set(e, EBADMSG, "%u bootstrap leases of %u", count, s->missing_count);
 	for (uint32_t i = 0; i < count && !rc; i++)
 		rc = load_lease(s, f, e);
 	return rc;
 }
 
-void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
+void bootstrap_compute_b(const struct bootstrap *s, struct bootstrap_result *r)
 {
-	assert(s->missing == 0);
+	assert(s->missing_count == 0);
 	*r = (struct bootstrap_result){0};
 	struct exact_sum all = {0}, beyond = {0};
 	uint64_t all_count = 0;
@@ -192,7 +192,7 @@ void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
 		struct exact_sum sum = {0};
 		uint64_t count = 0;
 		for (uint32_t part = 0; part < s->plan.parts; part++) {
-			const struct batch *b = batch_of(s, g, part);
+			const struct batch *b = stored_batch(s, g, part);
 			exact_sum_add(&sum, b->independent_sum);
 			exact_sum_add(&beyond, b->beyond_sum);
 			count += b->counters[COUNT_INDEPENDENT];
@@ -207,22 +207,22 @@ void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
 	r->black = s->plan.kind == PLAN_CHAINS && !(inside > 0);
 }
 
-void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
+void bootstrap_draw_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
 {
-	assert(s->missing == 0 && s->plan.kind == PLAN_CHAINS);
+	assert(s->missing_count == 0 && s->plan.kind == PLAN_CHAINS);
 	uint64_t first = plan_bootstrap_range(&s->plan, group, 0).begin, count = s->plan.bootstrap / s->plan.groups;
-	if (plan_resample(&s->plan, group, s->weights + first, count, plan_resample_u(&s->plan, group),
+	if (plan_resample(&s->plan, group, s->weights + first, count, plan_resample_offset(&s->plan, group),
 			  s->plan.chains / s->plan.groups, index))
 		return;
 	for (uint32_t k = 0; k < s->plan.chains / s->plan.groups; k++)
 		index[k] = UINT64_MAX;
 }
 
-void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
+void bootstrap_add_to_canvas(struct bootstrap *s, struct canvas *c)
 {
-	assert(s->missing == 0);
-	tail_settle(&s->tail);
-	canvas_set_tail(c, tail_index(&s->tail, tail_count(&s->plan)));
+	assert(s->missing_count == 0);
+	tail_select_largest(&s->tail);
+	canvas_set_tail_index(c, tail_index(&s->tail, tail_count(&s->plan)));
 	for (uint32_t i = 0; i < s->plan.groups * s->plan.parts; i++) {
 		int rc = canvas_add(c, s->batches + i, NULL);
 		assert(rc == 0 || rc == -EEXIST);
@@ -233,15 +233,15 @@ void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
 /* Returns the least number of rounds between two estimates of the error. An estimate costs 15 to 17 ns per pixel and
  * group, a mutation or sample at least 2 us: after 0.9 mutations or samples per pixel and group, an estimate costs less
  * than 1 % of the work since the last one. */
-static uint64_t look_rounds(const struct plan *p)
+static uint64_t error_interval_rounds(const struct plan *p)
 {
 	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);
 	return work / round + (work % round != 0);
 }
 
-uint64_t merge_error_next(const struct plan *p, uint64_t rounds)
+uint64_t merge_next_error_rounds(const struct plan *p, uint64_t rounds)
 {
-	uint64_t step = look_rounds(p), due = 1;
+	uint64_t step = error_interval_rounds(p), due = 1;
 	step = step > 0 ? step : 1;
 	if (rounds >= UINT64_MAX / 2)
 		return UINT64_MAX;
@@ -250,9 +250,9 @@ uint64_t merge_error_next(const struct plan *p, uint64_t rounds)
 	return due > UINT64_MAX / step ? UINT64_MAX : due * step;
 }
 
-bool merge_error_due(const struct plan *p, uint64_t rounds)
+bool merge_error_is_due(const struct plan *p, uint64_t rounds)
 {
-	return p->target_error > 0 && rounds > 0 && merge_error_next(p, rounds - 1) == rounds;
+	return p->target_error > 0 && rounds > 0 && merge_next_error_rounds(p, rounds - 1) == rounds;
 }
 
 bool merge_ends_black(const struct plan *p, uint64_t rounds, bool black)
@@ -263,7 +263,7 @@ bool merge_ends_black(const struct plan *p, uint64_t rounds, bool black)
 	       (double)rounds * (double)plan_round_mutations(p) >= samples;
 }
 
-enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
+enum merge_end merge_find_end(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
 {
 	if (img && p->target_error > 0 && stated_error_meets(img, p->target_error))
 		return MERGE_ERROR;
@@ -271,14 +271,14 @@ enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double second
 		return MERGE_ROUNDS;
 	if (p->seconds > 0 && rounds > 0 && seconds >= p->seconds)
 		return MERGE_TIME;
-	if (img && merge_ends_black(p, rounds, img->black))
+	if (img && merge_ends_black(p, rounds, img->is_black))
 		return MERGE_BLACK;
-	return MERGE_GOES_ON;
+	return MERGE_CONTINUES;
 }
 
 const char *merge_end_name(enum merge_end end, bool black)
 {
-	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted",
+	static const char *const names[] = {[MERGE_CONTINUES] = "interrupted",
 					    [MERGE_ROUNDS] = "mutations",
 					    [MERGE_TIME] = "time",
 					    [MERGE_ERROR] = "target-error",
@@ -286,11 +286,11 @@ const char *merge_end_name(enum merge_end end, bool black)
 	return black ? "black" : names[end];
 }
 
-double merge_seconds_left(const struct plan *p, double seconds, double rounds, double rounds_per_second)
+double merge_seconds_remaining(const struct plan *p, double seconds, double rounds, double rounds_per_second)
 {
-	double left = p->seconds - seconds;
+	double remaining = p->seconds - seconds;
 	if (!(rounds_per_second > 0))
-		return left > 0 ? left : NAN;
-	double last = fmax(ceil(rounds + fmax(0, left) * rounds_per_second), floor(rounds) + 1);
+		return remaining > 0 ? remaining : NAN;
+	double last = fmax(ceil(rounds + fmax(0, remaining) * rounds_per_second), floor(rounds) + 1);
 	return (fmax(1, last) - rounds) / rounds_per_second;
 }

@@ -32,43 +32,45 @@ static double r_hat(const struct spread *s, double n)
 	return sqrt((n - 1) / n + s->between / s->within);
 }
 
-static void find_spread(const struct moments *m, uint32_t tile, double n, struct spread *s)
+static void compute_spread(const struct moments *m, uint32_t tile, double n, struct spread *s)
 {
-	size_t sequences = (size_t)m->leases * m->per_lease;
+	size_t sequences = (size_t)m->lease_count * m->sequences_per_lease;
 	double count = (double)sequences, square = 0, second = 0;
 	*s = (struct spread){0, 0, 0};
 	for (size_t i = 0; i < sequences; i++)
-		s->mean += (double)m->first[i * m->tiles + tile];
+		s->mean += (double)m->first_moments[i * m->tile_count + tile];
 	s->mean /= MOMENTS_GRID * n * count;
 	for (size_t i = 0; i < sequences; i++) {
-		double p = (double)m->first[i * m->tiles + tile] / (MOMENTS_GRID * n), d = p - s->mean;
+		double p = (double)m->first_moments[i * m->tile_count + tile] / (MOMENTS_GRID * n), d = p - s->mean;
 		s->between += d * d;
 		square += p * p;
 	}
-	for (size_t i = 0; i < m->leases; i++)
-		second += (double)m->second[i * m->tiles + tile];
+	for (size_t i = 0; i < m->lease_count; i++)
+		second += (double)m->second_moments[i * m->tile_count + tile];
 	s->between = sequences > 1 ? s->between / (count - 1) : NAN;
 	s->within = n > 1 ? (second / (MOMENTS_GRID * n * count) - square / count) * n / (n - 1) : NAN;
 }
 
-static int make_tiles(const struct moments *m, double n, struct canvas_image *img, struct error *e)
+static int compute_tiles(const struct moments *m, double n, struct canvas_image *img, struct error *e)
 {
-	img->r_hat = mem_alloc(m->tiles, sizeof *img->r_hat);
-	img->tile_error = mem_alloc(m->tiles, sizeof *img->tile_error);
-	img->tile_share = mem_alloc(m->tiles, sizeof *img->tile_share);
-	double *mean = mem_alloc(m->tiles, sizeof *mean), all = 0;
-	bool there = img->r_hat && img->tile_error && img->tile_share && mean;
-	int rc = there ? 0 : error_set(e, ENOMEM, "no memory for tiles");
-	for (uint32_t t = 0; t < m->tiles && rc == 0; t++) {
+	img->r_hat = mem_alloc(m->tile_count, sizeof *img->r_hat);
+	img->tile_error = mem_alloc(m->tile_count, sizeof *img->tile_error);
+	img->tile_share = mem_alloc(m->tile_count, sizeof *img->tile_share);
+	double *mean = mem_alloc(m->tile_count, sizeof *mean), all = 0;
+	bool allocated = img->r_hat && img->tile_error && img->tile_share && mean;
+	int rc = allocated ? 0 : error_set(e, ENOMEM, "no memory for tiles");
+	for (uint32_t t = 0; t < m->tile_count && rc == 0; t++) {
 		struct spread s;
-		find_spread(m, t, n, &s);
+		compute_spread(m, t, n, &s);
 		img->r_hat[t] = (float)r_hat(&s, n);
 		img->tile_error[t] =
-			(float)(s.mean > 0 ? sqrt(s.between / ((double)m->leases * m->per_lease)) / s.mean : NAN);
+			(float)(s.mean > 0
+					? sqrt(s.between / ((double)m->lease_count * m->sequences_per_lease)) / s.mean
+					: NAN);
 		mean[t] = s.mean;
 		all += s.mean;
 	}
-	for (uint32_t t = 0; t < m->tiles && rc == 0; t++)
+	for (uint32_t t = 0; t < m->tile_count && rc == 0; t++)
 		img->tile_share[t] = (float)(all > 0 ? mean[t] / all : 0);
 	mem_free(mean);
 	return rc;
@@ -77,7 +79,7 @@ static int make_tiles(const struct moments *m, double n, struct canvas_image *im
 /* ---- classes */
 
 /* Returns the mean of the groups' values, and stores its standard error. */
-static double mean_of(const double *x, uint32_t groups, double *error)
+static double mean_and_error(const double *x, uint32_t groups, double *error)
 {
 	double mean = 0, square = 0;
 	for (uint32_t g = 0; g < groups; g++)
@@ -89,69 +91,72 @@ static double mean_of(const double *x, uint32_t groups, double *error)
 }
 
 /* Returns the time of a group's chains in a class, in mutations. */
-static double chains_time(const struct moments *m, uint32_t group, size_t class, bool open_rounds)
+static double class_time(const struct moments *m, uint32_t group, size_t class, bool open_rounds)
 {
 	struct exact_sum sum = {0};
 	for (size_t set = 0; set < (open_rounds ? MOMENTS_SETS : MOMENTS_OPEN); set++)
-		exact_sum_merge(&sum, &m->time[set * moments_classes(m) + (size_t)group * PATH_CLASSES + class]);
+		exact_sum_merge(&sum,
+				&m->class_time[set * moments_class_count(m) + (size_t)group * PATH_CLASSES + class]);
 	return exact_sum_value(&sum);
 }
 
 /* Returns the energy of one unit of a class's sums: chains add up time, of which a unit stands for b; samples add up
  * the energy that they leave to chains (erpt). */
-static double unit_of(const struct moments *m, const struct moments_group *of)
+static double class_unit(const struct moments *m, const struct moments_group *of)
 {
 	return m->plan.kind == PLAN_CHAINS ? of->b : 1;
 }
 
-/* Computes the energy of a class, and adds the chains' energy in it to of_chains, by group. */
-static void make_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
-		       double of_chains[PLAN_MAX_GROUPS], struct path_class_energy *out)
+/* Computes the energy of a class, and adds the chains' energy in it to chains_energy, by group. */
+static void compute_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
+			  double chains_energy[PLAN_GROUPS_MAX], struct path_class_energy *out)
 {
 	uint32_t count = m->plan.groups;
-	double bootstrap[PLAN_MAX_GROUPS], chains[PLAN_MAX_GROUPS], difference[PLAN_MAX_GROUPS], error;
+	double bootstrap[PLAN_GROUPS_MAX], chains[PLAN_GROUPS_MAX], difference[PLAN_GROUPS_MAX], error;
 	for (uint32_t g = 0; g < count; g++) {
 		const struct moments_group *of = &groups[g];
-		double sum = exact_sum_value(&m->bootstrap[(size_t)g * PATH_CLASSES + class]);
-		double time = of->mutations ? chains_time(m, g, class, open_rounds) : 0;
+		double sum = exact_sum_value(&m->bootstrap_energy[(size_t)g * PATH_CLASSES + class]);
+		double time = of->mutations ? class_time(m, g, class, open_rounds) : 0;
 		bootstrap[g] = of->bootstrap ? sum / (double)of->bootstrap : 0;
-		chains[g] = of->mutations ? unit_of(m, of) * time / (double)of->mutations : 0;
+		chains[g] = of->mutations ? class_unit(m, of) * time / (double)of->mutations : 0;
 		difference[g] = chains[g] - bootstrap[g];
-		of_chains[g] += chains[g];
+		chains_energy[g] += chains[g];
 	}
-	out->bootstrap = mean_of(bootstrap, count, &out->bootstrap_error);
-	out->chains = mean_of(chains, count, &out->chains_error);
-	double mean = mean_of(difference, count, &error);
-	bool compared = m->per_lease && (out->bootstrap > 0 || out->chains > 0);
+	out->bootstrap = mean_and_error(bootstrap, count, &out->bootstrap_error);
+	out->chains = mean_and_error(chains, count, &out->chains_error);
+	double mean = mean_and_error(difference, count, &error);
+	bool compared = m->sequences_per_lease && (out->bootstrap > 0 || out->chains > 0);
 	out->difference_t = compared && !(mean == 0 && error == 0) ? mean / error : NAN;
 }
 
 /* For samples whose brightest contributions are spread by chains: computes the chains' share of the energy, and of the
  * variance of b between groups. */
-static void find_chains_part(const double *of_chains, const struct moments_group *groups, uint32_t count,
-			     struct canvas_image *img)
+static void compute_chains_share(const double *chains_energy, const struct moments_group *groups, uint32_t count,
+				 struct canvas_image *img)
 {
-	double rest[PLAN_MAX_GROUPS], chains_error, rest_error;
+	double other_energy[PLAN_GROUPS_MAX], chains_error, rest_error;
 	for (uint32_t g = 0; g < count; g++)
-		rest[g] = groups[g].b - of_chains[g];
-	double chains = mean_of(of_chains, count, &chains_error), others = mean_of(rest, count, &rest_error);
-	img->chains_energy = chains / (chains + others);
-	img->chains_variance = chains_error * chains_error / (chains_error * chains_error + rest_error * rest_error);
+		other_energy[g] = groups[g].b - chains_energy[g];
+	double chains = mean_and_error(chains_energy, count, &chains_error),
+	       others = mean_and_error(other_energy, count, &rest_error);
+	img->chains_energy_share = chains / (chains + others);
+	img->chains_variance_share =
+		chains_error * chains_error / (chains_error * chains_error + rest_error * rest_error);
 }
 
-int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
-		  struct canvas_image *img, struct error *e)
+int moments_fill_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
+		       struct canvas_image *img, struct error *e)
 {
 	const struct plan *p = &m->plan;
 	img->tiles_across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
 	img->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
-	double of_chains[PLAN_MAX_GROUPS] = {0};
+	double chains_energy[PLAN_GROUPS_MAX] = {0};
 	for (size_t k = 0; k < PATH_CLASSES; k++)
-		make_class(m, groups, k, open_rounds, of_chains, &img->classes[k]);
+		compute_class(m, groups, k, open_rounds, chains_energy, &img->classes[k]);
 	if (p->kind == PLAN_SAMPLES)
-		find_chains_part(of_chains, groups, p->groups, img);
-	if (m->per_lease == 0 || open_rounds || rounds == 0)
+		compute_chains_share(chains_energy, groups, p->groups, img);
+	if (m->sequences_per_lease == 0 || open_rounds || rounds == 0)
 		return 0;
-	double chains = (double)(p->chains / m->leases / m->per_lease);
-	return make_tiles(m, chains * (double)p->epoch * (double)rounds, img, e);
+	double chains = (double)(p->chains / m->lease_count / m->sequences_per_lease);
+	return compute_tiles(m, chains * (double)p->epoch * (double)rounds, img, e);
 }

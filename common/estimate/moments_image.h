@@ -16,7 +16,7 @@ struct moments_group {
 };
 /* Fills in img->classes and, for complete rounds of chains (not for previews), the arrays by tile. Returns 0 or
  * -ENOMEM. */
-int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
-		  struct canvas_image *img, struct error *e);
+int moments_fill_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
+		       struct canvas_image *img, struct error *e);
 
 #endif

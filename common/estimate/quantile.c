@@ -56,7 +56,7 @@ static double incomplete_beta(double x, double y, double a, double b)
 	return 1 - front / b * beta_fraction(y, b, a);
 }
 
-double f_below(double x, double a, double b)
+double f_cdf(double x, double a, double b)
 {
 	if (!(x > 0))
 		return 0;
@@ -66,13 +66,13 @@ double f_below(double x, double a, double b)
 double f_quantile(double p, double a, double b)
 {
 	double low = 0, high = 1;
-	while (f_below(high, a, b) < p && high < 1e300)
+	while (f_cdf(high, a, b) < p && high < 1e300)
 		high *= 2;
 	while (low < high * (1 - 0x1p-32)) {
 		double middle = low > 0 ? sqrt(low * high) : high / 16;
 		if (low == 0 && high < 1e-300)
 			return 0;
-		if (f_below(middle, a, b) < p)
+		if (f_cdf(middle, a, b) < p)
 			low = middle;
 		else
 			high = middle;

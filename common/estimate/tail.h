@@ -20,29 +20,29 @@
 #include <stddef.h>
 
 struct tail {
-	size_t held;  /* numbers in y */
-	size_t most;  /* how many of the largest are kept; y has room for twice as many */
-	double least; /* only numbers above this can be among the largest */
-	double *y;
+	size_t count;	   /* numbers in y */
+	size_t kept_count; /* how many of the largest are kept; y has room for twice as many */
+	double threshold;  /* only numbers above this can be among the largest */
+	double *values;
 };
 
-/* Prepares to keep the `most` largest numbers exactly. Returns 0 or -ENOMEM; tail_fini frees. */
+/* Prepares to keep the `kept_count` largest numbers exactly. Returns 0 or -ENOMEM; tail_fini frees. */
 int tail_init(struct tail *t, size_t most);
 void tail_fini(struct tail *t);
 /* Forgets all numbers. */
 void tail_clear(struct tail *t);
 void tail_add(struct tail *t, double y);
 /* Reduces y to the largest numbers, in descending order. Needed after the last tail_add, before the estimates below. */
-void tail_settle(struct tail *t);
-/* Returns Hill's estimate from the k largest, k < most: 1 if no more than k numbers were added or k is 0, INFINITY if
- * they are all equal. */
+void tail_select_largest(struct tail *t);
+/* Returns Hill's estimate from the k largest, k < kept_count: 1 if no more than k numbers were added or k is 0,
+ * INFINITY if they are all equal. */
 double tail_index(const struct tail *t, size_t k);
 /* Returns the value that an estimate from the k largest must exceed to rule out this index, or a smaller one, at the 5
  * % level; INFINITY if k is 0. It is based on the estimate's standard error; since the estimate's distribution is
  * skewed, the actual level is one in eleven at k = 32. */
-double tail_index_least(double index, size_t k);
-/* Returns the extreme-value index from the k largest, k < most: 1 if no more than k numbers were added or k is 0,
+double tail_index_critical(double index, size_t k);
+/* Returns the extreme-value index from the k largest, k < kept_count: 1 if no more than k numbers were added or k is 0,
  * -INFINITY if they are all equal. */
-double tail_evi(const struct tail *t, size_t k);
+double tail_extreme_value_index(const struct tail *t, size_t k);
 
 #endif

@@ -13,26 +13,26 @@
 #include <math.h>
 #include <string.h>
 
-/* A pixel's rare light is estimated from squares of up to RARE pixels a side, and only from pixels that are brighter by
- * at most RARE_BRIGHTER powers of two. */
-enum { RARE = 16, RARE_BRIGHTER = 3 };
+/* A pixel's rare light is estimated from squares of up to RARE_SIDE_MAX pixels a side, and only from pixels that are
+ * brighter by at most RARE_POWERS_MAX powers of two. */
+enum { RARE_SIDE_MAX = 16, RARE_POWERS_MAX = 3 };
 
-/* Computes a pixel's deviations, variance and kurtosis from the sums at offset `at` of the groups' slots. The inner
+/* Computes a pixel's deviations, variance and kurtosis from the sums at offset `offset` of the groups' slots. The inner
  * loops run over groups, so that the compiler vectorises them. */
-static void pixel_error(struct image_builder *m, struct tile_error *t, const int64_t *const *slot, size_t at,
-			size_t pixel)
+static void compute_pixel_error(struct image_builder *m, struct tile_error *t, const int64_t *const *slot,
+				size_t offset, size_t pixel)
 {
 	uint32_t groups = t->groups;
-	double rgb[3][PLAN_MAX_GROUPS];
+	double rgb[3][PLAN_GROUPS_MAX];
 	for (uint32_t g = 0; g < groups; g++) {
-		const int64_t *s = slot[g] + at;
+		const int64_t *s = slot[g] + offset;
 		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]},
 		       out[3];
 		rec709_from_xyz(xyz, out);
 		for (int k = 0; k < 3; k++)
 			rgb[k][g] = out[k];
 	}
-	float *apart = tile_error_apart(t, pixel);
+	float *deviations = tile_error_deviations(t, pixel);
 	for (size_t k = 0; k < 3; k++) {
 		double mean = 0, square = 0;
 		for (uint32_t g = 0; g < groups; g++)
@@ -40,7 +40,7 @@ static void pixel_error(struct image_builder *m, struct tile_error *t, const int
 		mean /= groups;
 		for (uint32_t g = 0; g < groups; g++) {
 			rgb[k][g] -= mean;
-			apart[k * groups + g] = (float)rgb[k][g];
+			deviations[k * groups + g] = (float)rgb[k][g];
 		}
 		double fourth = 0;
 		for (uint32_t g = 0; g < groups; g++) {
@@ -48,7 +48,7 @@ static void pixel_error(struct image_builder *m, struct tile_error *t, const int
 			square += q;
 			fourth += q * q;
 		}
-		t->square[pixel][k] = square / groups / (groups - 1);
+		t->variance[pixel][k] = square / groups / (groups - 1);
 		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
 	}
 }
@@ -57,24 +57,24 @@ static void pixel_error(struct image_builder *m, struct tile_error *t, const int
  * the mean of the rest. */
 static void find_base(struct tile_error *t, size_t pixel, size_t k, double floor)
 {
-	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
-	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
+	double d[PLAN_GROUPS_MAX], mean = 0, square = 0;
+	const float *deviations = tile_error_deviations(t, pixel) + k * t->groups;
 	uint32_t n = t->groups, drop = t->groups / 8;
 	for (uint32_t g = 0; g < n; g++)
-		d[g] = (double)apart[g];
+		d[g] = (double)deviations[g];
 	for (; drop > 0; drop--) {
-		uint32_t far = 0;
+		uint32_t farthest = 0;
 		for (uint32_t g = 1; g < n; g++)
-			far = fabs(d[g] - mean) > fabs(d[far] - mean) ? g : far;
-		mean = (mean * n - d[far]) / (n - 1);
-		d[far] = d[--n];
+			farthest = fabs(d[g] - mean) > fabs(d[farthest] - mean) ? g : farthest;
+		mean = (mean * n - d[farthest]) / (n - 1);
+		d[farthest] = d[--n];
 	}
 	for (uint32_t g = 0; g < n; g++)
 		square += (d[g] - mean) * (d[g] - mean);
 	t->base[pixel][k] = t->brightness[pixel][k] + mean;
-	t->base_square[pixel][k] = square / n / (n - 1);
-	double times = t->base[pixel][k] / floor;
-	int power = times >= 1 ? ilogb(times) : 0;
+	t->base_variance[pixel][k] = square / n / (n - 1);
+	double ratio = t->base[pixel][k] / floor;
+	int power = ratio >= 1 ? ilogb(ratio) : 0;
 	t->base_power[pixel][k] = (uint8_t)(power < BASE_POWERS ? power : BASE_POWERS - 1);
 }
 
@@ -88,43 +88,43 @@ void tile_error_find_bases(struct tile_error *t)
 
 static bool is_dark(const struct tile_error *t, size_t pixel)
 {
-	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
+	return t->variance[pixel][0] + t->variance[pixel][1] + t->variance[pixel][2] == 0;
 }
 
 void tile_error_load(struct image_builder *m, struct tile_error *t)
 {
 	bool chains = m->c->plan.kind == PLAN_CHAINS;
-	t->lit = false;
-	memset(t->mean_square, 0, sizeof t->mean_square);
-	static const int64_t nothing[SLOT];
-	const int64_t *slot[PLAN_MAX_GROUPS];
+	t->is_lit = false;
+	memset(t->mean_variance, 0, sizeof t->mean_variance);
+	static const int64_t zeros[SLOT_VALUES];
+	const int64_t *slot[PLAN_GROUPS_MAX];
 	size_t tile = (size_t)(t->y / TILE_SIZE) * m->c->tiles_across + t->x / TILE_SIZE;
 	for (uint32_t g = 0; g < t->groups; g++) {
-		size_t film = canvas_film(g, FILM_PREFIX);
-		slot[g] = *canvas_flags(m->c, film, tile) & TILE_USED ? canvas_slot(m->c, film, tile) : nothing;
+		size_t film = canvas_film_index(g, FILM_PREFIX);
+		slot[g] = *canvas_tile_flags(m->c, film, tile) & TILE_USED ? canvas_slot(m->c, film, tile) : zeros;
 	}
 	for (uint32_t y = 0; y < t->height; y++)
 		for (uint32_t x = 0; x < t->width; x++) {
 			size_t pixel = (size_t)y * t->width + x,
 			       out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
-			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
+			compute_pixel_error(m, t, slot, (size_t)y * SLOT_ROW_VALUES + (size_t)x * TILE_CHANNELS, pixel);
 			for (size_t k = 0; k < 3; k++) {
 				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
-				t->mean_square[k] += t->square[pixel][k] / t->width / t->height;
+				t->mean_variance[k] += t->variance[pixel][k] / t->width / t->height;
 			}
 			bool dark = is_dark(t, pixel);
-			m->img->unvisited += chains && dark;
-			t->lit |= chains && !dark;
+			m->img->unvisited_count += chains && dark;
+			t->is_lit |= chains && !dark;
 		}
 }
 
 /* Returns the mean variance of the 3 x 3 pixels around one, within the tile. */
-static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+static double variance_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
 	for (uint32_t j = y > 0 ? y - 1 : 0; j < t->height && j <= y + 1; j++)
 		for (uint32_t i = x > 0 ? x - 1 : 0; i < t->width && i <= x + 1; i++, n++)
-			sum += t->square[(size_t)j * t->width + i][k];
+			sum += t->variance[(size_t)j * t->width + i][k];
 	return sum / n;
 }
 
@@ -135,14 +135,15 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
  * Pixels that rare light has not reached look certain: their groups agree, on a value that is too small by this mean on
  * average. Pixels that it has reached have a larger error of their own anyway, and where light is frequent, brightness
  * and base differ in either direction and the mean is near zero. For each pixel, the mean is only over pixels whose
- * base is at most about ten times as bright (8 to 16 times: RARE_BRIGHTER powers of two), since rare light in a
+ * base is at most about ten times as bright (8 to 16 times: RARE_POWERS_MAX powers of two), since rare light in a
  * highlight says nothing about the dark wall beside it.
  */
-static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
+static void raise_rare_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
 {
-	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
+	uint32_t right = x + size < t->width ? x + size : t->width,
+		 bottom = y + size < t->height ? y + size : t->height;
 	double excess[BASE_POWERS] = {0}, count[BASE_POWERS] = {0};
-	for (uint32_t j = y; j < low; j++)
+	for (uint32_t j = y; j < bottom; j++)
 		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			unsigned b = t->base_power[pixel][k];
@@ -153,24 +154,25 @@ static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint3
 		excess[b] += excess[b - 1];
 		count[b] += count[b - 1];
 	}
-	for (uint32_t j = y; j < low; j++)
+	for (uint32_t j = y; j < bottom; j++)
 		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
-			unsigned upto = t->base_power[pixel][k] + RARE_BRIGHTER;
-			upto = upto < BASE_POWERS ? upto : BASE_POWERS - 1;
-			double missing = excess[upto] / count[upto];
+			unsigned max_power = t->base_power[pixel][k] + RARE_POWERS_MAX;
+			max_power = max_power < BASE_POWERS ? max_power : BASE_POWERS - 1;
+			double missing = excess[max_power] / count[max_power];
 			rare[pixel] = fmax(rare[pixel], missing * missing);
 		}
 }
 
-/* Sets `rare` of each pixel to the largest value over the squares of 2, 4, ... RARE pixels a side that contain it. */
+/* Sets `rare` of each pixel to the largest value over the squares of 2, 4, ... RARE_SIDE_MAX pixels a side that contain
+ * it. */
 static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
 {
 	for (size_t k = 0; k < 3; k++)
-		for (uint32_t size = 2; size <= RARE; size *= 2)
+		for (uint32_t size = 2; size <= RARE_SIDE_MAX; size *= 2)
 			for (uint32_t y = 0; y < t->height; y += size)
 				for (uint32_t x = 0; x < t->width; x += size)
-					raise_square(t, k, x, y, size, rare[k]);
+					raise_rare_square(t, k, x, y, size, rare[k]);
 }
 
 /*
@@ -189,14 +191,14 @@ void tile_error_write(struct image_builder *m, const struct tile_error *t, bool 
 		for (uint32_t x = 0; x < t->width; x++)
 			for (size_t k = 0; k < 3; k++) {
 				size_t pixel = (size_t)y * t->width + x;
-				double own = t->square[pixel][k], around = own;
-				if (!t->settled[pixel][k] || own == 0)
-					around = (own + square_around(t, x, y, k)) / 2;
-				if (around == 0 && t->lit)
-					around = t->mean_square[k];
-				around = fmax(around, rare[k][pixel]);
+				double own = t->variance[pixel][k], variance = own;
+				if (!t->is_settled[pixel][k] || own == 0)
+					variance = (own + variance_around(t, x, y, k)) / 2;
+				if (variance == 0 && t->is_lit)
+					variance = t->mean_variance[k];
+				variance = fmax(variance, rare[k][pixel]);
 				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
-					(float)sqrt(around);
+					(float)sqrt(variance);
 			}
 }
 

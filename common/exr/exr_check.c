@@ -4,20 +4,20 @@
 #include <stdio.h>
 #include <string.h>
 
-#define VALUES_MOST (INT64_C(1) << 30)
+#define VALUES_MAX (INT64_C(1) << 30)
 
 static int check_channels(const exr_attr_chlist_t *list, struct exr_image *img, struct error *e)
 {
-	if (list->num_channels < 1 || list->num_channels > EXR_CHANNELS_MOST)
+	if (list->num_channels < 1 || list->num_channels > EXR_CHANNELS_MAX)
 		return error_set(e, EBADMSG, "%d channels; 1 to %d are supported", list->num_channels,
-				 EXR_CHANNELS_MOST);
+				 EXR_CHANNELS_MAX);
 	for (int c = 0; c < list->num_channels; c++) {
 		const exr_attr_chlist_entry_t *entry = list->entries + c;
 		if (entry->x_sampling != 1 || entry->y_sampling != 1)
 			return error_set(e, EBADMSG, "channel %s is subsampled", entry->name.str);
-		if (entry->name.length >= (int)sizeof img->names[0])
+		if (entry->name.length >= (int)sizeof img->channel_names[0])
 			return error_set(e, EBADMSG, "a channel's name has %d characters", entry->name.length);
-		snprintf(img->names[c], sizeof img->names[c], "%s", entry->name.str);
+		snprintf(img->channel_names[c], sizeof img->channel_names[c], "%s", entry->name.str);
 	}
 	img->channel_count = (uint32_t)list->num_channels;
 	return 0;
@@ -48,8 +48,8 @@ static void read_primaries(exr_context_t x, struct exr_image *img)
 	       sizeof img->primaries);
 }
 
-int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limits *most, struct exr_image *img,
-	      bool *tiled, struct error *e)
+int exr_check_header(exr_context_t x, const struct exr_stream *s, const struct exr_limits *limits,
+		     struct exr_image *img, bool *tiled, struct error *e)
 {
 	int parts;
 	exr_storage_t storage;
@@ -66,15 +66,15 @@ int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limi
 	    exr_get_channels(x, 0, &channels))
 		return error_set(e, EBADMSG, "the EXR file's header is not complete");
 	int64_t width = (int64_t)data.max.x - data.min.x + 1, height = (int64_t)data.max.y - data.min.y + 1;
-	if (width < 1 || height < 1 || width > EXR_MAX_SIDE || height > EXR_MAX_SIDE ||
-	    width * height > EXR_PIXELS_MOST || width * height * channels->num_channels > VALUES_MOST)
+	if (width < 1 || height < 1 || width > EXR_SIDE_MAX || height > EXR_SIDE_MAX ||
+	    width * height > EXR_PIXELS_MAX || width * height * channels->num_channels > VALUES_MAX)
 		return error_set(e, EBADMSG, "the EXR file has %lldx%lld pixels", (long long)width, (long long)height);
-	if (width * height * channels->num_channels * (int64_t)sizeof(float) > most->bytes)
+	if (width * height * channels->num_channels * (int64_t)sizeof(float) > limits->max_bytes)
 		return error_set(e, EFBIG, "%lld x %lld pixels of %d channels take %lld MB decoded; at most %lld MB",
 				 (long long)width, (long long)height, channels->num_channels,
 				 (long long)(width * height * channels->num_channels * (int64_t)sizeof(float)) >> 20,
-				 (long long)most->bytes >> 20);
-	if (width * height * pixel_bytes(channels) / most->inflation > (int64_t)s->size)
+				 (long long)limits->max_bytes >> 20);
+	if (width * height * pixel_bytes(channels) / limits->max_inflation > (int64_t)s->size)
 		return error_set(e, EBADMSG, "the EXR file is too short for %lldx%lld pixels", (long long)width,
 				 (long long)height);
 	img->width = (uint32_t)width;

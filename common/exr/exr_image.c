@@ -13,7 +13,7 @@
 
 void exr_image_fini(struct exr_image *img)
 {
-	for (uint32_t c = 0; c < EXR_CHANNELS_MOST; c++)
+	for (uint32_t c = 0; c < EXR_CHANNELS_MAX; c++)
 		mem_free(img->planes[c]);
 	for (size_t i = 0; img->attributes && i < img->attribute_count; i++) {
 		char *name, *string; /* const in struct exr_attribute, but owned by an image that was read */
@@ -26,7 +26,7 @@ void exr_image_fini(struct exr_image *img)
 	*img = (struct exr_image){0};
 }
 
-const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name)
+const struct exr_attribute *exr_find_attribute(const struct exr_image *img, const char *name)
 {
 	for (size_t i = 0; i < img->attribute_count; i++)
 		if (strcmp(img->attributes[i].name, name) == 0)
@@ -49,18 +49,18 @@ static exr_result_t write_attributes(exr_context_t x, const struct exr_image *im
 	return rc;
 }
 
-uint32_t exr_channel(const struct exr_image *img, const char *name)
+uint32_t exr_channel_index(const struct exr_image *img, const char *name)
 {
 	for (uint32_t c = 0; c < img->channel_count; c++)
-		if (strcmp(img->names[c], name) == 0)
+		if (strcmp(img->channel_names[c], name) == 0)
 			return c;
-	return EXR_CHANNELS_MOST;
+	return EXR_CHANNELS_MAX;
 }
 
-const float *exr_plane(const struct exr_image *img, const char *name)
+const float *exr_find_plane(const struct exr_image *img, const char *name)
 {
-	uint32_t c = exr_channel(img, name);
-	return c < EXR_CHANNELS_MOST ? img->planes[c] : NULL;
+	uint32_t c = exr_channel_index(img, name);
+	return c < EXR_CHANNELS_MAX ? img->planes[c] : NULL;
 }
 
 /* Writes standard attributes: the program that wrote the file and, if there are colours, the primaries of ITU-R BT.709
@@ -69,15 +69,15 @@ static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
 {
 	static const exr_attr_chromaticities_t bt709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
 	exr_result_t rc = exr_attr_set_string(x, 0, "software", "HSLT Farm " HSLT_VERSION);
-	return rc == EXR_ERR_SUCCESS && exr_plane(img, "R")
+	return rc == EXR_ERR_SUCCESS && exr_find_plane(img, "R")
 		       ? exr_attr_set_chromaticities(x, 0, "chromaticities", &bt709)
 		       : rc;
 }
 
 static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 {
-	exr_attr_box2i_t data = exr_box(img->x, img->y, img->width, img->height);
-	exr_attr_box2i_t display = exr_box(0, 0, img->full_width, img->full_height);
+	exr_attr_box2i_t data = exr_make_box(img->x, img->y, img->width, img->height);
+	exr_attr_box2i_t display = exr_make_box(0, 0, img->full_width, img->full_height);
 	const exr_attr_v2f_t center = {{{0, 0}}};
 	int part;
 	exr_result_t rc = exr_add_part(x, NULL, EXR_STORAGE_SCANLINE, &part);
@@ -85,7 +85,8 @@ static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 		rc = exr_initialize_required_attr(x, part, &display, &data, 1, &center, 1, EXR_LINEORDER_INCREASING_Y,
 						  EXR_COMPRESSION_ZIP);
 	for (uint32_t c = 0; c < img->channel_count && rc == EXR_ERR_SUCCESS; c++)
-		rc = exr_add_channel(x, part, img->names[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
+		rc = exr_add_channel(x, part, img->channel_names[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1,
+				     1);
 	if (rc == EXR_ERR_SUCCESS)
 		rc = write_origin(x, img);
 	if (rc == EXR_ERR_SUCCESS)
@@ -94,7 +95,7 @@ static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 }
 
 struct compressor {
-	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's function for the file's compression */
+	exr_result_t (*compress)(exr_encode_pipeline_t *encode); /* the library's function for the file's compression */
 };
 
 /*
@@ -105,7 +106,7 @@ struct compressor {
 static exr_result_t compress_or_store(exr_encode_pipeline_t *encode)
 {
 	const struct compressor *c = encode->encoding_user_data;
-	exr_result_t rc = c->run(encode);
+	exr_result_t rc = c->compress(encode);
 	if (rc == EXR_ERR_SUCCESS && encode->compressed_bytes == encode->packed_bytes)
 		memcpy(encode->compressed_buffer, encode->packed_buffer, encode->packed_bytes);
 	return rc;
@@ -123,14 +124,14 @@ static exr_result_t write_chunk(exr_context_t x, const struct exr_image *img, ui
 		return rc;
 	for (int c = 0; c < encode.channel_count; c++) {
 		exr_coding_channel_info_t *to = &encode.channels[c];
-		const float *plane = exr_plane(img, to->channel_name) + (size_t)first_row * img->width;
+		const float *plane = exr_find_plane(img, to->channel_name) + (size_t)first_row * img->width;
 		to->encode_from_ptr = (const uint8_t *)plane;
 		to->user_pixel_stride = sizeof(float);
 		to->user_line_stride = (int32_t)(img->width * sizeof(float));
 	}
 	rc = exr_encoding_choose_default_routines(x, 0, &encode);
 	struct compressor library = {encode.compress_fn};
-	if (library.run) {
+	if (library.compress) {
 		encode.encoding_user_data = &library;
 		encode.compress_fn = compress_or_store;
 	}
@@ -144,8 +145,8 @@ int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, 
 {
 	exr_context_t x;
 	struct exr_stream s;
-	if (img->width < 1 || img->height < 1 || img->channel_count < 1 || img->channel_count > EXR_CHANNELS_MOST ||
-	    (int64_t)img->width * img->height > EXR_PIXELS_MOST)
+	if (img->width < 1 || img->height < 1 || img->channel_count < 1 || img->channel_count > EXR_CHANNELS_MAX ||
+	    (int64_t)img->width * img->height > EXR_PIXELS_MAX)
 		return error_set(e, EINVAL, "an image of %ux%u with %u channels cannot be written", img->width,
 				 img->height, img->channel_count);
 	int rc = exr_open_write(&x, &s, 1 << 16, e);

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Reads EXR files from memory with OpenEXRCore: checks the header against the file's size before anything is allocated
- * (exr_check), then decodes the chunks directly into the planes of the channels, then reads the attributes hslt:*.
+ * (exr_check_header), then decodes the chunks directly into the planes of the channels, then reads the attributes
+ * hslt:*.
  *
- * Failures: anything that OpenEXR refuses, and whatever exr_check refuses, such as deep data or a header with more
- * pixels than the file can hold, are -EBADMSG; planes beyond the caller's limit are -EFBIG, DWA compression is
+ * Failures: anything that OpenEXR refuses, and whatever exr_check_header refuses, such as deep data or a header with
+ * more pixels than the file can hold, are -EBADMSG; planes beyond the caller's limit are -EFBIG, DWA compression is
  * -ENOTSUP. All come with a sentence, and the image is left empty.
  */
 #include "common/exr/exr_read.h"
@@ -14,10 +15,10 @@
 
 #include <string.h>
 
-enum { ATTRIBUTES_MOST = 256 };
+enum { ATTRIBUTES_MAX = 256 };
 /* Most bytes of pixels that one byte of the file can represent: deflate's 1032, times 4/3 because PXR24 drops every
  * fourth byte. */
-#define INFLATION_MOST INT64_C(1376)
+#define INFLATION_MAX INT64_C(1376)
 #define ATTRIBUTE_PREFIX "hslt:"
 
 static int32_t int_min(int32_t a, int32_t b)
@@ -95,7 +96,7 @@ static int read_planes(exr_context_t x, const struct exr_stream *s, struct exr_i
 	}
 	exr_result_t rc = tiled ? read_tiled(x, img) : read_scanlines(x, img);
 	if (rc != EXR_ERR_SUCCESS)
-		return exr_failed(s, rc, e);
+		return exr_set_error(s, rc, e);
 	const exr_attr_chlist_t *list;
 	exr_get_channels(x, 0, &list);
 	for (uint32_t c = 0; c < img->channel_count; c++)
@@ -128,7 +129,7 @@ static int read_attribute(const exr_attribute_t *a, struct exr_attribute *to, st
 static int read_attributes(exr_context_t x, struct exr_image *img, struct error *e)
 {
 	int32_t count;
-	if (exr_get_attribute_count(x, 0, &count) != EXR_ERR_SUCCESS || count > ATTRIBUTES_MOST)
+	if (exr_get_attribute_count(x, 0, &count) != EXR_ERR_SUCCESS || count > ATTRIBUTES_MAX)
 		return error_set(e, EBADMSG, "the EXR file's header has too many attributes");
 	img->attributes = mem_alloc((size_t)count, sizeof *img->attributes);
 	if (!img->attributes)
@@ -138,14 +139,15 @@ static int read_attributes(exr_context_t x, struct exr_image *img, struct error 
 		const exr_attribute_t *a;
 		if (exr_get_attribute_by_index(x, 0, EXR_ATTR_LIST_SORTED_ORDER, i, &a) != EXR_ERR_SUCCESS)
 			return error_set(e, EBADMSG, "the EXR file's header is invalid");
-		bool known = a->type == EXR_ATTR_DOUBLE || a->type == EXR_ATTR_INT || a->type == EXR_ATTR_STRING;
-		if (known && strncmp(a->name, ATTRIBUTE_PREFIX, strlen(ATTRIBUTE_PREFIX)) == 0)
+		bool is_known_type =
+			a->type == EXR_ATTR_DOUBLE || a->type == EXR_ATTR_INT || a->type == EXR_ATTR_STRING;
+		if (is_known_type && strncmp(a->name, ATTRIBUTE_PREFIX, strlen(ATTRIBUTE_PREFIX)) == 0)
 			rc = read_attribute(a, &img->attributes[img->attribute_count++], e);
 	}
 	return rc;
 }
 
-int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e)
+int exr_read_limited(const unsigned char *bytes, size_t size, int64_t max_bytes, struct exr_image *img, struct error *e)
 {
 	exr_context_t x;
 	struct exr_stream s;
@@ -159,7 +161,7 @@ int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most,
 		rc = error_set(e, ENOTSUP,
 			       "the EXR file is compressed by DWA; supported: none, RLE, ZIP, PIZ, PXR24, B44");
 	else
-		rc = exr_check(x, &s, &(struct exr_limits){bytes_most, INFLATION_MOST}, img, &tiled, e);
+		rc = exr_check_header(x, &s, &(struct exr_limits){max_bytes, INFLATION_MAX}, img, &tiled, e);
 	if (rc == 0)
 		rc = read_planes(x, &s, img, tiled, e);
 	if (rc == 0)
@@ -172,5 +174,5 @@ int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most,
 
 int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e)
 {
-	return exr_read_within(bytes, size, INT64_MAX, img, e);
+	return exr_read_limited(bytes, size, INT64_MAX, img, e);
 }

@@ -10,7 +10,7 @@
  * for any other file that cannot be read, -ENOMEM. The image is empty after an error. */
 int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e);
 /* Like exr_read, but returns -EFBIG, before anything is decoded, if the planes would take more than bytes_most. */
-int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
-		    struct error *e);
+int exr_read_limited(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
+		     struct error *e);
 
 #endif

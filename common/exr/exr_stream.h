@@ -10,12 +10,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { EXR_MAX_SIDE = 1 << 20 };
+enum { EXR_SIDE_MAX = 1 << 20 };
 
 struct exr_stream {
 	const unsigned char *source; /* when reading: the file, not copied */
 	unsigned char *bytes;	     /* when writing: the file so far; the caller's after exr_close_write */
-	size_t size, room;	     /* bytes of the file; bytes allocated for it */
+	size_t size, capacity;	     /* bytes of the file; bytes allocated for it */
 	char message[256];	     /* the library's last error message */
 };
 
@@ -26,8 +26,8 @@ int exr_open_write(exr_context_t *x, struct exr_stream *s, size_t room, struct e
 int exr_close_write(exr_context_t *x, struct exr_stream *s, exr_result_t rc, unsigned char **bytes, size_t *size,
 		    struct error *e);
 /* Sets the error to the library's message. Returns -ENOMEM if memory is out, otherwise -EBADMSG. */
-int exr_failed(const struct exr_stream *s, exr_result_t rc, struct error *e);
+int exr_set_error(const struct exr_stream *s, exr_result_t rc, struct error *e);
 /* Returns the box of this corner and size. */
-exr_attr_box2i_t exr_box(uint32_t x, uint32_t y, uint32_t width, uint32_t height);
+exr_attr_box2i_t exr_make_box(uint32_t x, uint32_t y, uint32_t width, uint32_t height);
 
 #endif

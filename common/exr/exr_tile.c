@@ -9,17 +9,17 @@
 
 static const char *const channel_names[TILE_CHANNELS] = {"X", "Y", "Z"}; /* in the file's order */
 
-enum { HEADER_ROOM = 1024 };
+enum { HEADER_SIZE_MAX = 1024 };
 
 size_t exr_tile_size_max(uint32_t width, uint32_t height)
 {
-	return (size_t)width * height * TILE_CHANNELS * sizeof(float) + HEADER_ROOM;
+	return (size_t)width * height * TILE_CHANNELS * sizeof(float) + HEADER_SIZE_MAX;
 }
 
 static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t full_width, uint32_t full_height)
 {
-	exr_attr_box2i_t data = exr_box(t->x, t->y, t->width, t->height),
-			 display = exr_box(0, 0, full_width, full_height);
+	exr_attr_box2i_t data = exr_make_box(t->x, t->y, t->width, t->height),
+			 display = exr_make_box(0, 0, full_width, full_height);
 	const exr_attr_v2f_t center = {{{0, 0}}};
 	int part;
 	exr_result_t rc = exr_add_part(x, "tile", EXR_STORAGE_TILED, &part);
@@ -34,7 +34,7 @@ static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t
 }
 
 /* Converts from [row][pixel][channel] to the file's [row][channel][pixel], little endian. */
-static void pack(const struct tile *t, float *to)
+static void pack_rows(const struct tile *t, float *to)
 {
 	size_t width = t->width;
 	for (size_t y = 0; y < t->height; y++, to += width * TILE_CHANNELS) {
@@ -47,7 +47,7 @@ static void pack(const struct tile *t, float *to)
 }
 
 /* The inverse of pack. */
-static void unpack(const unsigned char *from, const struct tile *t)
+static void unpack_rows(const unsigned char *from, const struct tile *t)
 {
 	float line[TILE_CHANNELS][TILE_SIZE];
 	size_t row_bytes = t->width * sizeof(float);
@@ -74,7 +74,7 @@ int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_heig
 	int rc = exr_open_write(&x, &s, exr_tile_size_max(t->width, t->height), e);
 	if (rc)
 		return rc;
-	pack(t, packed);
+	pack_rows(t, packed);
 	exr_result_t written = write_header(x, t, full_width, full_height);
 	if (written == EXR_ERR_SUCCESS)
 		written = exr_write_tile_chunk(x, 0, 0, 0, 0, 0, packed,
@@ -146,7 +146,7 @@ int exr_tile_read(const unsigned char *bytes, size_t size, uint32_t full_width, 
 		else if (!(found.xyz = mem_alloc(expected, 1)))
 			rc = error_set(e, ENOMEM, "no memory for a tile");
 		else
-			unpack(bytes + chunk.data_offset, &found);
+			unpack_rows(bytes + chunk.data_offset, &found);
 	}
 	exr_finish(&x);
 	if (rc == 0)

@@ -23,7 +23,7 @@ enum header_name {
 };
 #undef ROW
 
-enum { HEADER_STRATEGIES = 5120 };
+enum { HEADER_STRATEGIES_MAX = 5120 };
 
 #define STRING EXR_ATTRIBUTE_STRING
 #define DOUBLE EXR_ATTRIBUTE_DOUBLE
@@ -36,7 +36,7 @@ const struct header_row header_rows[] = {
 	{NULL, 0, false, NULL},
 };
 
-bool header_excluded(const char *name)
+bool header_is_excluded(const char *name)
 {
 	for (const struct header_row *r = header_rows; r->name; r++)
 		if (strcmp(r->name, name) == 0)
@@ -46,7 +46,7 @@ bool header_excluded(const char *name)
 
 static struct exr_attribute *add_attribute(struct header *h, enum header_name name, int type)
 {
-	assert(h->count < HEADER_ATTRIBUTES && header_rows[name].type == type);
+	assert(h->count < HEADER_ATTRIBUTES_MAX && header_rows[name].type == type);
 	(void)type;
 	struct exr_attribute *a = &h->attributes[h->count++];
 	*a = (struct exr_attribute){.name = header_rows[name].name};
@@ -71,37 +71,37 @@ static void begin_string(struct header *h, enum header_name name)
 {
 	struct exr_attribute *a = add_attribute(h, name, STRING);
 	a->type = EXR_ATTRIBUTE_STRING;
-	a->string = h->rest.at;
-	*h->rest.at = 0;
+	a->string = h->unused.end;
+	*h->unused.end = 0;
 }
 
 static void end_string(struct header *h)
 {
-	if (h->rest.left > 1) {
-		h->rest.at++;
-		h->rest.left--;
+	if (h->unused.remaining > 1) {
+		h->unused.end++;
+		h->unused.remaining--;
 	}
 }
 
 static void add_string(struct header *h, enum header_name name, const char *value)
 {
 	begin_string(h, name);
-	text_put(&h->rest, "%s", value);
+	text_appendf(&h->unused, "%s", value);
 	end_string(h);
 }
 
 static void add_count(struct header *h, enum header_name name, uint64_t value)
 {
 	begin_string(h, name);
-	text_put(&h->rest, "%" PRIu64, value);
+	text_appendf(&h->unused, "%" PRIu64, value);
 	end_string(h);
 }
 
 static void add_plan(struct header *h, const struct plan *p, uint64_t rounds, const struct plan_scene *inputs)
 {
 	static const struct plan_scene none = {.define_count = 0};
-	char options[PLAN_OPTIONS_TEXT];
-	plan_options_with(p, rounds, inputs ? inputs : &none, options, sizeof options);
+	char options[PLAN_OPTIONS_TEXT_MAX];
+	plan_print_options_with_scene(p, rounds, inputs ? inputs : &none, options, sizeof options);
 	add_string(h, H_INTEGRATOR, p->integrator);
 	if (*p->mutations)
 		add_string(h, H_MIXTURE, p->mutations);
@@ -120,23 +120,23 @@ static void add_convergence(struct header *h, const struct canvas_image *img, co
 {
 	if (p->kind != PLAN_CHAINS)
 		return;
-	char table[CONVERGENCE_TABLE];
+	char table[CONVERGENCE_TABLE_MAX];
 	add_string(h, H_AGREEMENT, convergence_name(a->verdict));
 	if (*a->text)
 		add_string(h, H_DISAGREEMENT, a->text);
-	if (!isnan(a->r_hat_worst)) {
+	if (!isnan(a->max_r_hat)) {
 		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
-		add_double(h, H_R_HAT_WORST, a->r_hat_worst);
+		add_double(h, H_R_HAT_WORST, a->max_r_hat);
 	}
-	convergence_table(img->classes, img->b, a, table, sizeof table);
+	convergence_print_table(img->classes, img->b, a, table, sizeof table);
 	if (*table)
 		add_string(h, H_CLASSES, table);
 }
 
 static void add_error(struct header *h, const struct canvas_image *img)
 {
-	char why[STATED_ERROR_TEXT];
-	stated_error_doubt(img, why, sizeof why);
+	char why[STATED_ERROR_TEXT_MAX];
+	stated_error_print_doubt(img, why, sizeof why);
 	if (*why) {
 		add_string(h, H_REL_MSE_DOUBT, why);
 	} else if (isfinite(img->rel_mse)) {
@@ -145,14 +145,14 @@ static void add_error(struct header *h, const struct canvas_image *img)
 		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
 	}
 	add_string(h, H_REL_MSE_DEFINITION, REL_MSE_DEFINITION);
-	if (img->unvisited)
-		add_count(h, H_UNVISITED, img->unvisited);
+	if (img->unvisited_count)
+		add_count(h, H_UNVISITED, img->unvisited_count);
 }
 
 static void add_b_error(struct header *h, const struct canvas_image *img)
 {
-	char why[STATED_ERROR_TEXT];
-	stated_b_doubt(img, why, sizeof why);
+	char why[STATED_ERROR_TEXT_MAX];
+	stated_error_print_b_doubt(img, why, sizeof why);
 	if (*why)
 		add_string(h, H_B_ERROR_DOUBT, why);
 	else if (isfinite(img->b_error))
@@ -182,15 +182,15 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	add_count(h, H_NEGATIVE, img->counts.counters[COUNT_NEGATIVE]);
 	add_count(h, H_RAYS_CLOSEST, img->counts.counters[COUNT_RAYS_CLOSEST]);
 	add_count(h, H_RAYS_SHADOW, img->counts.counters[COUNT_RAYS_SHADOW]);
-	char text[HEADER_STRATEGIES];
-	strategy_lines(p->mutations, &img->counts, text, sizeof text);
+	char text[HEADER_STRATEGIES_MAX];
+	strategy_print_lines(p->mutations, &img->counts, text, sizeof text);
 	if (*text)
 		add_string(h, H_STRATEGIES, text);
 	struct convergence a;
 	convergence_judge(p, img, &a);
-	strategy_note(p, &img->counts, img->black, text, sizeof text);
-	strategy_add_beyond(img->beyond_share, text, sizeof text);
-	convergence_add_note(&a, text, sizeof text);
+	strategy_print_note(p, &img->counts, img->is_black, text, sizeof text);
+	strategy_append_beyond(img->beyond_share, text, sizeof text);
+	convergence_append_note(&a, text, sizeof text);
 	if (*text)
 		add_string(h, H_NOTE, text);
 	add_convergence(h, img, p, &a);
@@ -205,30 +205,31 @@ static void add_extra(struct header *h, const struct header_extra *x)
 		add_string(h, H_CAMERA, x->camera);
 	if (x->scene_notes && *x->scene_notes)
 		add_string(h, H_SCENE_NOTES, x->scene_notes);
-	add_int(h, H_MIXED, x->mixed);
+	add_int(h, H_MIXED, x->mixed_fingerprints);
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)
-		text_put(&h->rest, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name,
-			 x->effects[i].on ? "on" : "off", x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
-			 x->effects[i].on ? "omitting it would save" : "saves", x->effects[i].saves);
+		text_appendf(&h->unused, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name,
+			     x->effects[i].is_on ? "on" : "off", x->effects[i].is_forced ? " (forced)" : "",
+			     x->effects[i].reason, x->effects[i].is_on ? "omitting it would save" : "saves",
+			     x->effects[i].savings);
 	end_string(h);
 	add_double(h, H_WALL, x->wall_seconds);
 	add_double(h, H_CPU, x->cpu_seconds);
-	add_int(h, H_WORKERS, x->workers);
+	add_int(h, H_WORKERS, x->worker_count);
 	char date[32] = "";
 	time_t now = time(NULL);
 	struct tm utc;
 	if (!x->date && gmtime_r(&now, &utc))
 		strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
 	add_string(h, H_DATE, x->date ? x->date : date);
-	if (x->end)
-		add_string(h, H_END, x->end);
+	if (x->end_name)
+		add_string(h, H_END, x->end_name);
 }
 
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)
 {
 	h->count = 0;
-	h->rest = (struct text){h->text, HEADER_TEXT};
+	h->unused = (struct text){h->text, HEADER_TEXT_MAX};
 	add_string(h, H_VERSION, HSLT_VERSION);
 	add_plan(h, p, img->rounds, x->inputs);
 	add_result(h, img, p);

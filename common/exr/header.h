@@ -22,13 +22,13 @@ struct header_row {
 extern const struct header_row header_rows[]; /* ends with a NULL name */
 
 /* Returns `excluded` of the attribute; false for unknown names. */
-bool header_excluded(const char *name);
+bool header_is_excluded(const char *name);
 
 /* One effect of the renderer and why it was switched on or off. */
 struct header_effect {
 	const char *name;
-	bool on, forced;
-	const char *why, *saves;
+	bool is_on, is_forced;
+	const char *reason, *savings;
 };
 
 struct header_extra {
@@ -36,22 +36,23 @@ struct header_extra {
 	const char *scene_hash;		 /* SHA-256 of the scene file in hexadecimal; NULL: not known */
 	const struct plan_scene *inputs; /* options -D and --path; NULL: none */
 	const char *camera;		 /* from render_camera_text; NULL or "": not known */
-	const char *scene_notes;	 /* one per line, in at most HEADER_SCENE_NOTES bytes; NULL or "": none */
+	const char *scene_notes;	 /* one per line, in at most HEADER_SCENE_NOTES_MAX bytes; NULL or "": none */
 	size_t effect_count;
 	const struct header_effect *effects;
-	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
+	bool mixed_fingerprints; /* workers of different numeric fingerprints took part: the bits are not reproducible
+				  */
 	double wall_seconds, cpu_seconds;
-	uint32_t workers;
-	const char *date; /* UTC; NULL: now */
-	const char *end;  /* from merge_end_name; NULL: the image is a preview */
+	uint32_t worker_count;
+	const char *date;     /* UTC; NULL: now */
+	const char *end_name; /* from merge_end_name; NULL: the image is a preview */
 };
 
-enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 49152, HEADER_SCENE_NOTES = 4096 };
+enum { HEADER_ATTRIBUTES_MAX = 64, HEADER_TEXT_MAX = 49152, HEADER_SCENE_NOTES_MAX = 4096 };
 struct header {
 	size_t count;
-	struct exr_attribute attributes[HEADER_ATTRIBUTES];
-	char text[HEADER_TEXT]; /* the strings of the attributes */
-	struct text rest;	/* the unused part of `text` */
+	struct exr_attribute attributes[HEADER_ATTRIBUTES_MAX];
+	char text[HEADER_TEXT_MAX]; /* the strings of the attributes */
+	struct text unused;	    /* the unused part of `text` */
 };
 /* Fills in all attributes. Never fails: text that does not fit is cut. Allocates nothing. h must not be moved
  * afterwards, since attributes point into it. */

@@ -20,8 +20,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_ROOM = 4096 };
-#define FILE_MOST (INT64_C(1) << 32)
+enum { PATH_SIZE = 4096 };
+#define FILE_SIZE_MAX (INT64_C(1) << 32)
 
 static int add_planes(struct exr_image *out, const float *rgb, const char *prefix)
 {
@@ -32,7 +32,8 @@ static int add_planes(struct exr_image *out, const float *rgb, const char *prefi
 			return -ENOMEM;
 		for (size_t i = 0; i < pixels; i++)
 			plane[i] = rgb[i * 3 + c];
-		snprintf(out->names[out->channel_count], sizeof out->names[0], "%s%c", prefix, "RGB"[c]);
+		snprintf(out->channel_names[out->channel_count], sizeof out->channel_names[0], "%s%c", prefix,
+			 "RGB"[c]);
 		out->planes[out->channel_count++] = plane;
 	}
 	return 0;
@@ -48,7 +49,7 @@ static int add_r_hat(struct exr_image *out, const struct canvas_image *img)
 			float r_hat = img->r_hat[y / TILE_SIZE * img->tiles_across + x / TILE_SIZE];
 			plane[y * out->width + x] = isnan(r_hat) ? 0 : r_hat;
 		}
-	snprintf(out->names[out->channel_count], sizeof out->names[0], "rhat.Y");
+	snprintf(out->channel_names[out->channel_count], sizeof out->channel_names[0], "rhat.Y");
 	out->planes[out->channel_count++] = plane;
 	return 0;
 }
@@ -82,16 +83,16 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 	return rc;
 }
 
-static int failed(struct error *e, const char *path, const char *what)
+static int set_file_error(struct error *e, const char *path, const char *action)
 {
 	int code = errno;
-	return error_set(e, code, "%s: cannot %s: %s", target_shown(path), what, strerror(code));
+	return error_set(e, code, "%s: cannot %s: %s", target_display_name(path), action, strerror(code));
 }
 
 /* Flushes the folder of `path`, so that a new name survives a crash. Failures are ignored: the image is written. */
 static void sync_folder(const char *path)
 {
-	char folder[PATH_ROOM];
+	char folder[PATH_SIZE];
 	const char *slash = strrchr(path, '/');
 	int n = slash ? snprintf(folder, sizeof folder, "%.*s/", (int)(slash - path), path)
 		      : snprintf(folder, sizeof folder, ".");
@@ -103,25 +104,25 @@ static void sync_folder(const char *path)
 }
 
 /* Creates a temporary file beside `path`. Returns its descriptor or -errno. */
-static int open_beside(const char *path, char temporary[PATH_ROOM], struct error *e)
+static int create_temporary(const char *path, char temporary[PATH_SIZE], struct error *e)
 {
-	int n = snprintf(temporary, PATH_ROOM, "%s.XXXXXX", path);
-	if (n < 0 || n >= PATH_ROOM)
+	int n = snprintf(temporary, PATH_SIZE, "%s.XXXXXX", path);
+	if (n < 0 || n >= PATH_SIZE)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
 	int fd = mkostemp(temporary, O_CLOEXEC);
-	return fd < 0 ? failed(e, path, "write there") : fd;
+	return fd < 0 ? set_file_error(e, path, "write there") : fd;
 }
 
 int image_file_probe(const char *path, struct error *e)
 {
-	char temporary[PATH_ROOM];
+	char temporary[PATH_SIZE];
 	struct target t;
-	int rc = target_find(&t, path, e);
+	int rc = target_resolve(&t, path, e);
 	if (rc)
 		return rc;
-	if (t.through)
-		return t.descriptor < 0 && access(t.path, W_OK) ? failed(e, path, "write there") : 0;
-	int fd = open_beside(t.path, temporary, e);
+	if (t.write_directly)
+		return t.descriptor < 0 && access(t.path, W_OK) ? set_file_error(e, path, "write there") : 0;
+	int fd = create_temporary(t.path, temporary, e);
 	if (fd < 0)
 		return fd;
 	close(fd);
@@ -129,33 +130,33 @@ int image_file_probe(const char *path, struct error *e)
 	return 0;
 }
 
-static int write_through(const struct target *t, const char *path, const unsigned char *bytes, size_t size,
-			 struct error *e)
+static int write_directly(const struct target *t, const char *path, const unsigned char *bytes, size_t size,
+			  struct error *e)
 {
 	int fd = target_open(t, e);
 	if (fd < 0)
 		return fd;
-	int rc = io_write_all(fd, bytes, size) ? failed(e, path, "write") : 0;
+	int rc = io_write_all(fd, bytes, size) ? set_file_error(e, path, "write") : 0;
 	if (close(fd) && !rc)
-		rc = failed(e, path, "write");
+		rc = set_file_error(e, path, "write");
 	return rc;
 }
 
-static int replace(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+static int replace_file(const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
-	char temporary[PATH_ROOM];
-	int fd = open_beside(path, temporary, e);
+	char temporary[PATH_SIZE];
+	int fd = create_temporary(path, temporary, e);
 	if (fd < 0)
 		return fd;
 	mode_t mask = umask(0);
 	umask(mask);
 	int rc = io_write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0
-			 ? failed(e, path, "write")
+			 ? set_file_error(e, path, "write")
 			 : 0;
 	if (close(fd) != 0 && rc == 0)
-		rc = failed(e, path, "write");
+		rc = set_file_error(e, path, "write");
 	if (rc == 0 && rename(temporary, path) != 0)
-		rc = failed(e, path, "put the file in place");
+		rc = set_file_error(e, path, "put the file in place");
 	if (rc)
 		unlink(temporary);
 	else
@@ -166,32 +167,33 @@ static int replace(const char *path, const unsigned char *bytes, size_t size, st
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
 	struct target t;
-	int rc = target_find(&t, path, e);
+	int rc = target_resolve(&t, path, e);
 	if (rc)
 		return rc;
-	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
+	return t.write_directly ? write_directly(&t, path, bytes, size, e) : replace_file(t.path, bytes, size, e);
 }
 
 /* Reads a pipe to its end. *bytes is to be freed also after a failure. */
 static int read_stream(int fd, const char *path, unsigned char **bytes, size_t *size, struct error *e)
 {
-	size_t room = 0;
+	size_t capacity = 0;
 	*bytes = NULL;
 	*size = 0;
 	for (;;) {
-		if (*size == room) {
-			size_t more = room ? 2 * room : 1 << 16;
-			unsigned char *all = more <= (size_t)FILE_MOST ? mem_grow(*bytes, room, more) : NULL;
-			if (!all)
+		if (*size == capacity) {
+			size_t new_capacity = capacity ? 2 * capacity : 1 << 16;
+			unsigned char *grown =
+				new_capacity <= (size_t)FILE_SIZE_MAX ? mem_grow(*bytes, capacity, new_capacity) : NULL;
+			if (!grown)
 				return error_set(e, ENOMEM, "%s: no memory for it, or more than 4 GiB", path);
-			*bytes = all;
-			room = more;
+			*bytes = grown;
+			capacity = new_capacity;
 		}
-		ssize_t n = io_read_all(fd, *bytes + *size, room - *size);
+		ssize_t n = io_read_all(fd, *bytes + *size, capacity - *size);
 		if (n < 0)
-			return failed(e, path, "read");
+			return set_file_error(e, path, "read");
 		*size += (size_t)n;
-		if (*size < room)
+		if (*size < capacity)
 			return 0;
 	}
 }
@@ -204,7 +206,7 @@ static int read_regular(int fd, const struct stat *st, const char *path, unsigne
 		return error_set(e, ENOMEM, "%s: no memory for it", path);
 	ssize_t n = io_read_all(fd, *bytes, (size_t)st->st_size);
 	if (n < 0)
-		return failed(e, path, "read");
+		return set_file_error(e, path, "read");
 	*size = (size_t)n;
 	return 0;
 }
@@ -214,14 +216,14 @@ int image_file_read(const char *path, unsigned char **bytes, size_t *size, struc
 	struct stat st;
 	int fd = open(path, O_RDONLY | O_CLOEXEC);
 	if (fd < 0)
-		return failed(e, path, "open");
+		return set_file_error(e, path, "open");
 	int rc;
 	*bytes = NULL;
 	if (fstat(fd, &st) != 0)
-		rc = failed(e, path, "read");
+		rc = set_file_error(e, path, "read");
 	else if (S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode))
 		rc = read_stream(fd, path, bytes, size, e);
-	else if (!S_ISREG(st.st_mode) || st.st_size > FILE_MOST)
+	else if (!S_ISREG(st.st_mode) || st.st_size > FILE_SIZE_MAX)
 		rc = error_set(e, EINVAL, "%s: not a pipe, and not a regular file of at most 4 GiB", path);
 	else
 		rc = read_regular(fd, &st, path, bytes, size, e);

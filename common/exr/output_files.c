@@ -23,7 +23,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { BEGINNING = 1024 };
+enum { BEGINNING_SIZE = 1024 };
 
 static bool is_exr(const char *begin)
 {
@@ -51,51 +51,52 @@ static bool is_csv(const char *begin)
 	return strncmp(begin, "setting,", 8) == 0;
 }
 
-static bool is_statistics(const char *begin)
+static bool is_json(const char *begin)
 {
 	return *begin == '{' && strncmp(begin + 1 + strspn(begin + 1, " \t\r\n"), "\"schema\"", 8) == 0;
 }
 
 static const struct {
 	const char *noun, *extension;
-	bool (*is)(const char *begin); /* BEGINNING bytes, zeros after the end of the file, and a final zero */
+	bool (*has_format)(
+		const char *begin); /* BEGINNING_SIZE bytes, zeros after the end of the file, and a final zero */
 } formats[] = {
 	[OUTPUT_EXR] = {"an OpenEXR file", ".exr", is_exr},
 	[OUTPUT_PNG] = {"a PNG file", ".png", is_png},
 	[OUTPUT_SVG] = {"an SVG file", ".svg", is_svg},
 	[OUTPUT_HTML] = {"an HTML file", ".html", is_html},
 	[OUTPUT_CSV] = {"a table of hslt-accuracy", ".csv", is_csv},
-	[OUTPUT_JSON] = {"a file of statistics", ".json", is_statistics},
+	[OUTPUT_JSON] = {"a file of statistics", ".json", is_json},
 };
 
 /* Identifies a file: by device and inode if it exists, otherwise by its path without links. */
-struct place {
+struct file_identity {
 	bool exists, regular, stream; /* stream: bytes of two outputs would be mixed in it: a pipe, or a descriptor */
 	dev_t device;
 	ino_t inode;
-	char path[PATH_MAX + TARGET_PATH];
+	char path[PATH_MAX + TARGET_PATH_MAX];
 };
 
 /* Sets the path of a file that does not exist: its folder without links, then its name. If the folder does not exist
  * either, the path stays as it is; image_file_probe will report that. */
-static void find_new(struct place *p, const char *path)
+static void identify_new_file(struct file_identity *p, const char *path)
 {
-	char folder[TARGET_PATH], real[PATH_MAX];
+	char folder[TARGET_PATH_MAX], real[PATH_MAX];
 	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
 	snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
 	snprintf(p->path, sizeof p->path, "%s/%s", realpath(folder, real) ? real : folder, name);
 }
 
-static int find(struct place *p, const char *path, struct error *e)
+static int identify_file(struct file_identity *p, const char *path, struct error *e)
 {
 	struct stat st;
 	struct target t;
-	*p = (struct place){0};
-	int rc = target_find(&t, path, e);
+	*p = (struct file_identity){0};
+	int rc = target_resolve(&t, path, e);
 	if (rc)
 		return rc;
 	if (t.descriptor >= 0 ? fstat(t.descriptor, &st) : stat(t.path, &st)) {
-		find_new(p, t.path);
+		identify_new_file(p, t.path);
 		return 0;
 	}
 	p->exists = true;
@@ -106,7 +107,7 @@ static int find(struct place *p, const char *path, struct error *e)
 	return 0;
 }
 
-static bool is_same(const struct place *a, const struct place *b)
+static bool is_same_file(const struct file_identity *a, const struct file_identity *b)
 {
 	if (a->exists != b->exists)
 		return false;
@@ -116,8 +117,8 @@ static bool is_same(const struct place *a, const struct place *b)
 	return mixes && a->device == b->device && a->inode == b->inode;
 }
 
-/* Two outputs on one pipe would be mixed up, although pipes are not regular files and pass is_same. */
-static bool both_stdout(const char *a, const char *b)
+/* Two outputs on one pipe would be mixed up, although pipes are not regular files and pass is_same_file. */
+static bool are_both_stdout(const char *a, const char *b)
 {
 	return strcmp(a, TARGET_STDOUT) == 0 && strcmp(b, TARGET_STDOUT) == 0;
 }
@@ -127,8 +128,8 @@ static int refuse_input(const struct output_file *f, const char *input, struct e
 	return error_set(e, EINVAL, "%s %s would replace %s, which is an input", f->option, f->path, input);
 }
 
-static int check_inputs(const struct output_file *f, const struct place *p, const char *const *inputs, size_t count,
-			struct error *e)
+static int check_inputs(const struct output_file *f, const struct file_identity *p, const char *const *inputs,
+			size_t count, struct error *e)
 {
 	for (size_t i = 0; p->regular && i < count; i++) {
 		struct stat st;
@@ -156,18 +157,18 @@ static int check_name(const struct output_file *f, struct error *e)
 {
 	if (f->format == OUTPUT_SVG)
 		return check_plot(f->option, f->path, e);
-	const char *promised = picture_name_format(f->path), *own = formats[f->format].extension;
-	if (!promised || strcmp(promised, own) == 0)
+	const char *named_format = picture_name_format(f->path), *extension = formats[f->format].extension;
+	if (!named_format || strcmp(named_format, extension) == 0)
 		return 0;
 	return error_set(e, EINVAL, "%s %s: %s is written, so the name should end in %s%s", f->option, f->path,
-			 formats[f->format].noun, own,
+			 formats[f->format].noun, extension,
 			 f->format == OUTPUT_EXR ? "; hslt-tonemap converts it to PNG" : "");
 }
 
 int output_files_check_names(const struct output_files *o, struct error *e)
 {
 	int rc = 0;
-	for (size_t i = 0; !rc && i < OUTPUT_FILES_MOST; i++)
+	for (size_t i = 0; !rc && i < OUTPUT_FILES_MAX; i++)
 		rc = o->files[i].path ? check_name(&o->files[i], e) : 0;
 	return rc;
 }
@@ -175,35 +176,36 @@ int output_files_check_names(const struct output_files *o, struct error *e)
 /* Refuses an existing file of another format. A file that cannot be read passes: its format is not known. */
 static int check_format(const struct output_file *f, struct error *e)
 {
-	char begin[BEGINNING + 1] = "";
+	char begin[BEGINNING_SIZE + 1] = "";
 	struct target t;
-	int rc = target_find(&t, f->path, e);
-	if (rc || t.through)
+	int rc = target_resolve(&t, f->path, e);
+	if (rc || t.write_directly)
 		return rc;
 	int fd = open(t.path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 	if (fd < 0)
 		return 0;
-	ssize_t n = read(fd, begin, BEGINNING);
+	ssize_t n = read(fd, begin, BEGINNING_SIZE);
 	close(fd);
-	if (n <= 0 || formats[f->format].is(begin))
+	if (n <= 0 || formats[f->format].has_format(begin))
 		return 0;
 	return error_set(e, EEXIST, "%s exists and is not %s; it is not replaced", f->path, formats[f->format].noun);
 }
 
 int output_files_check(const struct output_files *o, const char *const *inputs, size_t input_count, struct error *e)
 {
-	struct place places[OUTPUT_FILES_MOST];
+	struct file_identity places[OUTPUT_FILES_MAX];
 	const struct output_file *f = o->files;
-	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
+	for (size_t i = 0; i < OUTPUT_FILES_MAX; i++) {
 		if (!f[i].path)
 			continue;
-		int rc = find(&places[i], f[i].path, e);
+		int rc = identify_file(&places[i], f[i].path, e);
 		if (!rc)
 			rc = check_inputs(&f[i], &places[i], inputs, input_count, e);
 		for (size_t j = 0; !rc && j < i; j++)
-			if (f[j].path && (is_same(&places[i], &places[j]) || both_stdout(f[i].path, f[j].path)))
+			if (f[j].path &&
+			    (is_same_file(&places[i], &places[j]) || are_both_stdout(f[i].path, f[j].path)))
 				rc = error_set(e, EINVAL, "%s and %s are the same file, %s", f[j].option, f[i].option,
-					       target_shown(f[i].path));
+					       target_display_name(f[i].path));
 		if (!rc)
 			rc = check_format(&f[i], e);
 		if (!rc)
@@ -219,7 +221,7 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 int output_files_check_read(const struct output_files *o, uint64_t device, uint64_t inode, const char *name,
 			    struct error *e)
 {
-	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
+	for (size_t i = 0; i < OUTPUT_FILES_MAX; i++) {
 		const struct output_file *f = &o->files[i];
 		struct stat st;
 		if (f->path && stat(f->path, &st) == 0 && S_ISREG(st.st_mode) && st.st_dev == device &&
@@ -229,7 +231,7 @@ int output_files_check_read(const struct output_files *o, uint64_t device, uint6
 	return 0;
 }
 
-enum output_format output_format_of_plot(const char *path)
+enum output_format output_plot_format(const char *path)
 {
 	const char *format = picture_name_format(path);
 	return format && strcmp(format, ".png") == 0 ? OUTPUT_PNG : OUTPUT_SVG;

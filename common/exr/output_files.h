@@ -21,9 +21,9 @@ struct output_file {
 	enum output_format format;
 };
 
-enum { OUTPUT_FILES_MOST = 4 };
+enum { OUTPUT_FILES_MAX = 4 };
 struct output_files {
-	struct output_file files[OUTPUT_FILES_MOST];
+	struct output_file files[OUTPUT_FILES_MAX];
 };
 
 /* Checks all outputs. inputs: paths of files that the command reads; NULL, "-" and files that do not exist are skipped.
@@ -42,6 +42,6 @@ int output_files_check_read(const struct output_files *o, uint64_t device, uint6
 
 /* Returns the format of a plot by its extension: PNG for .png, otherwise SVG; output_files_check refuses extensions
  * other than .svg and .png. */
-enum output_format output_format_of_plot(const char *path);
+enum output_format output_plot_format(const char *path);
 
 #endif

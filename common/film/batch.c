@@ -39,12 +39,12 @@ void batch_fini(struct batch *b)
 	*b = (struct batch){0};
 }
 
-uint32_t batch_film_tiles(const struct plan *p)
+uint32_t batch_film_tile_count(const struct plan *p)
 {
 	return ((p->crop_width + TILE_SIZE - 1) / TILE_SIZE) * ((p->crop_height + TILE_SIZE - 1) / TILE_SIZE);
 }
 
-uint32_t batch_sequences(const struct plan *p)
+uint32_t batch_sequence_count(const struct plan *p)
 {
 	if (p->kind != PLAN_CHAINS)
 		return 0;
@@ -53,8 +53,8 @@ uint32_t batch_sequences(const struct plan *p)
 
 uint64_t batch_moment_count(const struct plan *p, enum lease_kind kind)
 {
-	uint64_t sequences = kind == LEASE_RENDER ? batch_sequences(p) : 0;
-	return sequences ? (sequences + 1) * batch_film_tiles(p) : 0;
+	uint64_t sequences = kind == LEASE_RENDER ? batch_sequence_count(p) : 0;
+	return sequences ? (sequences + 1) * batch_film_tile_count(p) : 0;
 }
 
 static int check_key(const struct lease_key *k, const struct plan *p, struct error *e)
@@ -70,7 +70,7 @@ static int check_key(const struct lease_key *k, const struct plan *p, struct err
 	return 0;
 }
 
-static bool all_finite(const float *v, size_t n)
+static bool are_finite(const float *v, size_t n)
 {
 	/* An exponent of all ones means infinity or NaN. The loop has no branch, so that it can be vectorised. */
 	uint32_t bad = 0;
@@ -103,54 +103,55 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 		if (index <= last)
 			return error_set(e, EBADMSG, "the tile at %u,%u is repeated or out of order", t->x, t->y);
 		last = index;
-		if (!all_finite(t->xyz, (size_t)w * h * TILE_CHANNELS))
+		if (!are_finite(t->xyz, (size_t)w * h * TILE_CHANNELS))
 			return error_set(e, EBADMSG, "the tile at %u,%u holds a value that is not finite", t->x, t->y);
 	}
 	return 0;
 }
 
 enum {
-	STATE_HEAD = 64,    /* most bytes of a state besides its vertices */
-	STATE_VERTEX = 128, /* most bytes per vertex: random numbers of both sub-paths; a stored path needs only 40 */
-	STATE_COST = 48,    /* memory per state besides its bytes: struct chain_state and the allocator's overhead */
+	STATE_HEAD_MAX = 64, /* most bytes of a state besides its vertices */
+	STATE_VERTEX_MAX =
+		128,	     /* most bytes per vertex: random numbers of both sub-paths; a stored path needs only 40 */
+	STATE_OVERHEAD = 48, /* memory per state besides its bytes: struct chain_state and the allocator's overhead */
 };
 
-uint32_t chain_state_max(const struct plan *p)
+uint32_t chain_state_max_bytes(const struct plan *p)
 {
-	uint64_t vertices = (uint64_t)p->max_depth + 1, size = STATE_HEAD + STATE_VERTEX * vertices;
+	uint64_t vertices = (uint64_t)p->max_depth + 1, size = STATE_HEAD_MAX + STATE_VERTEX_MAX * vertices;
 	return size < CHAIN_STATE_MAX ? (uint32_t)size : CHAIN_STATE_MAX;
 }
 
-uint64_t chain_states_max(const struct plan *p)
+uint64_t chain_states_max_bytes(const struct plan *p)
 {
-	return (uint64_t)p->chains * (chain_state_max(p) + STATE_COST);
+	return (uint64_t)p->chains * (chain_state_max_bytes(p) + STATE_OVERHEAD);
 }
 
 uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count)
 {
 	uint64_t sum = 0;
 	for (uint32_t i = 0; s && i < count; i++)
-		sum += s[i].size + STATE_COST;
+		sum += s[i].size + STATE_OVERHEAD;
 	return sum;
 }
 
 /* *live: the number of chains that run, whose states are not empty. */
-static int check_states(const struct batch *b, const struct plan *p, uint64_t *live, struct error *e)
+static int check_states(const struct batch *b, const struct plan *p, uint64_t *live_count, struct error *e)
 {
 	struct plan_range chains = plan_chain_range(p, b->key.part);
-	bool has = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
-	uint64_t expected = has ? chains.end - chains.begin : 0;
-	*live = 0;
+	bool has_states = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
+	uint64_t expected = has_states ? chains.end - chains.begin : 0;
+	*live_count = 0;
 	if (b->state_count != expected)
 		return error_set(e, EBADMSG, "%u chain states where there should be %llu", b->state_count,
 				 (unsigned long long)expected);
 	for (uint32_t i = 0; i < b->state_count; i++) {
 		const struct chain_state *s = &b->states[i];
-		if (s->size > chain_state_max(p) || (s->size && !s->bytes))
+		if (s->size > chain_state_max_bytes(p) || (s->size && !s->bytes))
 			return error_set(e, EBADMSG,
 					 "a chain state of %u bytes; paths of up to %u edges have at most %u", s->size,
-					 p->max_depth, chain_state_max(p));
-		*live += s->size > 0;
+					 p->max_depth, chain_state_max_bytes(p));
+		*live_count += s->size > 0;
 	}
 	return 0;
 }
@@ -169,24 +170,25 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 }
 
 /* Relative tolerance between sums of the same terms in different orders, partly rounded to float. */
-#define ROUNDING (1 + 1e-6)
+#define ROUNDING_FACTOR (1 + 1e-6)
 
 /* Above anything that one sample can add to a counter, such as the rays of a path of 128 edges with all its connections
  * and of the chains that it starts. */
-#define PER_SAMPLE 0x1p24
+#define PER_SAMPLE_MAX 0x1p24
 
-static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
+static int check_counter_range(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
 {
 	const uint64_t *c = b->counters;
 	bool chains = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
 	for (int i = 0; i < BATCH_COUNTERS; i++)
-		if (c[i] >> 56 || (i != COUNT_LONGEST_STUCK && !((double)c[i] <= ((double)samples + 1) * PER_SAMPLE)))
+		if (c[i] >> 56 ||
+		    (i != COUNT_LONGEST_STUCK && !((double)c[i] <= ((double)samples + 1) * PER_SAMPLE_MAX)))
 			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i,
 					 (unsigned long long)c[i]);
-	uint64_t most = chains ? (b->key.epoch + 1) * p->epoch : 0;
-	if (c[COUNT_LONGEST_STUCK] > most)
+	uint64_t max_rejections = chains ? (b->key.epoch + 1) * p->epoch : 0;
+	if (c[COUNT_LONGEST_STUCK] > max_rejections)
 		return error_set(e, EBADMSG, "%llu rejections in a row after %llu mutations of a chain",
-				 (unsigned long long)c[COUNT_LONGEST_STUCK], (unsigned long long)most);
+				 (unsigned long long)c[COUNT_LONGEST_STUCK], (unsigned long long)max_rejections);
 	return 0;
 }
 
@@ -199,9 +201,10 @@ static int check_sums(const struct batch *b, struct error *e)
 		if (!isfinite(sums[i]) || sums[i] < 0)
 			return error_set(e, EBADMSG, "a sum over independent samples is negative or not finite");
 	double n = (double)b->counters[COUNT_INDEPENDENT], sum = b->independent_sum, square = b->independent_square;
-	if (!(sum <= n * (double)FLT_MAX * ROUNDING))
+	if (!(sum <= n * (double)FLT_MAX * ROUNDING_FACTOR))
 		return error_set(e, EBADMSG, "%g independent samples add up to %g", n, sum);
-	if (!(sum * sum <= n * (square * ROUNDING + DBL_MIN)) || !(square <= sum * sum * ROUNDING + n * DBL_MIN))
+	if (!(sum * sum <= n * (square * ROUNDING_FACTOR + DBL_MIN)) ||
+	    !(square <= sum * sum * ROUNDING_FACTOR + n * DBL_MIN))
 		return error_set(e, EBADMSG, "%g independent samples add up to %g and their squares to %g", n, sum,
 				 square);
 	if (b->key.kind != LEASE_BOOTSTRAP)
@@ -209,12 +212,12 @@ static int check_sums(const struct batch *b, struct error *e)
 	double weights = 0;
 	for (uint64_t i = 0; i < b->weight_count; i++)
 		weights += (double)b->weights[i];
-	if (!(fabs(weights - sum) <= (ROUNDING - 1) * sum + n * (double)FLT_MIN))
+	if (!(fabs(weights - sum) <= (ROUNDING_FACTOR - 1) * sum + n * (double)FLT_MIN))
 		return error_set(e, EBADMSG, "bootstrap weights that add up to %g where their sum is %g", weights, sum);
 	return 0;
 }
 
-static int check_counts(const struct batch *b, const struct plan *p, uint64_t live, struct error *e)
+static int check_counts(const struct batch *b, const struct plan *p, uint64_t live_count, struct error *e)
 {
 	const uint64_t *c = b->counters;
 	struct plan_range rows = plan_row_range(p, b->key.part);
@@ -222,7 +225,7 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 	if (b->key.kind == LEASE_BOOTSTRAP)
 		samples = b->weight_count;
 	else if (p->kind == PLAN_CHAINS)
-		samples = live * p->epoch;
+		samples = live_count * p->epoch;
 	else
 		samples = (rows.end - rows.begin) * (p->crop_width + 2 * (uint64_t)p->border) * p->epoch;
 	if (b->key.kind == LEASE_BOOTSTRAP ? c[COUNT_INDEPENDENT] != samples : c[COUNT_SAMPLES] != samples)
@@ -233,20 +236,20 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 	if (c[COUNT_SAMPLES] > samples || c[COUNT_INDEPENDENT] > samples || c[COUNT_ACCEPTED] > samples ||
 	    c[COUNT_STUCK] > b->state_count || c[COUNT_STATES_LOST] > b->state_count)
 		return error_set(e, EBADMSG, "more accepted, independent, stuck or lost chains than there are");
-	int rc = check_absurd(b, p, samples, e);
+	int rc = check_counter_range(b, p, samples, e);
 	return rc ? rc : check_sums(b, e);
 }
 
 static int check_strategies(const struct batch *b, const struct plan *p, struct error *e)
 {
 	uint64_t proposed = 0, accepted = 0;
-	bool has = b->key.kind == LEASE_RENDER;
-	int expected = has ? plan_strategy_count(p->mutations) : 0;
+	bool has_strategies = b->key.kind == LEASE_RENDER;
+	int expected = has_strategies ? plan_strategy_count(p->mutations) : 0;
 	if (b->strategy_count != 0 && (int64_t)b->strategy_count != expected)
 		return error_set(e, EBADMSG, "counters of %u strategies where the plan has %d", b->strategy_count,
 				 expected);
 	for (uint32_t i = 0; i < b->strategy_count; i++) {
-		const uint64_t *c = b->strategy[i];
+		const uint64_t *c = b->strategies[i];
 		for (int k = 0; k < STRATEGY_COUNTERS; k++)
 			if (c[k] >> 56 ||
 			    ((k == STRATEGY_ACCEPTED || k >= STRATEGY_FAIL_FIRST) && c[k] > c[STRATEGY_PROPOSED]))
@@ -273,21 +276,21 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 static int check_classes(const struct batch *b, const struct plan *p, struct error *e)
 {
 	bool is_time = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
-	double sum = 0, most = is_time ? (double)b->counters[COUNT_SAMPLES] : b->independent_sum;
+	double sum = 0, max_sum = is_time ? (double)b->counters[COUNT_SAMPLES] : b->independent_sum;
 	for (int i = 0; i < PATH_CLASSES; i++) {
 		if (!(b->classes[i] >= 0) || !isfinite(b->classes[i]))
 			return error_set(e, EBADMSG, "the sum of a path class is negative or not finite");
 		sum += b->classes[i];
 	}
-	if (!(sum <= most * ROUNDING))
-		return error_set(e, EBADMSG, "the path classes add up to %g, more than %g", sum, most);
+	if (!(sum <= max_sum * ROUNDING_FACTOR))
+		return error_set(e, EBADMSG, "the path classes add up to %g, more than %g", sum, max_sum);
 	return 0;
 }
 
 static int check_moments(const struct batch *b, const struct plan *p, struct error *e)
 {
-	uint64_t expected = batch_moment_count(p, b->key.kind), tiles = batch_film_tiles(p),
-		 sequences = batch_sequences(p);
+	uint64_t expected = batch_moment_count(p, b->key.kind), tiles = batch_film_tile_count(p),
+		 sequences = batch_sequence_count(p);
 	if (b->moment_count != expected || (expected && !b->moments))
 		return error_set(e, EBADMSG, "%llu moments where there should be %llu",
 				 (unsigned long long)b->moment_count, (unsigned long long)expected);
@@ -296,13 +299,13 @@ static int check_moments(const struct batch *b, const struct plan *p, struct err
 	for (uint64_t i = 0; i < expected; i++)
 		if (!(b->moments[i] >= 0) || !isfinite(b->moments[i]))
 			return error_set(e, EBADMSG, "a moment is negative or not finite");
-	double most = (double)b->state_count / (double)sequences * (double)p->epoch * ROUNDING;
+	double max_sum = (double)b->state_count / (double)sequences * (double)p->epoch * ROUNDING_FACTOR;
 	for (uint64_t s = 0; s < sequences; s++) {
 		double sum = 0;
 		for (uint64_t t = 0; t < tiles; t++)
 			sum += (double)b->moments[s * tiles + t];
-		if (!(sum <= most))
-			return error_set(e, EBADMSG, "a chain was in tiles %g times in %g mutations", sum, most);
+		if (!(sum <= max_sum))
+			return error_set(e, EBADMSG, "a chain was in tiles %g times in %g mutations", sum, max_sum);
 	}
 	for (uint64_t t = 0; t < tiles; t++) {
 		double first = 0;
@@ -310,7 +313,7 @@ static int check_moments(const struct batch *b, const struct plan *p, struct err
 			first += (double)b->moments[s * tiles + t];
 		/* Proposals with a tiny acceptance probability leave moments below FLT_MIN, where floats lose bits. */
 		double lost = ((double)sequences + 1) * (double)FLT_TRUE_MIN;
-		if (!((double)b->moments[sequences * tiles + t] <= first * ROUNDING + lost))
+		if (!((double)b->moments[sequences * tiles + t] <= first * ROUNDING_FACTOR + lost))
 			return error_set(e, EBADMSG, "a second moment above the first");
 	}
 	return 0;
@@ -318,16 +321,16 @@ static int check_moments(const struct batch *b, const struct plan *p, struct err
 
 int batch_check(const struct batch *b, const struct plan *p, struct error *e)
 {
-	uint64_t live;
+	uint64_t live_count;
 	int rc = check_key(&b->key, p, e);
 	if (rc == 0)
 		rc = check_tiles(b, p, e);
 	if (rc == 0)
-		rc = check_states(b, p, &live, e);
+		rc = check_states(b, p, &live_count, e);
 	if (rc == 0)
 		rc = check_weights(b, p, e);
 	if (rc == 0)
-		rc = check_counts(b, p, live, e);
+		rc = check_counts(b, p, live_count, e);
 	if (rc == 0)
 		rc = check_classes(b, p, e);
 	if (rc == 0)

@@ -17,12 +17,12 @@ struct lease_key {
 	uint64_t epoch;
 };
 const char *lease_kind_name(enum lease_kind kind); /* "bootstrap", "render" */
-/* Formats and arguments that print a lease: LEASE_FORMAT with LEASE_VALUES(&key) in a line of a log, LEASE_WORDS with
- * LEASE_PLACE(&key), without the kind, in a sentence. */
+/* Formats and arguments that print a lease: LEASE_FORMAT with LEASE_VALUES(&key) in a line of a log,
+ * LEASE_POSITION_FORMAT with LEASE_POSITION_VALUES(&key), without the kind, in a sentence. */
 #define LEASE_FORMAT "kind=%s group=%u part=%u epoch=%llu"
-#define LEASE_VALUES(k) lease_kind_name((k)->kind), LEASE_PLACE(k)
-#define LEASE_WORDS "group %u part %u epoch %llu"
-#define LEASE_PLACE(k) (k)->group, (k)->part, (unsigned long long)(k)->epoch
+#define LEASE_VALUES(k) lease_kind_name((k)->kind), LEASE_POSITION_VALUES(k)
+#define LEASE_POSITION_FORMAT "group %u part %u epoch %llu"
+#define LEASE_POSITION_VALUES(k) (k)->group, (k)->part, (unsigned long long)(k)->epoch
 bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 enum { TILE_SIZE = 64, TILE_CHANNELS = 3 }; /* X Y Z */
@@ -38,14 +38,14 @@ struct tile {
 /* The state of one chain after an epoch, from which any worker can continue. Only the integrator interprets it. */
 struct chain_state {
 	uint8_t *bytes;
-	uint32_t size; /* at most chain_state_max; 0: the chain does not run */
+	uint32_t size; /* at most chain_state_max_bytes; 0: the chain does not run */
 };
 enum { CHAIN_STATE_MAX = 5376 }; /* largest size for any plan */
 
 /* Returns the largest size of a state of this plan, in bytes; it grows with the plan's max_depth. */
-uint32_t chain_state_max(const struct plan *p);
+uint32_t chain_state_max_bytes(const struct plan *p);
 /* Returns the memory that the states of all chains of the plan need at most. */
-uint64_t chain_states_max(const struct plan *p);
+uint64_t chain_states_max_bytes(const struct plan *p);
 /* Returns the memory that these states need; 0 if s is NULL. */
 uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count);
 
@@ -70,7 +70,7 @@ enum batch_counter {
 
 /* Returns all rays of one batch, whose counters are bounded by batch_check. Sums of many batches may be saturated, and
  * adding them here could overflow. */
-static inline uint64_t batch_rays(const uint64_t counters[BATCH_COUNTERS])
+static inline uint64_t batch_ray_count(const uint64_t counters[BATCH_COUNTERS])
 {
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
 }
@@ -78,7 +78,7 @@ static inline uint64_t batch_rays(const uint64_t counters[BATCH_COUNTERS])
 /* Counters of the chains of a lease for each strategy of the plan's mixture; common/estimate/strategy.h has their
  * names. The counters from STRATEGY_FAIL_FIRST on are the reasons why proposals could not be made or carried no light,
  * one reason per proposal. */
-enum { BATCH_STRATEGIES = PLAN_MAX_STRATEGIES };
+enum { BATCH_STRATEGIES = PLAN_STRATEGIES_MAX };
 enum strategy_counter {
 	STRATEGY_PROPOSED, /* mutations for which the strategy was chosen */
 	STRATEGY_ACCEPTED,
@@ -111,8 +111,8 @@ enum strategy_counter {
  * f^2.
  */
 enum { SEQUENCES_MAX = 4096 };
-uint32_t batch_sequences(const struct plan *p);	 /* sequences of one render lease; 0: the plan has no chains */
-uint32_t batch_film_tiles(const struct plan *p); /* tiles of the crop */
+uint32_t batch_sequence_count(const struct plan *p);  /* sequences of one render lease; 0: the plan has no chains */
+uint32_t batch_film_tile_count(const struct plan *p); /* tiles of the crop */
 /* Returns the number of floats in struct batch.moments for a lease of that kind. */
 uint64_t batch_moment_count(const struct plan *p, enum lease_kind kind);
 
@@ -120,7 +120,7 @@ struct batch {
 	struct lease_key key;
 	uint64_t counters[BATCH_COUNTERS];
 	uint32_t strategy_count; /* entries of the plan's mixture, or 0 */
-	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+	uint64_t strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	/* Sums of I and I^2 over the independent samples, I = X+Y+Z of the whole sample. COUNT_INDEPENDENT also counts
 	 * samples with I = 0. beyond_sum: the sum of I of paths too long for a chain's state, estimated by the
 	 * bootstrap; not part of independent_sum, since b is the integral over the paths that chains can reach. */

@@ -20,7 +20,7 @@ struct canvas;
 
 /* The result of the bootstrap of all groups, computed from the weights in index order. */
 struct bootstrap_result {
-	double b[PLAN_MAX_GROUPS]; /* by group */
+	double b[PLAN_GROUPS_MAX]; /* by group */
 	double b_pooled;
 	double beyond_share; /* share of the energy in paths too long for the chains' state */
 	bool black; /* no sample carried light. Chains cannot start: the job ends with a black image. Samples continue,
@@ -40,7 +40,7 @@ size_t canvas_bytes(const struct plan *p); /* size of the films */
 int canvas_probe(const struct plan *p, struct error *e);
 bool canvas_is_mapped(const struct canvas *c); /* the films are in a mapped file, not in memory */
 /* Returns the bytes of the mapped file for which no disk space is reserved yet; 0 if there is no file. */
-uint64_t canvas_unreserved(const struct canvas *c);
+uint64_t canvas_unreserved_bytes(const struct canvas *c);
 
 /* Merges a batch that has passed batch_check. A bootstrap batch adds only its sums of independent samples and path
  * classes; a render batch adds its pixels, counters and sums to its round. Returns -EEXIST if the lease is merged
@@ -50,24 +50,24 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
 /* Takes back the last render batch that was added for its (group, part); b must be as it was added. A batch of the same
  * lease may be added later with other contents; until then no round is closed. COUNT_LONGEST_STUCK, a maximum, keeps
  * its value. */
-void canvas_take_back(struct canvas *c, const struct batch *b);
+void canvas_subtract(struct canvas *c, const struct batch *b);
 /* Returns the number of batches of complete rounds that have been taken back and not been added again. */
-uint64_t canvas_missing(const struct canvas *c);
+uint64_t canvas_missing_count(const struct canvas *c);
 /* Checks, before canvas_add, that no pixel of a render batch takes more than an eighth of the film's range. Returns
  * -EBADMSG for chains, which cannot stay in one pixel for so long, and -ERANGE for samples: a sample may be that
  * bright, but then the grid is too fine. */
-int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e);
+int canvas_check_range(const struct canvas *c, const struct batch *b, struct error *e);
 /* Sets the tail index of the independent samples (common/estimate/tail.h), from the bootstrap. */
-void canvas_set_tail(struct canvas *c, double index);
+void canvas_set_tail_index(struct canvas *c, double index);
 /* Changes the number of rounds after which the plan ends; at least the number of complete ones. */
 void canvas_set_rounds(struct canvas *c, uint64_t rounds);
 /* Reserves disk space for the tiles of a render batch, so that adding it cannot fail for lack of space. Returns 0,
  * -ENOSPC or another error of the disk. */
 int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e);
-bool canvas_has(const struct canvas *c, const struct lease_key *k); /* the lease is merged */
-uint64_t canvas_rounds(const struct canvas *c);			    /* number of complete rounds */
+bool canvas_has_lease(const struct canvas *c, const struct lease_key *k); /* the lease is merged */
+uint64_t canvas_complete_rounds(const struct canvas *c);		  /* number of complete rounds */
 
 /* Returns the counts of the prefix of complete rounds; with open_rounds, of everything merged. */
-void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
+void canvas_sum_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
 
 #endif

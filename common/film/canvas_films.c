@@ -7,15 +7,15 @@
 
 /* Touching a page of a sparse file for which the disk has no room raises SIGBUS. Reserving the space first turns this
  * into an error. */
-int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
+int canvas_reserve_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
 {
-	uint8_t *flags = canvas_flags(c, film, tile);
-	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
-		off_t at = (off_t)((film * canvas_tiles(c) + tile) * SLOT * sizeof *c->sums);
-		int code = disk_posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
+	uint8_t *flags = canvas_tile_flags(c, film, tile);
+	if (!(*flags & TILE_RESERVED) && c->fd >= 0) {
+		off_t offset = (off_t)((film * canvas_tile_count(c) + tile) * SLOT_VALUES * sizeof *c->sums);
+		int code = disk_posix_fallocate(c->fd, offset, SLOT_VALUES * sizeof *c->sums);
 		if (code)
 			return error_set(e, code, "no room on the disk for the films: %s", strerror(code));
 	}
-	*flags |= TILE_BACKED;
+	*flags |= TILE_RESERVED;
 	return 0;
 }

@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * moments_add adds a render's moments to the open round of its epoch or, if that round is closed, to the prefix, and a
+ * bootstrap's energy to its group. moments_close_round moves an open round into the prefix. Floats are rounded to the
+ * grid before they are added, so the sums are integers and the order does not matter; moments_subtract adds the same
+ * integers with the other sign, which removes a batch without a trace.
+ *
+ * Failures: moments_new returns -ENOMEM. Sums cannot overflow if moments_check_range, which bounds the mutations of a
+ * chain, was called before. moments_load refuses moments of another shape and files that end early.
+ */
 #include "common/film/canvas_moments.h"
 
 #include "common/base/mem.h"
@@ -8,18 +17,18 @@
 #include <math.h>
 #include <string.h>
 
-enum { SHAPE = 4 };
+enum { SHAPE_NUMBERS = 4 };
 _Static_assert(sizeof(struct exact_sum) == EXACT_SUM_WORDS * sizeof(uint64_t), "an array of them is an array of words");
-#define MUTATIONS_MOST (UINT64_C(1) << 42)
+#define MUTATIONS_MAX (UINT64_C(1) << 42)
 
-static size_t first_count(const struct moments *m)
+static size_t first_moment_count(const struct moments *m)
 {
-	return (size_t)m->leases * m->per_lease * m->tiles;
+	return (size_t)m->lease_count * m->sequences_per_lease * m->tile_count;
 }
 
-static size_t second_count(const struct moments *m)
+static size_t second_moment_count(const struct moments *m)
 {
-	return m->per_lease ? (size_t)m->leases * m->tiles : 0;
+	return m->sequences_per_lease ? (size_t)m->lease_count * m->tile_count : 0;
 }
 
 int moments_new(struct moments **out, const struct plan *p, struct error *e)
@@ -28,14 +37,14 @@ int moments_new(struct moments **out, const struct plan *p, struct error *e)
 	*out = m;
 	if (m) {
 		m->plan = *p;
-		m->per_lease = batch_sequences(p);
-		m->leases = p->groups * p->parts;
-		m->tiles = batch_film_tiles(p);
-		m->first = mem_alloc(MOMENTS_SETS * first_count(m), sizeof *m->first);
-		m->second = mem_alloc(MOMENTS_SETS * second_count(m), sizeof *m->second);
-		m->time = mem_alloc(MOMENTS_SETS * moments_classes(m), sizeof *m->time);
-		m->bootstrap = mem_alloc(moments_classes(m), sizeof *m->bootstrap);
-		if (m->first && m->second && m->time && m->bootstrap)
+		m->sequences_per_lease = batch_sequence_count(p);
+		m->lease_count = p->groups * p->parts;
+		m->tile_count = batch_film_tile_count(p);
+		m->first_moments = mem_alloc(MOMENTS_SETS * first_moment_count(m), sizeof *m->first_moments);
+		m->second_moments = mem_alloc(MOMENTS_SETS * second_moment_count(m), sizeof *m->second_moments);
+		m->class_time = mem_alloc(MOMENTS_SETS * moments_class_count(m), sizeof *m->class_time);
+		m->bootstrap_energy = mem_alloc(moments_class_count(m), sizeof *m->bootstrap_energy);
+		if (m->first_moments && m->second_moments && m->class_time && m->bootstrap_energy)
 			return 0;
 	}
 	moments_free(m);
@@ -47,18 +56,18 @@ void moments_free(struct moments *m)
 {
 	if (!m)
 		return;
-	mem_free(m->first);
-	mem_free(m->second);
-	mem_free(m->time);
-	mem_free(m->bootstrap);
+	mem_free(m->first_moments);
+	mem_free(m->second_moments);
+	mem_free(m->class_time);
+	mem_free(m->bootstrap_energy);
 	mem_free(m);
 }
 
-int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e)
+int moments_check_range(const struct moments *m, const struct lease_key *k, struct error *e)
 {
-	if (m->per_lease == 0 || k->kind != LEASE_RENDER)
+	if (m->sequences_per_lease == 0 || k->kind != LEASE_RENDER)
 		return 0;
-	uint64_t chains = m->plan.chains / m->leases, epochs = MUTATIONS_MOST / chains / m->plan.epoch;
+	uint64_t chains = m->plan.chains / m->lease_count, epochs = MUTATIONS_MAX / chains / m->plan.epoch;
 	if (k->epoch < epochs)
 		return 0;
 	return error_set(e, ERANGE, "after %llu rounds the moments of chains leave their range",
@@ -86,23 +95,25 @@ static void add_render(struct moments *m, const struct batch *b, bool closed, in
 {
 	const struct lease_key *k = &b->key;
 	size_t group = (size_t)k->group * PATH_CLASSES, set = closed ? MOMENTS_PREFIX : MOMENTS_OPEN + k->epoch % 2;
-	add_classes(m->time + set * moments_classes(m) + group, b->classes, sign);
+	add_classes(m->class_time + set * moments_class_count(m) + group, b->classes, sign);
 	if (b->moment_count == 0)
 		return;
-	size_t lease = (size_t)k->group * m->plan.parts + k->part, own = (size_t)m->per_lease * m->tiles;
-	add_grid(m->first + set * first_count(m) + lease * own, b->moments, own, sign);
-	add_grid(m->second + set * second_count(m) + lease * m->tiles, b->moments + own, m->tiles, sign);
+	size_t lease = (size_t)k->group * m->plan.parts + k->part,
+	       lease_values = (size_t)m->sequences_per_lease * m->tile_count;
+	add_grid(m->first_moments + set * first_moment_count(m) + lease * lease_values, b->moments, lease_values, sign);
+	add_grid(m->second_moments + set * second_moment_count(m) + lease * m->tile_count, b->moments + lease_values,
+		 m->tile_count, sign);
 }
 
 void moments_add(struct moments *m, const struct batch *b, bool closed)
 {
 	if (b->key.kind == LEASE_BOOTSTRAP)
-		add_classes(m->bootstrap + (size_t)b->key.group * PATH_CLASSES, b->classes, 1);
+		add_classes(m->bootstrap_energy + (size_t)b->key.group * PATH_CLASSES, b->classes, 1);
 	else
 		add_render(m, b, closed, 1);
 }
 
-void moments_take_back(struct moments *m, const struct batch *b, bool closed)
+void moments_subtract(struct moments *m, const struct batch *b, bool closed)
 {
 	add_render(m, b, closed, -1);
 }
@@ -120,11 +131,11 @@ static void move_grid(int64_t *to, int64_t *from, size_t count)
 void moments_close_round(struct moments *m, uint64_t round)
 {
 	size_t set = MOMENTS_OPEN + round % 2;
-	struct exact_sum *time = m->time + set * moments_classes(m);
-	move_grid(m->first, m->first + set * first_count(m), first_count(m));
-	move_grid(m->second, m->second + set * second_count(m), second_count(m));
-	for (size_t i = 0; i < moments_classes(m); i++) {
-		exact_sum_merge(&m->time[i], &time[i]);
+	struct exact_sum *time = m->class_time + set * moments_class_count(m);
+	move_grid(m->first_moments, m->first_moments + set * first_moment_count(m), first_moment_count(m));
+	move_grid(m->second_moments, m->second_moments + set * second_moment_count(m), second_moment_count(m));
+	for (size_t i = 0; i < moments_class_count(m); i++) {
+		exact_sum_merge(&m->class_time[i], &time[i]);
 		time[i] = (struct exact_sum){0};
 	}
 }
@@ -136,11 +147,11 @@ static int save_runs(struct checked_file *out, const void *numbers, size_t run, 
 {
 	int rc = 0;
 	for (const uint64_t *p = numbers; count && !rc; count--, p += run) {
-		unsigned char any = 0;
-		for (size_t k = 0; k < run && !any; k++)
-			any = p[k] != 0;
-		rc = checked_file_write(out, &any, 1, e);
-		if (!rc && any)
+		unsigned char is_nonzero = 0;
+		for (size_t k = 0; k < run && !is_nonzero; k++)
+			is_nonzero = p[k] != 0;
+		rc = checked_file_write(out, &is_nonzero, 1, e);
+		if (!rc && is_nonzero)
 			rc = checked_file_write_numbers(out, p, sizeof *p, run, e);
 	}
 	return rc;
@@ -150,46 +161,50 @@ static int load_runs(struct checked_file *in, void *numbers, size_t run, size_t 
 {
 	int rc = 0;
 	for (uint64_t *p = numbers; count && !rc; count--, p += run) {
-		unsigned char any;
-		rc = checked_file_read(in, &any, 1, e);
-		if (!rc && any)
+		unsigned char is_nonzero;
+		rc = checked_file_read(in, &is_nonzero, 1, e);
+		if (!rc && is_nonzero)
 			rc = checked_file_read_numbers(in, p, sizeof *p, run, e);
 	}
 	return rc;
 }
 
-static void shape_of(const struct moments *m, uint32_t shape[SHAPE])
+static void fill_shape(const struct moments *m, uint32_t shape[SHAPE_NUMBERS])
 {
-	const uint32_t all[SHAPE] = {m->per_lease, m->leases, m->tiles, PATH_CLASSES};
+	const uint32_t all[SHAPE_NUMBERS] = {m->sequences_per_lease, m->lease_count, m->tile_count, PATH_CLASSES};
 	memcpy(shape, all, sizeof all);
 }
 
 int moments_save(const struct moments *m, struct checked_file *out, struct error *e)
 {
-	uint32_t shape[SHAPE];
-	shape_of(m, shape);
-	int rc = checked_file_write_numbers(out, shape, sizeof *shape, SHAPE, e);
+	uint32_t shape[SHAPE_NUMBERS];
+	fill_shape(m, shape);
+	int rc = checked_file_write_numbers(out, shape, sizeof *shape, SHAPE_NUMBERS, e);
 	if (!rc)
-		rc = save_runs(out, m->first, m->tiles, MOMENTS_SETS * first_count(m) / m->tiles, e);
+		rc = save_runs(out, m->first_moments, m->tile_count,
+			       MOMENTS_SETS * first_moment_count(m) / m->tile_count, e);
 	if (!rc)
-		rc = save_runs(out, m->second, m->tiles, MOMENTS_SETS * second_count(m) / m->tiles, e);
+		rc = save_runs(out, m->second_moments, m->tile_count,
+			       MOMENTS_SETS * second_moment_count(m) / m->tile_count, e);
 	if (!rc)
-		rc = save_runs(out, m->time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_classes(m), e);
-	return rc ? rc : save_runs(out, m->bootstrap, EXACT_SUM_WORDS, moments_classes(m), e);
+		rc = save_runs(out, m->class_time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_class_count(m), e);
+	return rc ? rc : save_runs(out, m->bootstrap_energy, EXACT_SUM_WORDS, moments_class_count(m), e);
 }
 
 int moments_load(struct moments *m, struct checked_file *in, struct error *e)
 {
-	uint32_t shape[SHAPE], want[SHAPE];
-	shape_of(m, want);
-	int rc = checked_file_read_numbers(in, shape, sizeof *shape, SHAPE, e);
-	if (!rc && memcmp(shape, want, sizeof want) != 0)
+	uint32_t shape[SHAPE_NUMBERS], expected[SHAPE_NUMBERS];
+	fill_shape(m, expected);
+	int rc = checked_file_read_numbers(in, shape, sizeof *shape, SHAPE_NUMBERS, e);
+	if (!rc && memcmp(shape, expected, sizeof expected) != 0)
 		rc = error_set(e, EBADMSG, "moments of other chains");
 	if (!rc)
-		rc = load_runs(in, m->first, m->tiles, MOMENTS_SETS * first_count(m) / m->tiles, e);
+		rc = load_runs(in, m->first_moments, m->tile_count,
+			       MOMENTS_SETS * first_moment_count(m) / m->tile_count, e);
 	if (!rc)
-		rc = load_runs(in, m->second, m->tiles, MOMENTS_SETS * second_count(m) / m->tiles, e);
+		rc = load_runs(in, m->second_moments, m->tile_count,
+			       MOMENTS_SETS * second_moment_count(m) / m->tile_count, e);
 	if (!rc)
-		rc = load_runs(in, m->time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_classes(m), e);
-	return rc ? rc : load_runs(in, m->bootstrap, EXACT_SUM_WORDS, moments_classes(m), e);
+		rc = load_runs(in, m->class_time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_class_count(m), e);
+	return rc ? rc : load_runs(in, m->bootstrap_energy, EXACT_SUM_WORDS, moments_class_count(m), e);
 }

@@ -29,11 +29,11 @@ void moments_free(struct moments *m);
 
 /* Returns -ERANGE if a sum could leave the grid after the lease's epoch. Call it before moments_add, which cannot fail.
  */
-int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e);
+int moments_check_range(const struct moments *m, const struct lease_key *k, struct error *e);
 /* Adds a batch. closed: the round of its lease is complete, so it is added to the prefix. */
 void moments_add(struct moments *m, const struct batch *b, bool closed);
 /* Subtracts a render batch; b must be as it was added. */
-void moments_take_back(struct moments *m, const struct batch *b, bool closed);
+void moments_subtract(struct moments *m, const struct batch *b, bool closed);
 /* Moves the sums of an open round into the prefix. */
 void moments_close_round(struct moments *m, uint64_t round);
 

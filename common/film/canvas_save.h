@@ -4,7 +4,7 @@
  * when the same batches are added to both. Untouched tiles take no space. One thread at a time.
  *
  * Version 2, all numbers little endian (common/base/checked_file.h). G: groups, P: parts. Films are numbered as by
- * canvas_film(), tiles row by row.
+ * canvas_film_index(), tiles row by row.
  *
  * offset  bytes      contents
  * 0       4          version
@@ -34,7 +34,7 @@
 #include "common/base/checked_file.h"
 #include "common/film/canvas.h"
 
-/* Saves a canvas from which no batch of a complete round is taken back (canvas_missing() is 0). */
+/* Saves a canvas from which no batch of a complete round is taken back (canvas_missing_count() is 0). */
 int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e);
 /* Loads into a new canvas of the same plan and grid. Returns -EBADMSG if the file is of another plan or grid or
  * damaged, -EPROTO if it is of another version. The canvas is unusable after an error. */

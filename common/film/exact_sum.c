@@ -7,22 +7,22 @@
 enum { MANTISSA_BITS = 52, EXPONENT_MASK = 0x7ff, UNIT_EXPONENT = -1074 };
 
 /* Adds value to word i and carries into the following words. */
-static void add_at(struct exact_sum *s, int i, uint64_t value)
+static void add_word(struct exact_sum *s, int i, uint64_t value)
 {
 	while (value && i < EXACT_SUM_WORDS) {
-		uint64_t before = s->word[i];
-		s->word[i] = before + value;
-		value = s->word[i] < before;
+		uint64_t previous = s->words[i];
+		s->words[i] = previous + value;
+		value = s->words[i] < previous;
 		i++;
 	}
 }
 
-static void subtract_at(struct exact_sum *s, int i, uint64_t value)
+static void subtract_word(struct exact_sum *s, int i, uint64_t value)
 {
 	while (value && i < EXACT_SUM_WORDS) {
-		uint64_t before = s->word[i];
-		s->word[i] = before - value;
-		value = before < value;
+		uint64_t previous = s->words[i];
+		s->words[i] = previous - value;
+		value = previous < value;
 		i++;
 	}
 }
@@ -44,11 +44,11 @@ bool exact_sum_add(struct exact_sum *s, double x)
 	unsigned shift = position % 64;
 	uint64_t low = mantissa << shift, high = shift ? mantissa >> (64 - shift) : 0;
 	if (bits >> 63) {
-		subtract_at(s, i, low);
-		subtract_at(s, i + 1, high);
+		subtract_word(s, i, low);
+		subtract_word(s, i + 1, high);
 	} else {
-		add_at(s, i, low);
-		add_at(s, i + 1, high);
+		add_word(s, i, low);
+		add_word(s, i + 1, high);
 	}
 	return true;
 }
@@ -57,10 +57,10 @@ void exact_sum_merge(struct exact_sum *s, const struct exact_sum *other)
 {
 	uint64_t carry = 0;
 	for (int i = 0; i < EXACT_SUM_WORDS; i++) {
-		uint64_t a = s->word[i] + carry;
+		uint64_t a = s->words[i] + carry;
 		carry = a < carry;
-		s->word[i] = a + other->word[i];
-		carry += s->word[i] < a;
+		s->words[i] = a + other->words[i];
+		carry += s->words[i] < a;
 	}
 }
 
@@ -81,28 +81,28 @@ static bool any_below(const uint64_t *w, int position)
 double exact_sum_value(const struct exact_sum *s)
 {
 	struct exact_sum m = *s;
-	bool negative = s->word[EXACT_SUM_WORDS - 1] >> 63;
+	bool negative = s->words[EXACT_SUM_WORDS - 1] >> 63;
 	if (negative) {
 		for (int i = 0; i < EXACT_SUM_WORDS; i++)
-			m.word[i] = ~m.word[i];
-		add_at(&m, 0, 1);
+			m.words[i] = ~m.words[i];
+		add_word(&m, 0, 1);
 	}
 	int top = EXACT_SUM_WORDS - 1;
-	while (top > 0 && m.word[top] == 0)
+	while (top > 0 && m.words[top] == 0)
 		top--;
-	if (m.word[top] == 0)
+	if (m.words[top] == 0)
 		return 0;
-	int highest = top * 64 + 63 - __builtin_clzll(m.word[top]);
+	int highest = top * 64 + 63 - __builtin_clzll(m.words[top]);
 	double magnitude;
 	if (highest <= MANTISSA_BITS) {
-		magnitude = ldexp((double)m.word[0], UNIT_EXPONENT);
+		magnitude = ldexp((double)m.words[0], UNIT_EXPONENT);
 	} else {
 		int lowest = highest - MANTISSA_BITS;
 		uint64_t mantissa = 0;
 		for (int b = highest; b >= lowest; b--)
-			mantissa = mantissa << 1 | bit_at(m.word, b);
-		bool half = bit_at(m.word, lowest - 1);
-		if (half && ((mantissa & 1) || any_below(m.word, lowest - 1)))
+			mantissa = mantissa << 1 | bit_at(m.words, b);
+		bool half = bit_at(m.words, lowest - 1);
+		if (half && ((mantissa & 1) || any_below(m.words, lowest - 1)))
 			mantissa++;
 		magnitude = ldexp((double)mantissa, lowest + UNIT_EXPONENT);
 	}

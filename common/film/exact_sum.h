@@ -12,7 +12,7 @@
 enum { EXACT_SUM_WORDS = 36 };
 
 struct exact_sum {
-	uint64_t word[EXACT_SUM_WORDS]; /* two's complement, least significant first, unit 2^-1074 */
+	uint64_t words[EXACT_SUM_WORDS]; /* two's complement, least significant first, unit 2^-1074 */
 };
 
 bool exact_sum_add(struct exact_sum *s, double x); /* false, and no change, if x is not finite */

@@ -11,18 +11,19 @@
 enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
 
 /* Moments are stored in units of 1 / MOMENTS_GRID. They are at most the number of mutations, 2^42 for the chains of one
- * lease (moments_fit), so that sums stay below 2^62. */
+ * lease (moments_check_range), so that sums stay below 2^62. */
 #define MOMENTS_GRID 0x1p20
 struct moments {
 	struct plan plan;
-	uint32_t per_lease, leases, tiles; /* sequences per lease, leases per round, tiles of the crop */
-	int64_t *first;			   /* [set][lease][sequence][tile] */
-	int64_t *second;		   /* [set][lease][tile] */
-	struct exact_sum *time;		   /* [set][group][class] */
-	struct exact_sum *bootstrap;	   /* [group][class] */
+	uint32_t sequences_per_lease, lease_count,
+		tile_count;		    /* sequences per lease, leases per round, tiles of the crop */
+	int64_t *first_moments;		    /* [set][lease][sequence][tile] */
+	int64_t *second_moments;	    /* [set][lease][tile] */
+	struct exact_sum *class_time;	    /* [set][group][class] */
+	struct exact_sum *bootstrap_energy; /* [group][class] */
 };
 
-static inline size_t moments_classes(const struct moments *m)
+static inline size_t moments_class_count(const struct moments *m)
 {
 	return (size_t)m->plan.groups * PATH_CLASSES;
 }

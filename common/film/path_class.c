@@ -11,7 +11,7 @@ const char *path_class_name(unsigned path_class)
 	}
 	static const char *const names[PATH_CLASS_KINDS][PATH_CLASS_LENGTHS] = {
 		[PATH_ROUGH] = LENGTHS("rough"),     [PATH_REFLECTED] = LENGTHS("reflected"),
-		[PATH_CAUSTIC] = LENGTHS("caustic"), [PATH_BOTH] = LENGTHS("reflected caustic"),
+		[PATH_CAUSTIC] = LENGTHS("caustic"), [PATH_REFLECTED_CAUSTIC] = LENGTHS("reflected caustic"),
 		[PATH_SMOOTH] = LENGTHS("smooth"),
 	};
 #undef LENGTHS

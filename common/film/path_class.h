@@ -14,8 +14,9 @@ enum path_class_kind {
 	PATH_ROUGH,	/* no smooth vertex */
 	PATH_REFLECTED, /* smooth vertices only between the camera and the first rough vertex, such as a mirror image */
 	PATH_CAUSTIC,	/* the vertex next to the camera is rough, and a smooth vertex follows nearer to the light */
-	PATH_BOTH, /* a smooth vertex next to the camera, then a rough one, then a smooth one: a caustic in a mirror */
-	PATH_SMOOTH, /* smooth vertices only */
+	PATH_REFLECTED_CAUSTIC, /* a smooth vertex next to the camera, then a rough one, then a smooth one: a caustic in
+				   a mirror */
+	PATH_SMOOTH,		/* smooth vertices only */
 	PATH_CLASS_KINDS,
 	PATH_NO_VERTEX = PATH_CLASS_KINDS, /* no inner vertex yet, for path_class_kind_next; counts as PATH_ROUGH */
 };
@@ -28,9 +29,12 @@ enum { PATH_CLASSES = PATH_CLASS_KINDS * PATH_CLASS_LENGTHS };
 static inline enum path_class_kind path_class_kind_next(enum path_class_kind kind, bool smooth)
 {
 	static const unsigned char next[PATH_CLASS_KINDS + 1][2] = {
-		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_SMOOTH},  [PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC},
-		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_SMOOTH}, [PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH},
-		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC}, [PATH_BOTH] = {PATH_BOTH, PATH_BOTH},
+		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_SMOOTH},
+		[PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC},
+		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_SMOOTH},
+		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_REFLECTED_CAUSTIC},
+		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC},
+		[PATH_REFLECTED_CAUSTIC] = {PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC},
 	};
 	return (enum path_class_kind)next[kind][smooth];
 }
@@ -41,11 +45,15 @@ static inline enum path_class_kind path_class_kind_join(enum path_class_kind cam
 	/* Row: the kind of the vertices on the camera's side; column: the kind of the others, in the enum's order. */
 	static const unsigned char join[PATH_CLASS_KINDS + 1][PATH_CLASS_KINDS + 1] = {
 		[PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_ROUGH},
-		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_REFLECTED},
+		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC,
+				    PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC, PATH_REFLECTED},
 		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC},
-		[PATH_BOTH] = {PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH},
-		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_REFLECTED, PATH_BOTH, PATH_BOTH, PATH_SMOOTH, PATH_SMOOTH},
-		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_REFLECTED, PATH_CAUSTIC, PATH_BOTH, PATH_SMOOTH, PATH_NO_VERTEX},
+		[PATH_REFLECTED_CAUSTIC] = {PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC,
+					    PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC},
+		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_REFLECTED, PATH_REFLECTED_CAUSTIC, PATH_REFLECTED_CAUSTIC,
+				 PATH_SMOOTH, PATH_SMOOTH},
+		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_REFLECTED, PATH_CAUSTIC, PATH_REFLECTED_CAUSTIC, PATH_SMOOTH,
+				    PATH_NO_VERTEX},
 	};
 	return (enum path_class_kind)join[camera][light];
 }

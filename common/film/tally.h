@@ -14,7 +14,7 @@
  * mixture does not have are 0. */
 struct canvas_counts {
 	uint64_t counters[BATCH_COUNTERS];
-	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+	uint64_t strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 };
 void canvas_counts_add(struct canvas_counts *to, const struct canvas_counts *from);
 
@@ -22,14 +22,14 @@ void canvas_counts_add(struct canvas_counts *to, const struct canvas_counts *fro
 struct tally {
 	struct canvas_counts counts;
 	struct {
-		uint64_t samples, independent; /* sums of COUNT_SAMPLES and COUNT_INDEPENDENT */
-		struct exact_sum sum, beyond;  /* sums of independent_sum and beyond_sum */
-	} group[PLAN_MAX_GROUPS];
+		uint64_t samples, independent;		      /* sums of COUNT_SAMPLES and COUNT_INDEPENDENT */
+		struct exact_sum independent_sum, beyond_sum; /* sums of independent_sum and beyond_sum */
+	} groups[PLAN_GROUPS_MAX];
 };
 
 void tally_add(struct tally *t, const struct batch *b);
 /* Subtracts a batch, which must be as it was added. COUNT_LONGEST_STUCK keeps its value. */
-void tally_take_back(struct tally *t, const struct batch *b);
+void tally_subtract(struct tally *t, const struct batch *b);
 void tally_merge(struct tally *to, const struct tally *from, uint32_t groups);
 
 #endif

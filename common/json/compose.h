@@ -6,9 +6,9 @@
 
 #include <jansson.h>
 
-/* Adds a value to an object (json_with) or list (json_and) and returns the object or list. Both arguments may be NULL,
- * and both references are taken over; NULL if either is NULL or memory is out. */
-static inline json_t *json_with(json_t *o, const char *key, json_t *value)
+/* Adds a value to an object (json_object_with) or list (json_array_with) and returns the object or list. Both arguments
+ * may be NULL, and both references are taken over; NULL if either is NULL or memory is out. */
+static inline json_t *json_object_with(json_t *o, const char *key, json_t *value)
 {
 	if (json_object_set_new(o, key, value) == 0)
 		return o;
@@ -16,7 +16,7 @@ static inline json_t *json_with(json_t *o, const char *key, json_t *value)
 	return NULL;
 }
 
-static inline json_t *json_and(json_t *list, json_t *value)
+static inline json_t *json_array_with(json_t *list, json_t *value)
 {
 	if (json_array_append_new(list, value) == 0)
 		return list;

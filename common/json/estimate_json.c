@@ -15,15 +15,15 @@
 
 /* ---- errors and forecasts ---- */
 
-json_t *forecast_real(double x)
+json_t *json_real_or_null(double x)
 {
 	return isfinite(x) ? json_real(x) : json_null();
 }
 
 json_t *forecast_range_to_json(const struct forecast_range *r)
 {
-	return json_pack("{s:o s:o s:o}", "low", forecast_real(r->low), "expected", forecast_real(r->middle), "high",
-			 forecast_real(r->high));
+	return json_pack("{s:o s:o s:o}", "low", json_real_or_null(r->low), "expected", json_real_or_null(r->middle),
+			 "high", json_real_or_null(r->high));
 }
 
 json_t *forecast_looks_to_json(const struct forecast_history *h)
@@ -33,10 +33,10 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 		const struct forecast_look *l = &h->looks[i];
 		if (!isfinite(l->work + l->cpu_seconds + l->seconds + l->rel_mse + l->rel_mse_upper))
 			continue; /* JSON has neither infinities nor NaN */
-		list = json_and(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds",
-						l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", l->rel_mse,
-						"relMSEUpper", l->rel_mse_upper, "degrees", forecast_real(l->degrees),
-						"doubtful", l->doubtful != 0));
+		list = json_array_with(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work,
+						       "cpuSeconds", l->cpu_seconds, "wallSeconds", l->seconds,
+						       "relMSE", l->rel_mse, "relMSEUpper", l->rel_mse_upper, "degrees",
+						       json_real_or_null(l->degrees), "doubtful", l->doubtful != 0));
 	}
 	return list;
 }
@@ -66,40 +66,42 @@ void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
 
 /* ---- agreement of chains ---- */
 
-static double real_or_nan(const json_t *o, const char *key)
+static double read_real_or_nan(const json_t *o, const char *key)
 {
 	const json_t *x = json_object_get(o, key);
 	return json_is_number(x) ? json_number_value(x) : NAN;
 }
 
-static uint32_t uint32_of(const json_t *x)
+static uint32_t read_uint32(const json_t *x)
 {
 	json_int_t n = json_integer_value(x);
 	return n < 0 ? 0 : n > UINT32_MAX ? UINT32_MAX : (uint32_t)n;
 }
 
-static json_t *names_of(uint32_t classes)
+static json_t *class_names_to_json(uint32_t classes)
 {
 	json_t *list = json_array();
 	for (unsigned k = 0; k < PATH_CLASSES; k++)
 		if (classes >> k & 1)
-			list = json_and(list, json_string(path_class_name(k)));
+			list = json_array_with(list, json_string(path_class_name(k)));
 	return list;
 }
 
 json_t *convergence_to_json(const struct convergence *a)
 {
-	return json_pack(
-		"{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict), "text",
-		a->text,											 /* */
-		"rHatMedian", forecast_real(a->r_hat_median), "rHatWorst", forecast_real(a->r_hat_worst),	 /* */
-		"worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles,		 /* */
-		"tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", forecast_real(a->energy_flagged), /* */
-		"stuckShare", forecast_real(a->stuck_share), "classesFlagged", names_of(a->classes_flagged),	 /* */
-		"classesApart", names_of(a->classes_apart));
+	return json_pack("{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict),
+			 "text", a->text, /* */
+			 "rHatMedian", json_real_or_null(a->r_hat_median), "rHatWorst",
+			 json_real_or_null(a->max_r_hat),							 /* */
+			 "worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles, /* */
+			 "tilesFlagged", (json_int_t)a->flagged_tiles, "energyFlagged",
+			 json_real_or_null(a->flagged_energy_share), /* */
+			 "stuckShare", json_real_or_null(a->stuck_share), "classesFlagged",
+			 class_names_to_json(a->flagged_classes), /* */
+			 "classesApart", class_names_to_json(a->inconsistent_classes));
 }
 
-static unsigned class_named(const json_t *name)
+static unsigned find_class(const json_t *name)
 {
 	unsigned k = 0;
 	while (k < PATH_CLASSES && (!json_is_string(name) || strcmp(json_string_value(name), path_class_name(k)) != 0))
@@ -107,11 +109,11 @@ static unsigned class_named(const json_t *name)
 	return k;
 }
 
-static uint32_t classes_named(const json_t *list)
+static uint32_t read_classes(const json_t *list)
 {
 	uint32_t classes = 0;
 	for (size_t i = 0; i < json_array_size(list); i++) {
-		unsigned k = class_named(json_array_get(list, i));
+		unsigned k = find_class(json_array_get(list, i));
 		if (k < PATH_CLASSES)
 			classes |= UINT32_C(1) << k;
 	}
@@ -123,20 +125,20 @@ void convergence_from_json(const json_t *o, struct convergence *a)
 	const char *verdict = json_string_value(json_object_get(o, "verdict")),
 		   *text = json_string_value(json_object_get(o, "text"));
 	const json_t *worst = json_object_get(o, "worst");
-	*a = (struct convergence){.r_hat_median = real_or_nan(o, "rHatMedian"),
-				  .r_hat_worst = real_or_nan(o, "rHatWorst")};
+	*a = (struct convergence){.r_hat_median = read_real_or_nan(o, "rHatMedian"),
+				  .max_r_hat = read_real_or_nan(o, "rHatWorst")};
 	for (int v = CHAINS_AGREE; verdict && v <= CHAINS_DISAGREE; v++)
 		if (strcmp(verdict, convergence_name((enum convergence_verdict)v)) == 0)
 			a->verdict = (enum convergence_verdict)v;
 	text_copy(a->text, sizeof a->text, text ? text : "");
-	a->worst_x = uint32_of(json_array_get(worst, 0));
-	a->worst_y = uint32_of(json_array_get(worst, 1));
-	a->tiles = uint32_of(json_object_get(o, "tiles"));
-	a->tiles_flagged = uint32_of(json_object_get(o, "tilesFlagged"));
-	a->energy_flagged = json_number_value(json_object_get(o, "energyFlagged"));
+	a->worst_x = read_uint32(json_array_get(worst, 0));
+	a->worst_y = read_uint32(json_array_get(worst, 1));
+	a->tiles = read_uint32(json_object_get(o, "tiles"));
+	a->flagged_tiles = read_uint32(json_object_get(o, "tilesFlagged"));
+	a->flagged_energy_share = json_number_value(json_object_get(o, "energyFlagged"));
 	a->stuck_share = json_number_value(json_object_get(o, "stuckShare"));
-	a->classes_flagged = classes_named(json_object_get(o, "classesFlagged"));
-	a->classes_apart = classes_named(json_object_get(o, "classesApart"));
+	a->flagged_classes = read_classes(json_object_get(o, "classesFlagged"));
+	a->inconsistent_classes = read_classes(json_object_get(o, "classesApart"));
 }
 
 json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
@@ -146,11 +148,12 @@ json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
 		const struct path_class_energy *c = &classes[k];
 		if (!(c->bootstrap > 0) && !(c->chains > 0))
 			continue;
-		list = json_and(list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
-						forecast_real(c->bootstrap), "bootstrapError",
-						forecast_real(c->bootstrap_error), "chains", forecast_real(c->chains),
-						"chainsError", forecast_real(c->chains_error), "t",
-						forecast_real(c->difference_t)));
+		list = json_array_with(list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k),
+						       "bootstrap", json_real_or_null(c->bootstrap), "bootstrapError",
+						       json_real_or_null(c->bootstrap_error), "chains",
+						       json_real_or_null(c->chains), "chainsError",
+						       json_real_or_null(c->chains_error), "t",
+						       json_real_or_null(c->difference_t)));
 	}
 	return list;
 }
@@ -161,31 +164,32 @@ void classes_from_json(const json_t *list, struct path_class_energy classes[PATH
 		classes[k] = (struct path_class_energy){.difference_t = NAN};
 	for (size_t i = 0; i < json_array_size(list); i++) {
 		const json_t *o = json_array_get(list, i);
-		unsigned k = class_named(json_object_get(o, "class"));
+		unsigned k = find_class(json_object_get(o, "class"));
 		if (k == PATH_CLASSES)
 			continue;
 		classes[k] = (struct path_class_energy){json_number_value(json_object_get(o, "bootstrap")),
-							real_or_nan(o, "bootstrapError"),
+							read_real_or_nan(o, "bootstrapError"),
 							json_number_value(json_object_get(o, "chains")),
-							real_or_nan(o, "chainsError"), real_or_nan(o, "t")};
+							read_real_or_nan(o, "chainsError"), read_real_or_nan(o, "t")};
 	}
 }
 
 /* ---- counters of strategies ---- */
 
-static json_t *integer(uint64_t n)
+static json_t *clamped_integer(uint64_t n)
 {
 	return json_integer(n > INT64_MAX ? INT64_MAX : (json_int_t)n);
 }
 
-static json_t *one_strategy(const char *name, const uint64_t counts[STRATEGY_COUNTERS])
+static json_t *counters_to_json(const char *name, const uint64_t counts[STRATEGY_COUNTERS])
 {
-	json_t *o = json_with(json_object(), "name", json_string(name)), *failures = json_object();
+	json_t *o = json_object_with(json_object(), "name", json_string(name)), *failures = json_object();
 	for (int k = 0; k < STRATEGY_COUNTERS; k++) {
-		json_t **at = k < STRATEGY_FAIL_FIRST ? &o : &failures;
-		*at = json_with(*at, strategy_counter_name((enum strategy_counter)k), integer(counts[k]));
+		json_t **destination = k < STRATEGY_FAIL_FIRST ? &o : &failures;
+		*destination = json_object_with(*destination, strategy_counter_name((enum strategy_counter)k),
+						clamped_integer(counts[k]));
 	}
-	return json_with(o, "failures", failures);
+	return json_object_with(o, "failures", failures);
 }
 
 json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n)
@@ -195,21 +199,21 @@ json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n)
 	for (int i = 0; i < count; i++) {
 		char name[PLAN_MUTATIONS_MAX];
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
-		list = json_and(list, one_strategy(name, n->strategy[i]));
+		list = json_array_with(list, counters_to_json(name, n->strategies[i]));
 	}
 	return list;
 }
 
 void strategy_from_json(const json_t *list, struct canvas_counts *n)
 {
-	memset(n->strategy, 0, sizeof n->strategy);
+	memset(n->strategies, 0, sizeof n->strategies);
 	for (size_t i = 0; i < json_array_size(list) && i < BATCH_STRATEGIES; i++) {
 		const json_t *o = json_array_get(list, i), *failures = json_object_get(o, "failures");
 		for (int k = 0; k < STRATEGY_COUNTERS; k++) {
 			json_int_t value =
 				json_integer_value(json_object_get(k < STRATEGY_FAIL_FIRST ? o : failures,
 								   strategy_counter_name((enum strategy_counter)k)));
-			n->strategy[i][k] = value > 0 ? (uint64_t)value : 0;
+			n->strategies[i][k] = value > 0 ? (uint64_t)value : 0;
 		}
 	}
 }

@@ -10,7 +10,7 @@
 
 #include <jansson.h>
 
-json_t *forecast_real(double x);				/* JSON null if x is not finite */
+json_t *json_real_or_null(double x);				/* JSON null if x is not finite */
 json_t *forecast_range_to_json(const struct forecast_range *r); /* {"low":..., "expected":..., "high":...} */
 /* [{"mutations":..., "cpuSeconds":..., "wallSeconds":..., "relMSE":..., "relMSEUpper":..., "degrees":...,
  * "doubtful":false}, ...] */

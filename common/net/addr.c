@@ -29,11 +29,11 @@ int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **
 	return 0;
 }
 
-void net_addrs_take(struct net_addrs *l, const struct addrinfo *found)
+void net_addrs_set(struct net_addrs *l, const struct addrinfo *found)
 {
 	memset(l, 0, sizeof *l);
-	for (; found && l->count < NET_ADDRS_MOST; found = found->ai_next)
-		memcpy(&l->all[l->count++].storage, found->ai_addr, found->ai_addrlen);
+	for (; found && l->count < NET_ADDRS_MAX; found = found->ai_next)
+		memcpy(&l->addrs[l->count++].storage, found->ai_addr, found->ai_addrlen);
 }
 
 int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *e)
@@ -47,24 +47,24 @@ int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *
 	int code = getaddrinfo(host, port, &hints, &found);
 	if (code)
 		return error_set(e, EHOSTUNREACH, "'%s': %s", host_port, gai_strerror(code));
-	net_addrs_take(l, found);
+	net_addrs_set(l, found);
 	freeaddrinfo(found);
 	return 0;
 }
 
-int net_addrs_allow(struct net_addrs *l, const char *host_port, bool safe, struct error *e)
+int net_addrs_filter_allowed(struct net_addrs *l, const char *host_port, bool allow_remote, struct error *e)
 {
-	unsigned kept = 0;
+	unsigned count = 0;
 	int rc = 0;
 	for (unsigned i = 0; i < l->count; i++) {
-		int refused = net_addr_allow(&l->all[i], host_port, safe, e);
+		int refused = net_addr_check_allowed(&l->addrs[i], host_port, allow_remote, e);
 		if (refused)
 			rc = refused;
 		else
-			l->all[kept++] = l->all[i];
+			l->addrs[count++] = l->addrs[i];
 	}
-	l->count = kept;
-	return kept ? 0 : rc;
+	l->count = count;
+	return count ? 0 : rc;
 }
 
 bool net_addr_is_loopback(const struct net_addr *a)
@@ -82,9 +82,9 @@ bool net_addr_is_loopback(const struct net_addr *a)
 	return false;
 }
 
-int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e)
+int net_addr_check_allowed(const struct net_addr *a, const char *host_port, bool allow_remote, struct error *e)
 {
-	if (safe || net_addr_is_loopback(a))
+	if (allow_remote || net_addr_is_loopback(a))
 		return 0;
 	return error_set(
 		e, EPERM,
@@ -103,8 +103,8 @@ unsigned net_addr_port(const struct net_addr *a)
 
 void net_addr_set_port(struct net_addr *a, unsigned port)
 {
-	in_port_t there = htons((uint16_t)port);
-	memcpy((char *)&a->storage + offsetof(struct sockaddr_in, sin_port), &there, sizeof there);
+	in_port_t network_port = htons((uint16_t)port);
+	memcpy((char *)&a->storage + offsetof(struct sockaddr_in, sin_port), &network_port, sizeof network_port);
 }
 
 _Static_assert(offsetof(struct sockaddr_in, sin_port) == offsetof(struct sockaddr_in6, sin6_port), "ports differ");

@@ -16,11 +16,11 @@ struct net_addr {
 	struct sockaddr_storage storage;
 };
 
-enum { NET_ADDRS_MOST = 8 };
+enum { NET_ADDRS_MAX = 8 };
 
 /* The addresses of a name, in the order in which they are to be tried. */
 struct net_addrs {
-	struct net_addr all[NET_ADDRS_MOST]; /* further addresses are ignored */
+	struct net_addr addrs[NET_ADDRS_MAX]; /* further addresses are ignored */
 	unsigned count;
 };
 
@@ -28,16 +28,16 @@ struct net_addrs {
  * -EHOSTUNREACH if the name is unknown. */
 int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *e);
 /* For callers that resolve names asynchronously: net_addr_split returns the parts of HOST:PORT (port points into it),
- * or -EINVAL; net_addrs_take stores the result of getaddrinfo. */
+ * or -EINVAL; net_addrs_set stores the result of getaddrinfo. */
 enum { NET_HOST_MAX = 256 };
 int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **port, struct error *e);
-void net_addrs_take(struct net_addrs *l, const struct addrinfo *found);
-/* Drops the addresses that net_addr_allow does not allow; -EPERM if none is left. */
-int net_addrs_allow(struct net_addrs *l, const char *host_port, bool safe, struct error *e);
+void net_addrs_set(struct net_addrs *l, const struct addrinfo *found);
+/* Drops the addresses that net_addr_check_allowed does not allow; -EPERM if none is left. */
+int net_addrs_filter_allowed(struct net_addrs *l, const char *host_port, bool safe, struct error *e);
 bool net_addr_is_loopback(const struct net_addr *a);
 /* Returns 0 if the address is loopback or `safe` is set (TLS, or --insecure); otherwise -EPERM, with a sentence that
  * says what to do. */
-int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
+int net_addr_check_allowed(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
 unsigned net_addr_port(const struct net_addr *a);
 void net_addr_set_port(struct net_addr *a, unsigned port);
 void net_addr_format(const struct net_addr *a, char *text, size_t size); /* numeric HOST:PORT */

@@ -13,7 +13,7 @@
 #include <time.h>
 
 /* Creates an authority. Returns 0, -EEXIST if the folder has one already, or another -errno. */
-int authority_init(const char *folder, const char *name, double days, struct error *e);
+int authority_create(const char *folder, const char *name, double days, struct error *e);
 
 /* Issues a certificate and writes FOLDER/NAME/; an incomplete folder that an interrupted call has left is completed.
  * Without `renew`, an existing certificate is -EEXIST. With it, certificate and key are replaced if they have this name
@@ -28,9 +28,9 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 int authority_revoke(const char *folder, const char *name_or_serial, unsigned *count, struct error *e);
 
 struct authority_entry {
-	struct tls_peer who;
-	time_t from, until;
-	bool revoked;
+	struct tls_peer subject;
+	time_t valid_from, valid_until;
+	bool is_revoked;
 };
 /* Lists the issued certificates, sorted by name, then by time; *entries is freed with mem_free. Returns -EBADMSG if
  * files in issued/ are damaged; the list then has all others. */

@@ -14,7 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/target.h"
 #include "common/base/text.h"
-#include "common/base/unfinished.h"
+#include "common/base/temp_file.h"
 #include "common/net/jitter.h"
 
 #include <assert.h>
@@ -28,17 +28,17 @@
 enum {
 	HEADER_LIMIT = 1 << 22,
 	PAYLOAD_LIMIT = 1 << 21,
-	WAITING_MAX = 4096,	 /* most messages received before client_wait asks for them */
-	WAITING_BYTES = 1 << 26, /* most bytes of these messages */
+	WAITING_MESSAGES_MAX = 4096, /* most messages received before client_receive asks for them */
+	WAITING_BYTES_MAX = 1 << 26, /* most bytes of these messages */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
-	FETCH_TRIES = 5,
+	FETCH_ATTEMPTS = 5,
 };
-static const double first_fetch_pause = 0.5; /* s before the second attempt; doubles each time; with jitter */
+static const double initial_backoff_seconds = 0.5; /* s before the second attempt; doubles each time; with jitter */
 
-/* A message that client_wait has not returned yet. */
-struct waiting {
-	STAILQ_ENTRY(waiting) next;
+/* A message that client_receive has not returned yet. */
+struct received_message {
+	STAILQ_ENTRY(received_message) next;
 	struct client_message message;
 };
 
@@ -46,21 +46,21 @@ struct client {
 	uv_loop_t loop;
 	uv_timer_t timeout, heartbeat;
 	struct conn *conn; /* NULL: closed */
-	STAILQ_HEAD(, waiting) received;
-	uint64_t patience_ms;	/* how long the current call waits without any message */
-	unsigned waiting_count; /* messages in `received` */
-	size_t waiting_bytes;	/* their memory */
-	struct tls *tls;	/* NULL: plaintext */
-	bool opened, timed_out;
-	int distrust;		      /* what conn_distrust returned for the connection */
-	char name[128], why[256];     /* the program; why the connection was closed */
-	char warning[384], note[256]; /* for client_print_notes */
+	STAILQ_HEAD(, received_message) received;
+	uint64_t wait_timeout_ms; /* how long the current call waits without any message */
+	unsigned waiting_count;	  /* messages in `received` */
+	size_t waiting_bytes;	  /* their memory */
+	struct tls *tls;	  /* NULL: plaintext */
+	bool is_open, timed_out;
+	int certificate_error;		   /* what conn_certificate_error returned for the connection */
+	char name[128], close_reason[256]; /* the program; why the connection was closed */
+	char warning[384], note[256];	   /* for client_print_notes */
 };
 
 static void on_opened(void *user)
 {
 	struct client *cl = user;
-	cl->opened = true;
+	cl->is_open = true;
 }
 
 static void on_timeout(uv_timer_t *t)
@@ -74,17 +74,17 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	struct client *cl = user;
 	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT) { /* the coordinator still works on the answer */
 		if (uv_is_active((uv_handle_t *)&cl->timeout))
-			uv_timer_start(&cl->timeout, on_timeout, cl->patience_ms, 0);
+			uv_timer_start(&cl->timeout, on_timeout, cl->wait_timeout_ms, 0);
 		return;
 	}
-	struct waiting *w = mem_alloc(1, sizeof *w);
+	struct received_message *w = mem_alloc(1, sizeof *w);
 	if (!w) {
 		conn_close(cl->conn, "no memory for a message of the coordinator");
 		return;
 	}
 	w->message.payload.limit = size;
 	cl->waiting_bytes += env->bytes + size;
-	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES ||
+	if (++cl->waiting_count > WAITING_MESSAGES_MAX || cl->waiting_bytes > WAITING_BYTES_MAX ||
 	    !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
 		conn_close(cl->conn, "the coordinator sends more than was requested");
@@ -98,9 +98,9 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 static void on_closed(void *user, const char *why)
 {
 	struct client *cl = user;
-	cl->distrust = conn_distrust(cl->conn);
+	cl->certificate_error = conn_certificate_error(cl->conn);
 	cl->conn = NULL;
-	text_copy(cl->why, sizeof cl->why, why);
+	text_copy(cl->close_reason, sizeof cl->close_reason, why);
 }
 
 static const struct conn_events events = {.opened = on_opened, .message = on_message, .closed = on_closed};
@@ -112,37 +112,37 @@ static void on_heartbeat(uv_timer_t *t)
 		conn_send(cl->conn, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 }
 
-static void start_clock(struct client *cl, double seconds)
+static void start_timeout(struct client *cl, double seconds)
 {
 	cl->timed_out = false;
 	uv_timer_stop(&cl->timeout);
 	uv_update_time(&cl->loop);
-	cl->patience_ms = (uint64_t)(1000 * (seconds >= 0 ? seconds : 0));
+	cl->wait_timeout_ms = (uint64_t)(1000 * (seconds >= 0 ? seconds : 0));
 	if (seconds >= 0)
-		uv_timer_start(&cl->timeout, on_timeout, cl->patience_ms, 0);
+		uv_timer_start(&cl->timeout, on_timeout, cl->wait_timeout_ms, 0);
 }
 
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e)
 {
 	if (cl->conn)
 		conn_send(cl->conn, m, payload, size);
-	start_clock(cl, ANSWER_SECONDS);
-	while (cl->conn && conn_unsent(cl->conn) && !cl->timed_out)
+	start_timeout(cl, ANSWER_SECONDS);
+	while (cl->conn && conn_unsent_bytes(cl->conn) && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	if (!cl->conn && STAILQ_EMPTY(&cl->received))
-		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
+		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->close_reason);
 	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not read what is sent to it") : 0;
 }
 
-int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e)
+int client_receive(struct client *cl, double seconds, struct client_message *m, struct error *e)
 {
 	memset(m, 0, sizeof *m);
-	start_clock(cl, seconds);
+	start_timeout(cl, seconds);
 	while (STAILQ_EMPTY(&cl->received) && cl->conn && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
-	struct waiting *w = STAILQ_FIRST(&cl->received);
+	struct received_message *w = STAILQ_FIRST(&cl->received);
 	if (!w && !cl->conn)
-		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
+		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->close_reason);
 	if (!w)
 		return error_set(e, ETIMEDOUT, "the coordinator did not answer in time");
 	*m = w->message;
@@ -157,14 +157,14 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 	return -EPROTO;
 }
 
-int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want,
+int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase expected,
 		struct client_message *answer, struct error *e)
 {
 	memset(answer, 0, sizeof *answer);
 	int rc = client_send(cl, m, NULL, 0, e);
 	if (!rc)
-		rc = client_wait(cl, ANSWER_SECONDS, answer, e);
-	if (!rc && answer->envelope.message->body_case != want) {
+		rc = client_receive(cl, ANSWER_SECONDS, answer, e);
+	if (!rc && answer->envelope.message->body_case != expected) {
 		client_message_fini(answer);
 		rc = error_set(e, EPROTO, "the coordinator's answer does not match the request");
 	}
@@ -179,18 +179,18 @@ void client_message_fini(struct client_message *m)
 
 static int refuse_coordinator(const struct client *cl, const char *host_port, struct error *e)
 {
-	return error_set(e, -cl->distrust, "%s: %s", host_port, cl->why);
+	return error_set(e, -cl->certificate_error, "%s: %s", host_port, cl->close_reason);
 }
 
-static int say_hello(struct client *cl, const char *host_port, struct error *e)
+static int exchange_hello(struct client *cl, const char *host_port, struct error *e)
 {
 	struct client_message answer;
 	int rc = client_send(
 		cl, ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_CLIENT, .name = cl->name),
 		NULL, 0, e);
 	if (!rc)
-		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
-	if (rc && cl->distrust)
+		rc = client_receive(cl, HELLO_SECONDS, &answer, e);
+	if (rc && cl->certificate_error)
 		return refuse_coordinator(cl, host_port, e);
 	if (rc)
 		return rc == -EPROTO ? rc : error_set(e, ECONNREFUSED, "no coordinator answers at %s", host_port);
@@ -209,8 +209,8 @@ static int say_hello(struct client *cl, const char *host_port, struct error *e)
 	return rc;
 }
 
-/* Tries one of a name's addresses; cl->opened tells whether a connection was opened. */
-static int connect_to(struct client *cl, const struct net_addr *a, struct error *e)
+/* Tries one of a name's addresses; cl->is_open tells whether a connection was opened. */
+static int try_address(struct client *cl, const struct net_addr *a, struct error *e)
 {
 	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls, NULL, NULL};
 	if (cl->conn) /* the attempt with the address before */
@@ -218,8 +218,8 @@ static int connect_to(struct client *cl, const struct net_addr *a, struct error 
 	while (cl->conn)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	int rc = conn_connect(&cl->conn, &cl->loop, a, &config, &events, cl, e);
-	start_clock(cl, HELLO_SECONDS);
-	while (!rc && cl->conn && !cl->opened && !cl->timed_out)
+	start_timeout(cl, HELLO_SECONDS);
+	while (!rc && cl->conn && !cl->is_open && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	return rc;
 }
@@ -230,7 +230,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	struct net_addrs to;
 	int rc = net_addrs_resolve(&to, host_port, e);
 	if (!rc)
-		rc = net_addrs_allow(&to, host_port, insecure || (tls && *tls), e);
+		rc = net_addrs_filter_allowed(&to, host_port, insecure || (tls && *tls), e);
 	if (rc)
 		return rc;
 	struct client *cl = mem_alloc(1, sizeof *cl);
@@ -243,10 +243,10 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		rc = tls_open(&cl->tls, tls, e);
 	if (rc) {
 		mem_free(cl);
-		return rc == -EPERM ? rc : client_local(rc);
+		return rc == -EPERM ? rc : client_local_error(rc);
 	}
 	if (cl->tls)
-		tls_warning(cl->tls, time(NULL), cl->warning, sizeof cl->warning);
+		tls_expiry_warning(cl->tls, time(NULL), cl->warning, sizeof cl->warning);
 	rc = uv_loop_init(&cl->loop);
 	if (rc) {
 		tls_close(cl->tls);
@@ -256,15 +256,15 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	uv_timer_init(&cl->loop, &cl->timeout);
 	uv_timer_init(&cl->loop, &cl->heartbeat);
 	cl->timeout.data = cl->heartbeat.data = cl;
-	for (unsigned i = 0; !rc && i < to.count && !cl->opened && !cl->distrust; i++)
-		rc = connect_to(cl, &to.all[i], e);
-	if (!rc && !cl->opened && cl->distrust)
+	for (unsigned i = 0; !rc && i < to.count && !cl->is_open && !cl->certificate_error; i++)
+		rc = try_address(cl, &to.addrs[i], e);
+	if (!rc && !cl->is_open && cl->certificate_error)
 		rc = refuse_coordinator(cl, host_port, e);
-	else if (!rc && !cl->opened)
+	else if (!rc && !cl->is_open)
 		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
-			       cl->timed_out ? "no answer in time" : cl->why);
+			       cl->timed_out ? "no answer in time" : cl->close_reason);
 	if (!rc)
-		rc = say_hello(cl, host_port, e);
+		rc = exchange_hello(cl, host_port, e);
 	if (rc)
 		client_close(cl);
 	else
@@ -293,7 +293,7 @@ void client_close(struct client *cl)
 	assert(rc == 0);
 	(void)rc;
 	tls_close(cl->tls);
-	for (struct waiting *w; (w = STAILQ_FIRST(&cl->received));) {
+	for (struct received_message *w; (w = STAILQ_FIRST(&cl->received));) {
 		STAILQ_REMOVE_HEAD(&cl->received, next);
 		client_message_fini(&w->message);
 		mem_free(w);
@@ -310,7 +310,7 @@ int client_exit_code(int rc)
 	return rc == -EACCES || rc == -EKEYEXPIRED || rc == -EPROTO ? 6 : 1;
 }
 
-int client_local(int rc)
+int client_local_error(int rc)
 {
 	return rc ? -EIO : 0;
 }
@@ -342,36 +342,36 @@ static int write_all(int fd, const char *path, const unsigned char *bytes, size_
 	return rc ? error_set(e, EIO, "%s: %s", path, strerror(-rc)) : 0;
 }
 
-static int fetch_rest(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
-		      const char *path, struct error *e)
+static int fetch_remaining(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
+			   const char *path, struct error *e)
 {
-	uint64_t size = first->envelope.message->fetch_chunk->size, at = first->payload.size;
+	uint64_t size = first->envelope.message->fetch_chunk->size, offset = first->payload.size;
 	int rc = write_all(fd, path, first->payload.bytes, first->payload.size, e);
-	while (!rc && at < size) {
-		struct client_message more;
-		rc = fetch_chunk(cl, job, what, at, &more, e);
+	while (!rc && offset < size) {
+		struct client_message answer;
+		rc = fetch_chunk(cl, job, what, offset, &answer, e);
 		if (rc)
 			break;
-		if (more.envelope.message->fetch_chunk->size != size)
+		if (answer.envelope.message->fetch_chunk->size != size)
 			rc = error_set(e, EIO, "the file changed while it was fetched");
 		if (!rc)
-			rc = write_all(fd, path, more.payload.bytes, more.payload.size, e);
-		at += more.payload.size;
-		client_message_fini(&more);
+			rc = write_all(fd, path, answer.payload.bytes, answer.payload.size, e);
+		offset += answer.payload.size;
+		client_message_fini(&answer);
 	}
 	return rc;
 }
 
 /* Waits while the loop keeps running, so that heartbeats are still sent. */
-static void wait_connected(struct client *cl, double seconds)
+static void wait_with_heartbeats(struct client *cl, double seconds)
 {
 	uint64_t end = uv_hrtime() + (uint64_t)(1e9 * seconds);
-	start_clock(cl, seconds);
+	start_timeout(cl, seconds);
 	while (cl->conn && !cl->timed_out && uv_hrtime() < end)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 }
 
-static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
+static int restart_fetch(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
 {
 	struct client_message first;
 	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
@@ -379,24 +379,24 @@ static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd,
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
-	rc = fetch_rest(cl, &first, job, what, fd, path, e);
+	rc = fetch_remaining(cl, &first, job, what, fd, path, e);
 	client_message_fini(&first);
 	return rc;
 }
 
 /* Fetches all chunks into a file, and begins again from the first one if the coordinator has dropped the fetch: it may
  * have another image by now. */
-static int fetch_whole(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
-		       const char *path, struct error *e)
+static int fetch_with_retries(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
+			      const char *path, struct error *e)
 {
-	double pause = first_fetch_pause;
-	int rc = fetch_rest(cl, first, job, what, fd, path, e);
-	for (int i = 2; rc == -EAGAIN && i <= FETCH_TRIES; i++, pause *= 2) {
-		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_TRIES);
-		wait_connected(cl, jitter(pause));
-		rc = begin_again(cl, job, what, fd, path, e);
+	double backoff = initial_backoff_seconds;
+	int rc = fetch_remaining(cl, first, job, what, fd, path, e);
+	for (int i = 2; rc == -EAGAIN && i <= FETCH_ATTEMPTS; i++, backoff *= 2) {
+		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_ATTEMPTS);
+		wait_with_heartbeats(cl, jitter(backoff));
+		rc = restart_fetch(cl, job, what, fd, path, e);
 	}
-	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
+	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_ATTEMPTS) : rc;
 }
 
 /* Renames a file, unless there is one of the new name. On file systems without RENAME_NOREPLACE, an empty file reserves
@@ -420,14 +420,14 @@ static int rename_to_new(const char *temporary, const char *path)
 }
 
 /* Renames a temporary file. replace: an existing file of that name is replaced, otherwise it is -EEXIST. */
-static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
+static int rename_temporary(const char *temporary, const char *path, bool replace, struct error *e)
 {
 	if ((replace ? rename(temporary, path) : rename_to_new(temporary, path)) == 0)
 		return 0;
 	return error_set(e, errno == EEXIST ? EEXIST : EIO, "%s: %s", path, strerror(errno));
 }
 
-static int copy(int from, int to, const char *path, struct error *e)
+static int copy_file(int from, int to, const char *path, struct error *e)
 {
 	unsigned char piece[1 << 16];
 	ssize_t n = lseek(from, 0, SEEK_SET);
@@ -439,21 +439,21 @@ static int copy(int from, int to, const char *path, struct error *e)
 
 /* Fetches into a temporary file, then copies it to the target: bytes written to a pipe could not be taken back if the
  * connection broke. */
-static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
-			 const struct target *t, const char *name, struct error *e)
+static int fetch_to_stream(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
+			   const struct target *t, const char *name, struct error *e)
 {
-	FILE *whole = tmpfile();
-	if (!whole)
+	FILE *temporary = tmpfile();
+	if (!temporary)
 		return error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
-	int rc = fetch_whole(cl, first, job, what, fileno(whole), "a temporary file", e);
+	int rc = fetch_with_retries(cl, first, job, what, fileno(temporary), "a temporary file", e);
 	int fd = rc ? -1 : target_open(t, e);
 	if (!rc && fd < 0)
-		rc = client_local(fd);
+		rc = client_local_error(fd);
 	if (!rc)
-		rc = copy(fileno(whole), fd, name, e);
+		rc = copy_file(fileno(temporary), fd, name, e);
 	if (fd >= 0 && close(fd) && !rc)
 		rc = error_set(e, EIO, "%s: %s", name, strerror(errno));
-	fclose(whole);
+	fclose(temporary);
 	return rc;
 }
 
@@ -466,15 +466,16 @@ int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e)
 	if (rc)
 		return rc;
 	const Farm__FetchChunk *c = first.envelope.message->fetch_chunk;
-	FILE *whole = first.payload.size < c->size ? tmpfile() : NULL;
+	FILE *temporary = first.payload.size < c->size ? tmpfile() : NULL;
 	if (first.payload.size == c->size) {
 		rc = write_all(fd, name, first.payload.bytes, first.payload.size, e);
-	} else if (!whole) {
+	} else if (!temporary) {
 		rc = error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
 	} else {
-		rc = fetch_whole(cl, &first, job, FARM__WHAT__WHAT_LOG, fileno(whole), "a temporary file", e);
-		rc = rc ? rc : copy(fileno(whole), fd, name, e);
-		fclose(whole);
+		rc = fetch_with_retries(cl, &first, job, FARM__WHAT__WHAT_LOG, fileno(temporary), "a temporary file",
+					e);
+		rc = rc ? rc : copy_file(fileno(temporary), fd, name, e);
+		fclose(temporary);
 	}
 	client_message_fini(&first);
 	return rc;
@@ -483,32 +484,32 @@ int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e)
 static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path,
 		      bool replace, struct error *e)
 {
-	char temporary[TARGET_PATH + 8];
+	char temporary[TARGET_PATH_MAX + 8];
 	struct target t;
-	int found = target_find(&t, path, e);
+	int found = target_resolve(&t, path, e);
 	if (found)
 		return found;
-	if (t.through)
-		return fetch_through(cl, first, job, what, &t, target_shown(path), e);
+	if (t.write_directly)
+		return fetch_to_stream(cl, first, job, what, &t, target_display_name(path), e);
 	path = t.path;
 	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
-	int fd = unfinished_begin(temporary, e);
+	int fd = temp_file_begin(temporary, e);
 	if (fd < 0)
 		return error_prefix(e, -EIO, "%s: cannot make a file there", path);
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = fetch_whole(cl, first, job, what, fd, path, e);
+	int rc = fetch_with_retries(cl, first, job, what, fd, path, e);
 	if (!rc && (fchmod(fd, 0666 & ~mask) || fsync(fd)))
 		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (close(fd) && !rc)
 		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (!rc)
-		rc = give_name(temporary, path, replace, e);
+		rc = rename_temporary(temporary, path, replace, e);
 	if (rc)
 		unlink(temporary);
-	unfinished_end();
+	temp_file_end();
 	return rc;
 }
 
@@ -523,7 +524,7 @@ int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *p
 	return rc;
 }
 
-static const char *last_part(const char *path)
+static const char *base_name(const char *path)
 {
 	const char *slash = strrchr(path, '/');
 	return slash ? slash + 1 : path;
@@ -531,45 +532,46 @@ static const char *last_part(const char *path)
 
 int client_preview_name(const char *path, char *name, size_t size, struct error *e)
 {
-	const char *last = last_part(path), *dot = strrchr(last, '.');
+	const char *last = base_name(path), *dot = strrchr(last, '.');
 	int stem = (int)((dot && dot != last ? dot : last + strlen(last)) - path);
 	int n = snprintf(name, size, "%.*s.preview%s", stem, path, path + stem);
 	return n < 0 || (size_t)n >= size ? error_set(e, ENAMETOOLONG, "%s: the name is too long", path) : 0;
 }
 
-int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *kept, struct error *e)
+int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *is_renamed, struct error *e)
 {
-	char other[TARGET_PATH];
+	char preview_path[TARGET_PATH_MAX];
 	struct target t;
 	struct client_message first;
-	int rc = target_find(&t, path, e);
-	*kept = false;
+	int rc = target_resolve(&t, path, e);
+	*is_renamed = false;
 	if (!rc)
 		rc = fetch_chunk(cl, job, FARM__WHAT__WHAT_PREVIEW, 0, &first, e);
 	if (rc)
 		return rc;
-	const char *final = last_part(first.envelope.message->fetch_chunk->output);
-	*kept = !t.through && *final && (strcmp(last_part(path), final) == 0 || strcmp(last_part(t.path), final) == 0);
-	if (*kept)
-		rc = client_preview_name(path, other, sizeof other, e);
-	if (!rc && *kept)
-		rc = target_find(&t, other, e);
-	if (!rc && *kept && strcmp(last_part(t.path), final) == 0)
-		rc = error_set(e, EEXIST, "%s: leads to %s, which is for the final image", other, t.path);
+	const char *final = base_name(first.envelope.message->fetch_chunk->output);
+	*is_renamed = !t.write_directly && *final &&
+		      (strcmp(base_name(path), final) == 0 || strcmp(base_name(t.path), final) == 0);
+	if (*is_renamed)
+		rc = client_preview_name(path, preview_path, sizeof preview_path, e);
+	if (!rc && *is_renamed)
+		rc = target_resolve(&t, preview_path, e);
+	if (!rc && *is_renamed && strcmp(base_name(t.path), final) == 0)
+		rc = error_set(e, EEXIST, "%s: leads to %s, which is for the final image", preview_path, t.path);
 	if (!rc)
-		rc = fetch_file(cl, &first, job, FARM__WHAT__WHAT_PREVIEW, *kept ? other : path, true, e);
+		rc = fetch_file(cl, &first, job, FARM__WHAT__WHAT_PREVIEW, *is_renamed ? preview_path : path, true, e);
 	client_message_fini(&first);
 	return rc;
 }
 
 /* Turns the name of a job's image, which somebody else chose, into a safe file name: without folders, not hidden, and
  * not like an option. A preview gets a name of its own. */
-static int take_name(const char *output, bool preview, char name[CLIENT_NAME_BYTES], struct error *e)
+static int choose_name(const char *output, bool preview, char name[CLIENT_NAME_BYTES], struct error *e)
 {
 	struct stat st;
-	const char *last = last_part(output);
+	const char *last = base_name(output);
 	int n = 0;
-	if (envelope_text_ok(last, CLIENT_NAME_BYTES - 1) && *last && *last != '.' && *last != '-')
+	if (envelope_text_is_valid(last, CLIENT_NAME_BYTES - 1) && *last && *last != '.' && *last != '-')
 		n = preview ? !client_preview_name(last, name, CLIENT_NAME_BYTES, e)
 			    : snprintf(name, CLIENT_NAME_BYTES, "%s", last);
 	if (n <= 0 || n >= CLIENT_NAME_BYTES)
@@ -577,13 +579,14 @@ static int take_name(const char *output, bool preview, char name[CLIENT_NAME_BYT
 	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s exists: -o FILE replaces it", name) : 0;
 }
 
-int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e)
+int client_fetch_to_current_folder(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES],
+				   struct error *e)
 {
 	struct client_message first;
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
-	rc = take_name(first.envelope.message->fetch_chunk->output, what == FARM__WHAT__WHAT_PREVIEW, name, e);
+	rc = choose_name(first.envelope.message->fetch_chunk->output, what == FARM__WHAT__WHAT_PREVIEW, name, e);
 	if (!rc)
 		rc = fetch_file(cl, &first, job, what, name, false, e);
 	client_message_fini(&first);

@@ -34,7 +34,7 @@ void client_print_notes(const struct client *cl, const char *program);
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);
 /* Waits for the next message. Returns -ETIMEDOUT after `seconds` without any message, heartbeats included (negative:
  * waits for ever), -ECONNRESET if the connection is lost, -EPROTO if the coordinator reports a fault. */
-int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e);
+int client_receive(struct client *cl, double seconds, struct client_message *m, struct error *e);
 /* Sends a message and waits for an answer of the kind `want`; -EPROTO for any other answer. */
 int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want,
 		struct client_message *answer, struct error *e);
@@ -52,7 +52,8 @@ int client_preview_name(const char *path, char *name, size_t size, struct error 
 /* Like client_fetch, into the current folder under the last part of the name of the job's image, which is returned; a
  * preview has `.preview` before the extension. That name was chosen by whoever submitted the job, so existing files are
  * not replaced: -EEXIST if one of that name exists, or if the name is unsafe (hidden, or like an option). */
-int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
+int client_fetch_to_current_folder(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES],
+				   struct error *e);
 /* Writes a job's log to a descriptor, once all of it has arrived. */
 int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e);
 
@@ -61,6 +62,6 @@ int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e);
 int client_exit_code(int rc);
 /* Turns an error of a local file into -EIO, so that client_exit_code does not take it for an error of the farm. 0 stays
  * 0. */
-int client_local(int rc);
+int client_local_error(int rc);
 
 #endif

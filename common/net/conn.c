@@ -23,52 +23,53 @@
 
 enum {
 	READ_BYTES = 1 << 16,
-	FRAMES_AT_ONCE = 16, /* frames of a connection that are handled before other connections are read */
+	FRAMES_PER_ITERATION = 16, /* frames of a connection that are handled before other connections are read */
 	TICK_MS = 250,
-	TICK_MS_MOST = 1000,	    /* longest tick, if the peer may be silent for long */
-	LINGER_MS = 5000,	    /* time for sending the rest */
-	REFUSED_MS = 1000,	    /* time for a refused peer to read the reason */
-	HANDSHAKE_MS = 10000,	    /* time for the TLS handshake */
-	BYTES_PER_SECOND = 1 << 16, /* least speed of a frame */
-	SHORT = 1 << 16,	    /* longest frame that does not need the pool */
+	TICK_MS_MAX = 1000,		/* longest tick, if the peer may be silent for long */
+	LINGER_MS = 5000,		/* time for sending the rest */
+	REFUSAL_LINGER_MS = 1000,	/* time for a refused peer to read the reason */
+	HANDSHAKE_MS = 10000,		/* time for the TLS handshake */
+	BYTES_PER_SECOND_MIN = 1 << 16, /* least speed of a frame */
+	SHORT_FRAME_MAX = 1 << 16,	/* longest frame that does not need the pool */
 };
 
 struct conn {
 	uv_tcp_t tcp;
 	uv_timer_t timer;
-	uv_idle_t later; /* not a timer: one of 0 ms would run again and again before anything else */
-	uv_connect_t connecting;
+	uv_idle_t resume_handle; /* not a timer: one of 0 ms would run again and again before anything else */
+	uv_connect_t connect_request;
 	struct conn_config config;
 	const struct conn_events *events;
 	void *user;
 	struct frame_reader reader;
-	struct tls_link *link;	  /* NULL: plaintext */
-	struct receive_turn turn; /* the place in the pool of the frame being received */
-	struct send_queue out;	  /* its state is the connection's state */
-	uint64_t clock, ticked;	  /* ms of the connection's clock and of the loop's clock at the last tick */
-	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock */
-	uint64_t checked;			/* ms of the loop's clock: the last check of the peer's certificate */
-	uint64_t linger_until;			/* ms of the loop's clock; 0: not closing */
-	uint64_t paced_at; /* ms of the connection's clock: when the frame last had enough new bytes */
-	size_t paced;	   /* bytes of its payload at that time */
+	struct tls_link *link;	      /* NULL: plaintext */
+	struct receive_turn turn;     /* the place in the pool of the frame being received */
+	struct send_queue send_queue; /* its state is the connection's state */
+	uint64_t clock_ms, tick_ms;   /* ms of the connection's clock and of the loop's clock at the last tick */
+	uint64_t begin_ms, last_read_ms, frame_begin_ms; /* ms of the connection's clock */
+	uint64_t certificate_check_ms; /* ms of the loop's clock: the last check of the peer's certificate */
+	uint64_t linger_until_ms;      /* ms of the loop's clock; 0: not closing */
+	uint64_t paced_ms;	       /* ms of the connection's clock: when the frame last had enough new bytes */
+	size_t paced_bytes;	       /* bytes of its payload at that time */
 	int open_handles;
-	struct buf rest; /* plaintext that waits for the next iteration of the loop, from rest_at on */
-	size_t rest_at;
-	bool goes_on;			 /* there is such a rest; the socket is not read until it is used up */
-	unsigned frames;		 /* frames delivered since other connections could be read */
-	bool accepted, sniffed, garbled; /* by a listener; the first bytes have been looked at; see conn_garbled */
-	int distrust;			 /* what conn_distrust returns */
-	char why[256];
+	struct buf backlog; /* plaintext that waits for the next iteration of the loop, from backlog_offset on */
+	size_t backlog_offset;
+	bool has_backlog;     /* there is such a rest; the socket is not read until it is used up */
+	unsigned frame_count; /* frames delivered since other connections could be read */
+	bool is_accepted, first_byte_checked,
+		had_bad_checksum; /* by a listener; the first bytes have been looked at; see conn_had_bad_checksum */
+	int certificate_error;	  /* what conn_certificate_error returns */
+	char close_reason[256];
 };
 
 /* Receives bytes read or decrypted. One buffer suffices: libuv calls back with it before it reads more, and nothing is
  * read inside a callback. */
-static _Thread_local char chunk[READ_BYTES];
+static _Thread_local char read_buffer[READ_BYTES];
 
-static void give_back(struct conn *c)
+static void release_turn(struct conn *c)
 {
-	if (c->turn.has || c->turn.waits)
-		receive_pool_give(c->config.pool, &c->turn);
+	if (c->turn.is_granted || c->turn.is_waiting)
+		receive_pool_release(c->config.receive_pool, &c->turn);
 }
 
 static void on_handle_closed(uv_handle_t *h)
@@ -76,43 +77,43 @@ static void on_handle_closed(uv_handle_t *h)
 	struct conn *c = h->data;
 	if (--c->open_handles)
 		return;
-	c->events->closed(c->user, c->why);
+	c->events->closed(c->user, c->close_reason);
 	frame_reader_fini(&c->reader);
-	buf_fini(&c->rest);
-	give_back(c);
+	buf_fini(&c->backlog);
+	release_turn(c);
 	tls_link_free(c->link);
-	send_queue_fini(&c->out);
+	send_queue_fini(&c->send_queue);
 	mem_free(c);
 }
 
 void conn_close(struct conn *c, const char *why)
 {
-	if (c->out.state == SEND_CLOSED)
+	if (c->send_queue.state == SEND_CLOSED)
 		return;
-	send_queue_close(&c->out, SEND_CLOSED);
-	if (!c->linger_until)
-		text_copy(c->why, sizeof c->why, why);
+	send_queue_close(&c->send_queue, SEND_CLOSED);
+	if (!c->linger_until_ms)
+		text_copy(c->close_reason, sizeof c->close_reason, why);
 	uv_close((uv_handle_t *)&c->timer, on_handle_closed);
-	uv_close((uv_handle_t *)&c->later, on_handle_closed);
+	uv_close((uv_handle_t *)&c->resume_handle, on_handle_closed);
 	uv_close((uv_handle_t *)&c->tcp, on_handle_closed);
 }
 
-/* ---- the connection's clock ---- */
+/* ---- the connection's clock_ms ---- */
 
 /* Returns the connection's clock, which stands still while the loop is busy: bytes that arrive then have not been read
  * yet, for which no peer is to blame. */
-static uint64_t clock_of(const struct conn *c)
+static uint64_t connection_ms(const struct conn *c)
 {
-	uint64_t since = uv_now(c->tcp.loop) - c->ticked, most = uv_timer_get_repeat(&c->timer);
-	return c->clock + (since < most ? since : most);
+	uint64_t since = uv_now(c->tcp.loop) - c->tick_ms, max_ms = uv_timer_get_repeat(&c->timer);
+	return c->clock_ms + (since < max_ms ? since : max_ms);
 }
 
-static void tick_every(struct conn *c, uint64_t ms)
+static void set_tick_interval(struct conn *c, uint64_t ms)
 {
-	if (c->out.state == SEND_CLOSED)
+	if (c->send_queue.state == SEND_CLOSED)
 		return;
-	c->clock = clock_of(c);
-	c->ticked = uv_now(c->tcp.loop);
+	c->clock_ms = connection_ms(c);
+	c->tick_ms = uv_now(c->tcp.loop);
 	uv_timer_set_repeat(&c->timer, ms);
 	uv_timer_again(&c->timer);
 }
@@ -120,27 +121,28 @@ static void tick_every(struct conn *c, uint64_t ms)
 /* ---- reading ---- */
 
 /* libuv reads a connection up to 32 times, while there is something to read, before it reads any other; without a
- * buffer it goes on to the next one. This function refuses a buffer after FRAMES_AT_ONCE frames, so that hundreds of
- * busy connections do not keep others waiting; the rest of a read with more short frames waits likewise (on_later). It
- * also refuses while closed connections hold memory that the loop has yet to free: more requests need memory for
+ * buffer it goes on to the next one. This function refuses a buffer after FRAMES_PER_ITERATION frames, so that hundreds
+ * of busy connections do not keep others waiting; the rest of a read with more short frames waits likewise (on_resume).
+ * It also refuses while closed connections hold memory that the loop has yet to free: more requests need memory for
  * answers. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
 	struct conn *c = h->data;
-	bool full = c->frames >= FRAMES_AT_ONCE, pause = full || (c->config.sending && c->config.sending->leaving);
-	if (full)
-		c->frames = 0;
-	*out = uv_buf_init(chunk, pause ? 0 : sizeof chunk);
+	bool turn_is_over = c->frame_count >= FRAMES_PER_ITERATION,
+	     pause = turn_is_over || (c->config.send_pool && c->config.send_pool->closing_bytes);
+	if (turn_is_over)
+		c->frame_count = 0;
+	*out = uv_buf_init(read_buffer, pause ? 0 : sizeof read_buffer);
 }
 
-static void deliver_frames(struct conn *c)
+static void deliver_frame(struct conn *c)
 {
 	struct envelope env;
 	struct error e;
 	int rc = envelope_unpack(&env, c->reader.header.bytes, c->reader.header.size, &e);
 	if (rc) {
-		c->garbled = rc == -EILSEQ;
+		c->had_bad_checksum = rc == -EILSEQ;
 		conn_close(c, e.text);
 		return;
 	}
@@ -151,9 +153,9 @@ static void deliver_frames(struct conn *c)
 static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b);
 
 /* Reads from the socket, unless bytes read before come first, or the frame waits for the pool. */
-static void read_socket(struct conn *c)
+static void resume_reading(struct conn *c)
 {
-	if (c->goes_on || c->turn.waits || c->out.state == SEND_CLOSED)
+	if (c->has_backlog || c->turn.is_waiting || c->send_queue.state == SEND_CLOSED)
 		return;
 	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
 	if (rc)
@@ -161,32 +163,32 @@ static void read_socket(struct conn *c)
 }
 
 /* Called when the pool has room for the frame. */
-static void read_on(struct receive_turn *t)
+static void on_turn_granted(struct receive_turn *t)
 {
 	struct conn *c = (struct conn *)((char *)t - offsetof(struct conn, turn));
-	c->last_read = c->frame_begun = c->paced_at = clock_of(c);
-	read_socket(c);
+	c->last_read_ms = c->frame_begin_ms = c->paced_ms = connection_ms(c);
+	resume_reading(c);
 }
 
 /* Returns a hash of the name in the peer's certificate or, without one, of its address: the owner in the pool. */
-static uint64_t owner_of(const struct conn *c)
+static uint64_t pool_owner(const struct conn *c)
 {
 	char address[64];
 	const struct tls_peer *who = conn_peer(c);
 	conn_peer_name(c, address, sizeof address);
 	const char *name = who ? who->name : address, *port = who ? NULL : strrchr(address, ':');
-	return fnv_add(FNV_BEGIN, name, port ? (size_t)(port - name) : strlen(name));
+	return fnv_add(FNV_OFFSET_BASIS, name, port ? (size_t)(port - name) : strlen(name));
 }
 
 /* Takes the size of a frame, of which a part has arrived, from the pool. */
-static void take_turn(struct conn *c)
+static void reserve_receive_pool(struct conn *c)
 {
-	uint64_t size = frame_reader_size(&c->reader);
-	if (!c->config.pool || size <= SHORT || c->turn.has || c->turn.waits)
+	uint64_t size = frame_reader_frame_size(&c->reader);
+	if (!c->config.receive_pool || size <= SHORT_FRAME_MAX || c->turn.is_granted || c->turn.is_waiting)
 		return;
-	c->turn.go = read_on;
-	c->turn.owner = owner_of(c);
-	if (!receive_pool_take(c->config.pool, &c->turn, size))
+	c->turn.on_granted = on_turn_granted;
+	c->turn.owner = pool_owner(c);
+	if (!receive_pool_acquire(c->config.receive_pool, &c->turn, size))
 		uv_read_stop((uv_stream_t *)&c->tcp);
 }
 
@@ -197,161 +199,162 @@ struct buf conn_take_payload(struct conn *c)
 	return payload;
 }
 
-static void begin_frame(struct conn *c)
+static void reset_pace(struct conn *c)
 {
-	c->frame_begun = c->paced_at = c->last_read;
-	c->paced = 0;
+	c->frame_begin_ms = c->paced_ms = c->last_read_ms;
+	c->paced_bytes = 0;
 }
 
-static void keep_pace(struct conn *c)
+static void update_pace(struct conn *c)
 {
 	size_t size = c->reader.payload.size;
-	if ((double)(size - c->paced) < c->config.stall_seconds * BYTES_PER_SECOND)
+	if ((double)(size - c->paced_bytes) < c->config.stall_seconds * BYTES_PER_SECOND_MIN)
 		return;
-	c->paced = size;
-	c->paced_at = c->last_read;
+	c->paced_bytes = size;
+	c->paced_ms = c->last_read_ms;
 }
 
-static void on_later(uv_idle_t *h);
+static void on_resume(uv_idle_t *h);
 
 /* Handles some frames in plaintext. Returns the number of bytes used. */
-static size_t take_frames(struct conn *c, const unsigned char *bytes, size_t size)
+static size_t handle_frames(struct conn *c, const unsigned char *bytes, size_t size)
 {
-	size_t at = 0;
-	c->last_read = clock_of(c);
-	while (at < size && c->out.state == SEND_OPEN && c->frames < FRAMES_AT_ONCE) {
+	size_t offset = 0;
+	c->last_read_ms = connection_ms(c);
+	while (offset < size && c->send_queue.state == SEND_OPEN && c->frame_count < FRAMES_PER_ITERATION) {
 		struct error e;
 		size_t used;
 		bool was_midway = frame_reader_is_midway(&c->reader);
-		int rc = frame_reader_take(&c->reader, bytes + at, size - at, &used, &e);
-		at += used;
+		int rc = frame_reader_feed(&c->reader, bytes + offset, size - offset, &used, &e);
+		offset += used;
 		if (!was_midway)
-			begin_frame(c);
+			reset_pace(c);
 		if (rc < 0) {
-			c->garbled = rc == -EILSEQ;
+			c->had_bad_checksum = rc == -EILSEQ;
 			conn_close(c, e.text);
 		} else if (rc) {
-			c->frames++;
-			deliver_frames(c);
-			frame_reader_drop(
+			c->frame_count++;
+			deliver_frame(c);
+			frame_reader_reset(
 				&c->reader); /* now: the next frame, which would do it, may be long in coming */
-			give_back(c);
+			release_turn(c);
 		}
 	}
-	return at;
+	return offset;
 }
 
 /* All bytes that were read have been used. */
-static void wait_for_more(struct conn *c)
+static void await_more(struct conn *c)
 {
-	if (!frame_reader_is_midway(&c->reader) || c->out.state != SEND_OPEN)
+	if (!frame_reader_is_midway(&c->reader) || c->send_queue.state != SEND_OPEN)
 		return;
-	take_turn(c);
-	keep_pace(c);
+	reserve_receive_pool(c);
+	update_pace(c);
 	if (c->events->partial)
 		c->events->partial(c->user);
 }
 
-/* Handles plaintext; frames beyond FRAMES_AT_ONCE are kept for the next iteration of the loop. */
-static void receive(struct conn *c, const unsigned char *bytes, size_t size)
+/* Handles plaintext; frames beyond FRAMES_PER_ITERATION are kept for the next iteration of the loop. */
+static void handle_plaintext(struct conn *c, const unsigned char *bytes, size_t size)
 {
-	size_t at = take_frames(c, bytes, size);
-	c->goes_on = at < size && c->out.state == SEND_OPEN;
-	if (!c->goes_on) {
-		wait_for_more(c);
+	size_t offset = handle_frames(c, bytes, size);
+	c->has_backlog = offset < size && c->send_queue.state == SEND_OPEN;
+	if (!c->has_backlog) {
+		await_more(c);
 		return;
 	}
-	c->rest.limit = READ_BYTES;
-	if (!buf_append(&c->rest, bytes + at, size - at)) {
+	c->backlog.limit = READ_BYTES;
+	if (!buf_append(&c->backlog, bytes + offset, size - offset)) {
 		conn_close(c, "no memory for what it sent");
 		return;
 	}
 	uv_read_stop((uv_stream_t *)&c->tcp);
-	uv_idle_start(&c->later, on_later);
+	uv_idle_start(&c->resume_handle, on_resume);
 }
 
 /* Closes the connection, but gives the peer time to read an alert with the reason: the kernel would discard the alert
  * if data arrived after the socket was closed. */
-static void refuse(struct conn *c, int rc, const char *why)
+static void refuse_peer(struct conn *c, int rc, const char *why)
 {
-	c->distrust = rc == -EACCES || rc == -EKEYEXPIRED ? rc : 0;
-	if (!c->linger_until)
-		text_copy(c->why, sizeof c->why, why);
-	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
-	tick_every(c, TICK_MS);
-	send_queue_close(&c->out, SEND_REFUSED);
-	if (!c->out.in_flight)
+	c->certificate_error = rc == -EACCES || rc == -EKEYEXPIRED ? rc : 0;
+	if (!c->linger_until_ms)
+		text_copy(c->close_reason, sizeof c->close_reason, why);
+	c->linger_until_ms = uv_now(c->tcp.loop) + REFUSAL_LINGER_MS;
+	set_tick_interval(c, TICK_MS);
+	send_queue_close(&c->send_queue, SEND_REFUSED);
+	if (!c->send_queue.in_flight_bytes)
 		conn_close(c, why);
 }
 
 /* Decrypts and handles the bytes in the link, until frames have to wait. */
-static void decrypt(struct conn *c)
+static void handle_decrypted(struct conn *c)
 {
 	struct error e;
 	ssize_t n = 1;
-	while (n > 0 && c->out.state != SEND_CLOSED && !c->goes_on) {
+	while (n > 0 && c->send_queue.state != SEND_CLOSED && !c->has_backlog) {
 		bool was_open = tls_link_is_open(c->link);
-		n = tls_link_read(c->link, chunk, sizeof chunk, &e);
-		send_queue_flush(&c->out);
-		if (!was_open && tls_link_is_open(c->link) && c->out.state != SEND_CLOSED) {
-			c->last_read = clock_of(c);
-			c->checked = uv_now(c->tcp.loop);
-			if (c->events->opened && !c->accepted)
+		n = tls_link_read(c->link, read_buffer, sizeof read_buffer, &e);
+		send_queue_flush(&c->send_queue);
+		if (!was_open && tls_link_is_open(c->link) && c->send_queue.state != SEND_CLOSED) {
+			c->last_read_ms = connection_ms(c);
+			c->certificate_check_ms = uv_now(c->tcp.loop);
+			if (c->events->opened && !c->is_accepted)
 				c->events->opened(c->user);
-			send_queue_opened(&c->out);
+			send_queue_start(&c->send_queue);
 		}
 		if (n > 0)
-			receive(c, (const unsigned char *)chunk, (size_t)n);
+			handle_plaintext(c, (const unsigned char *)read_buffer, (size_t)n);
 	}
-	if (n < 0 && c->out.state != SEND_CLOSED) {
-		send_queue_flush(&c->out);
-		refuse(c, (int)n, e.text);
+	if (n < 0 && c->send_queue.state != SEND_CLOSED) {
+		send_queue_flush(&c->send_queue);
+		refuse_peer(c, (int)n, e.text);
 	}
 }
 
 /* Handles encrypted bytes; without any, starts the handshake. */
-static void take_encrypted(struct conn *c, const void *bytes, size_t size)
+static void handle_encrypted(struct conn *c, const void *bytes, size_t size)
 {
 	struct error e;
-	int rc = tls_link_take(c->link, bytes, size, &e);
+	int rc = tls_link_receive(c->link, bytes, size, &e);
 	if (!rc) {
-		decrypt(c);
-	} else if (c->out.state != SEND_CLOSED) {
-		send_queue_flush(&c->out);
-		refuse(c, rc, e.text);
+		handle_decrypted(c);
+	} else if (c->send_queue.state != SEND_CLOSED) {
+		send_queue_flush(&c->send_queue);
+		refuse_peer(c, rc, e.text);
 	}
 }
 
 /* Called in the next iteration of the loop: handles the rest. */
-static void on_later(uv_idle_t *h)
+static void on_resume(uv_idle_t *h)
 {
 	struct conn *c = h->data;
-	if (c->config.sending && c->config.sending->leaving)
+	if (c->config.send_pool && c->config.send_pool->closing_bytes)
 		return;
-	c->frames = 0;
-	c->rest_at += take_frames(c, c->rest.bytes + c->rest_at, c->rest.size - c->rest_at);
-	c->goes_on = c->out.state == SEND_OPEN && c->rest_at < c->rest.size;
-	if (c->goes_on)
+	c->frame_count = 0;
+	c->backlog_offset +=
+		handle_frames(c, c->backlog.bytes + c->backlog_offset, c->backlog.size - c->backlog_offset);
+	c->has_backlog = c->send_queue.state == SEND_OPEN && c->backlog_offset < c->backlog.size;
+	if (c->has_backlog)
 		return;
 	uv_idle_stop(h);
-	buf_fini(&c->rest);
-	c->rest_at = 0;
-	wait_for_more(c);
-	if (c->link && c->out.state < SEND_REFUSED)
-		decrypt(c);
-	read_socket(c);
+	buf_fini(&c->backlog);
+	c->backlog_offset = 0;
+	await_more(c);
+	if (c->link && c->send_queue.state < SEND_REFUSED)
+		handle_decrypted(c);
+	resume_reading(c);
 }
 
 /* Recognises a peer that uses TLS by its first byte, since no frame begins like a TLS record, and refuses it. */
-static bool is_tls(struct conn *c, const char *bytes, size_t size)
+static bool refuse_if_tls(struct conn *c, const char *bytes, size_t size)
 {
-	bool first = !c->sniffed && size;
-	c->sniffed = true;
+	bool first = !c->first_byte_checked && size;
+	c->first_byte_checked = true;
 	if (!first || !tls_is_first_byte((unsigned char)*bytes))
 		return false;
-	if (c->accepted)
-		send_queue_raw(&c->out, tls_none_here, sizeof tls_none_here);
-	refuse(c, -EACCES, "the peer speaks TLS, and this side does not: both need --tls DIR, or neither");
+	if (c->is_accepted)
+		send_queue_send_raw(&c->send_queue, tls_mismatch_alert, sizeof tls_mismatch_alert);
+	refuse_peer(c, -EACCES, "the peer speaks TLS, and this side does not: both need --tls DIR, or neither");
 	return true;
 }
 
@@ -365,12 +368,12 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 		conn_close(c, count != UV_EOF ? uv_strerror((int)count)
 			      : midway	      ? "the peer hung up during the TLS handshake"
 					      : "the peer hung up");
-	} else if (c->out.state >= SEND_REFUSED) {
+	} else if (c->send_queue.state >= SEND_REFUSED) {
 		return;
 	} else if (c->link) {
-		take_encrypted(c, b->base, (size_t)count);
-	} else if (!is_tls(c, b->base, (size_t)count)) {
-		receive(c, (const unsigned char *)b->base, (size_t)count);
+		handle_encrypted(c, b->base, (size_t)count);
+	} else if (!refuse_if_tls(c, b->base, (size_t)count)) {
+		handle_plaintext(c, (const unsigned char *)b->base, (size_t)count);
 	}
 }
 
@@ -378,32 +381,32 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 
 static bool has_stalled(const struct conn *c)
 {
-	double allowed = c->config.stall_seconds + (double)c->reader.payload_size / BYTES_PER_SECOND;
-	bool awaited = c->turn.has && c->config.pool->first;
+	double allowed = c->config.stall_seconds + (double)c->reader.payload_size / BYTES_PER_SECOND_MIN;
+	bool pool_is_contended = c->turn.is_granted && c->config.receive_pool->queue;
 	return frame_reader_is_midway(&c->reader) &&
-	       ((double)(c->clock - c->frame_begun) > 1000 * allowed ||
-		(awaited && (double)(c->clock - c->paced_at) > 1000 * c->config.stall_seconds));
+	       ((double)(c->clock_ms - c->frame_begin_ms) > 1000 * allowed ||
+		(pool_is_contended && (double)(c->clock_ms - c->paced_ms) > 1000 * c->config.stall_seconds));
 }
 
 /* Checks the peer's certificate again: it may have expired or been revoked. */
-static void check_again(struct conn *c, uint64_t now)
+static void recheck_certificate(struct conn *c, uint64_t now)
 {
 	struct error e;
 	if (!c->link || !tls_link_is_open(c->link) ||
-	    (double)(now - c->checked) < 1000 * tls_recheck_seconds(c->config.tls))
+	    (double)(now - c->certificate_check_ms) < 1000 * tls_recheck_seconds(c->config.tls))
 		return;
-	c->checked = now;
+	c->certificate_check_ms = now;
 	int rc = tls_link_recheck(c->link, &e);
-	c->distrust = rc ? rc : c->distrust;
+	c->certificate_error = rc ? rc : c->certificate_error;
 	if (rc)
 		conn_close(c, e.text);
 }
 
 /* While the frame waits for the pool, the peer cannot send and is not to blame. Tells the owner, who may inform it. */
-static void wait_on(struct conn *c)
+static void excuse_waiting_peer(struct conn *c)
 {
-	c->last_read = c->frame_begun = c->clock;
-	if (c->events->partial && c->out.state == SEND_OPEN)
+	c->last_read_ms = c->frame_begin_ms = c->clock_ms;
+	if (c->events->partial && c->send_queue.state == SEND_OPEN)
 		c->events->partial(c->user);
 }
 
@@ -411,18 +414,19 @@ static void on_tick(uv_timer_t *t)
 {
 	struct conn *c = t->data;
 	uint64_t now = uv_now(t->loop);
-	c->clock = clock_of(c);
-	c->ticked = now;
-	check_again(c, now);
-	if (c->turn.waits)
-		wait_on(c);
-	if (c->linger_until && now >= c->linger_until)
-		conn_close(c, c->why);
-	else if (c->link && !tls_link_is_open(c->link) && c->clock - c->begun > HANDSHAKE_MS)
+	c->clock_ms = connection_ms(c);
+	c->tick_ms = now;
+	recheck_certificate(c, now);
+	if (c->turn.is_waiting)
+		excuse_waiting_peer(c);
+	if (c->linger_until_ms && now >= c->linger_until_ms)
+		conn_close(c, c->close_reason);
+	else if (c->link && !tls_link_is_open(c->link) && c->clock_ms - c->begin_ms > HANDSHAKE_MS)
 		conn_close(c, "the TLS handshake was not finished in time");
 	else if (has_stalled(c))
 		conn_close(c, "a frame was not completed in time");
-	else if (c->config.quiet_seconds > 0 && (double)(c->clock - c->last_read) > 1000 * c->config.quiet_seconds)
+	else if (c->config.idle_timeout_seconds > 0 &&
+		 (double)(c->clock_ms - c->last_read_ms) > 1000 * c->config.idle_timeout_seconds)
 		conn_close(c, "silent for too long");
 }
 
@@ -433,13 +437,13 @@ static void on_send_failed(void *user, const char *why)
 	conn_close(user, why);
 }
 
-/* In SEND_REFUSED nothing is done: the peer has until linger_until to read why it was refused. */
+/* In SEND_REFUSED nothing is done: the peer has until linger_until_ms to read why it was refused. */
 static void on_drained(void *user)
 {
 	struct conn *c = user;
-	if (c->out.state == SEND_DRAINING)
-		conn_close(c, c->why);
-	else if (c->out.state == SEND_OPEN && c->events->drained)
+	if (c->send_queue.state == SEND_DRAINING)
+		conn_close(c, c->close_reason);
+	else if (c->send_queue.state == SEND_OPEN && c->events->drained)
 		c->events->drained(c->user);
 }
 
@@ -456,12 +460,13 @@ static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const str
 		mem_free(c);
 		return rc;
 	}
-	c->accepted = accepted;
+	c->is_accepted = accepted;
 	c->config = *config;
 	c->events = events;
 	c->user = user;
 	frame_reader_init(&c->reader, config->limits);
-	send_queue_init(&c->out, (uv_stream_t *)&c->tcp, c->link, config->send_limit, config->sending, &send_events, c);
+	send_queue_init(&c->send_queue, (uv_stream_t *)&c->tcp, c->link, config->send_limit, config->send_pool,
+			&send_events, c);
 	rc = uv_tcp_init(loop, &c->tcp);
 	if (rc) {
 		tls_link_free(c->link);
@@ -469,32 +474,32 @@ static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const str
 		return error_set(e, -rc, "no socket: %s", uv_strerror(rc));
 	}
 	uv_timer_init(loop, &c->timer);
-	uv_idle_init(loop, &c->later);
-	c->tcp.data = c->timer.data = c->later.data = c->connecting.data = c;
+	uv_idle_init(loop, &c->resume_handle);
+	c->tcp.data = c->timer.data = c->resume_handle.data = c->connect_request.data = c;
 	c->open_handles = 3;
-	c->ticked = uv_now(loop);
+	c->tick_ms = uv_now(loop);
 	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
 	*out = c;
 	return 0;
 }
 
-static int start(struct conn *c)
+static int start_conn(struct conn *c)
 {
 	uv_tcp_nodelay(&c->tcp, 1);
 	uv_tcp_keepalive(&c->tcp, 1, 60);
-	c->begun = c->last_read = clock_of(c);
+	c->begin_ms = c->last_read_ms = connection_ms(c);
 	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
 	if (!rc && c->link)
-		take_encrypted(c, NULL, 0);
+		handle_encrypted(c, NULL, 0);
 	return rc;
 }
 
 static void on_connected(uv_connect_t *r, int status)
 {
 	struct conn *c = r->data;
-	if (c->out.state == SEND_CLOSED)
+	if (c->send_queue.state == SEND_CLOSED)
 		return;
-	int rc = status ? status : start(c);
+	int rc = status ? status : start_conn(c);
 	if (rc)
 		conn_close(c, uv_strerror(rc));
 	else if (c->events->opened && !c->link)
@@ -509,7 +514,7 @@ int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, c
 	if (rc)
 		return rc;
 	*out = c;
-	rc = uv_tcp_connect(&c->connecting, &c->tcp, (const struct sockaddr *)&a->storage, on_connected);
+	rc = uv_tcp_connect(&c->connect_request, &c->tcp, (const struct sockaddr *)&a->storage, on_connected);
 	if (rc)
 		conn_close(c, uv_strerror(rc));
 	return 0;
@@ -525,7 +530,7 @@ int conn_accept(struct conn **out, uv_stream_t *listener, const struct conn_conf
 	*out = c;
 	rc = uv_accept(listener, (uv_stream_t *)&c->tcp);
 	if (!rc)
-		rc = start(c);
+		rc = start_conn(c);
 	if (rc)
 		conn_close(c, uv_strerror(rc));
 	return 0;
@@ -538,14 +543,14 @@ void conn_set_limits(struct conn *c, struct frame_limits limits)
 
 void conn_set_send_limit(struct conn *c, size_t bytes)
 {
-	c->out.limit = bytes;
+	c->send_queue.max_bytes = bytes;
 }
 
-void conn_set_quiet(struct conn *c, double seconds)
+void conn_set_idle_timeout(struct conn *c, double seconds)
 {
-	c->config.quiet_seconds = seconds;
+	c->config.idle_timeout_seconds = seconds;
 	double ms = 1000 * seconds / 16;
-	tick_every(c, ms > TICK_MS_MOST ? TICK_MS_MOST : ms < TICK_MS ? TICK_MS : (uint64_t)ms);
+	set_tick_interval(c, ms > TICK_MS_MAX ? TICK_MS_MAX : ms < TICK_MS ? TICK_MS : (uint64_t)ms);
 }
 
 void conn_peer_name(const struct conn *c, char *text, size_t size)
@@ -564,31 +569,31 @@ const struct tls_peer *conn_peer(const struct conn *c)
 	return c->link && tls_link_is_open(c->link) ? tls_link_peer(c->link) : NULL;
 }
 
-int conn_distrust(const struct conn *c)
+int conn_certificate_error(const struct conn *c)
 {
-	return c->distrust;
+	return c->certificate_error;
 }
 
-bool conn_garbled(const struct conn *c)
+bool conn_had_bad_checksum(const struct conn *c)
 {
-	return c->garbled;
+	return c->had_bad_checksum;
 }
 
-bool conn_gave_way(const struct conn *c)
+bool conn_was_evicted(const struct conn *c)
 {
-	return c->out.gave_way;
+	return c->send_queue.was_evicted;
 }
 
 /* ---- writing ---- */
 
 void conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
 {
-	send_queue_frame(&c->out, frame, size);
+	send_queue_send_frame(&c->send_queue, frame, size);
 }
 
 void conn_send_bytes(struct conn *c, unsigned char *bytes, size_t size)
 {
-	send_queue_bytes(&c->out, bytes, size);
+	send_queue_send_bytes(&c->send_queue, bytes, size);
 }
 
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size)
@@ -602,19 +607,19 @@ void conn_send(struct conn *c, const Farm__Envelope *message, const void *payloa
 		conn_send_frame(c, frame, size);
 }
 
-size_t conn_unsent(const struct conn *c)
+size_t conn_unsent_bytes(const struct conn *c)
 {
-	return c->out.unsent;
+	return c->send_queue.unsent_bytes;
 }
 
 void conn_close_when_sent(struct conn *c, const char *why)
 {
-	if (c->out.state != SEND_OPEN)
+	if (c->send_queue.state != SEND_OPEN)
 		return;
-	text_copy(c->why, sizeof c->why, why);
-	c->linger_until = uv_now(c->tcp.loop) + LINGER_MS;
-	send_queue_close(&c->out, SEND_DRAINING);
-	tick_every(c, TICK_MS);
-	if (send_queue_is_empty(&c->out))
-		conn_close(c, c->why);
+	text_copy(c->close_reason, sizeof c->close_reason, why);
+	c->linger_until_ms = uv_now(c->tcp.loop) + LINGER_MS;
+	send_queue_close(&c->send_queue, SEND_DRAINING);
+	set_tick_interval(c, TICK_MS);
+	if (send_queue_is_empty(&c->send_queue))
+		conn_close(c, c->close_reason);
 }

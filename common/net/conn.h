@@ -32,14 +32,14 @@ struct conn_events {
 
 struct conn_config {
 	struct frame_limits limits;
-	size_t send_limit;    /* most bytes waiting to be sent; a peer that lets more pile up is disconnected */
-	double stall_seconds; /* a frame must be complete after this time plus 1 s per 64 KB */
-	double quiet_seconds; /* the peer is disconnected after this time without a byte, not counting time in which the
-				 loop was busy; 0: never */
+	size_t send_limit;	     /* most bytes waiting to be sent; a peer that lets more pile up is disconnected */
+	double stall_seconds;	     /* a frame must be complete after this time plus 1 s per 64 KB */
+	double idle_timeout_seconds; /* the peer is disconnected after this time without a byte, not counting time in
+				 which the loop was busy; 0: never */
 	/* These three must outlive the connection. */
-	struct tls *tls;	   /* a peer that does not use TLS is disconnected; NULL: plaintext */
-	struct receive_pool *pool; /* bounds frames of more than 64 KB over all connections; NULL: no limit */
-	struct send_pool *sending; /* bounds what waits to be sent over all connections; NULL: no limit */
+	struct tls *tls;		   /* a peer that does not use TLS is disconnected; NULL: plaintext */
+	struct receive_pool *receive_pool; /* bounds frames of more than 64 KB over all connections; NULL: no limit */
+	struct send_pool *send_pool;	   /* bounds what waits to be sent over all connections; NULL: no limit */
 };
 
 /* Connects. Returns -errno if the attempt could not be made; otherwise `opened` or `closed` is called later. */
@@ -51,7 +51,7 @@ int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config
 
 void conn_set_limits(struct conn *c, struct frame_limits limits);
 void conn_set_send_limit(struct conn *c, size_t bytes);
-void conn_set_quiet(struct conn *c, double seconds);
+void conn_set_idle_timeout(struct conn *c, double seconds);
 void conn_peer_name(const struct conn *c, char *text, size_t size); /* numeric HOST:PORT */
 /* Returns the peer by its certificate; NULL in plaintext and before the handshake is complete. */
 const struct tls_peer *conn_peer(const struct conn *c);
@@ -61,11 +61,11 @@ const struct tls_peer *conn_peer(const struct conn *c);
 /* Returns -EACCES if one side does not accept the other's certificate, or only one side uses TLS; -EKEYEXPIRED if the
  * date of a certificate is the reason, which a new certificate or a corrected clock will change; otherwise 0. A client
  * may be `opened` first and refused afterwards, because the coordinator checks last. */
-int conn_distrust(const struct conn *c);
+int conn_certificate_error(const struct conn *c);
 /* Returns whether bytes from the peer did not match their checksum. */
-bool conn_garbled(const struct conn *c);
+bool conn_had_bad_checksum(const struct conn *c);
 /* Returns whether too much waited to be sent to all peers, of which this one did not read its part. */
-bool conn_gave_way(const struct conn *c);
+bool conn_was_evicted(const struct conn *c);
 
 /* Packs and sends a message; the payload is copied. A failure closes the connection, so callers need not check. */
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);
@@ -75,7 +75,7 @@ void conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
 void conn_send_bytes(struct conn *c, unsigned char *bytes, size_t size);
 /* Within `message`, once: takes ownership of its payload. */
 struct buf conn_take_payload(struct conn *c);
-size_t conn_unsent(const struct conn *c); /* bytes that the kernel has not taken yet */
+size_t conn_unsent_bytes(const struct conn *c); /* bytes that the kernel has not taken yet */
 
 void conn_close(struct conn *c, const char *why);
 void conn_close_when_sent(struct conn *c, const char *why); /* sends everything first; waits at most 5 s */

@@ -12,14 +12,14 @@
 #include <stdio.h>
 
 /* Loads the certificate before the key, because OpenSSL drops a key that does not match a certificate loaded later. */
-static bool use_both(SSL_CTX *context, const char *key, const char *cert)
+static bool use_key_and_cert(SSL_CTX *context, const char *key, const char *cert)
 {
 	return SSL_CTX_use_certificate_chain_file(context, cert) == 1 &&
 	       SSL_CTX_use_PrivateKey_file(context, key, SSL_FILETYPE_PEM) == 1 &&
 	       SSL_CTX_check_private_key(context) == 1;
 }
 
-const char *key_pair_use(SSL_CTX *context, const char *key, const char *cert)
+const char *key_pair_load(SSL_CTX *context, const char *key, const char *cert)
 {
 	char next[4096 + sizeof KEY_PAIR_NEXT];
 	if (SSL_CTX_use_PrivateKey_file(context, key, SSL_FILETYPE_PEM) != 1)
@@ -28,7 +28,7 @@ const char *key_pair_use(SSL_CTX *context, const char *key, const char *cert)
 		return NULL;
 	snprintf(next, sizeof next, "%s" KEY_PAIR_NEXT, cert);
 	ERR_set_mark();
-	bool used = use_both(context, key, next);
+	bool used = use_key_and_cert(context, key, next);
 	ERR_pop_to_mark();
 	return used ? NULL : cert;
 }

@@ -9,6 +9,6 @@
 
 /* Uses the key and the certificate in these files or, if the key does not match the certificate, the next certificate.
  * Returns NULL on success, otherwise the path of the bad file; the reason is in OpenSSL's error queue. */
-const char *key_pair_use(SSL_CTX *context, const char *key, const char *cert);
+const char *key_pair_load(SSL_CTX *context, const char *key, const char *cert);
 
 #endif

@@ -44,7 +44,7 @@ static long long env_number(const char *name)
 	return *end || errno ? -1 : n;
 }
 
-double notify_watchdog(void)
+double notify_watchdog_seconds(void)
 {
 	long long us = env_number("WATCHDOG_USEC");
 	if (us <= 0 || (getenv("WATCHDOG_PID") && env_number("WATCHDOG_PID") != getpid()))
@@ -59,7 +59,7 @@ static int socket_option(int fd, int name)
 	return getsockopt(fd, SOL_SOCKET, name, &value, &size) ? -1 : value;
 }
 
-int notify_inherited_unix(void)
+int notify_inherited_socket(void)
 {
 	long long count = env_number("LISTEN_FDS");
 	if (count <= 0 || env_number("LISTEN_PID") != getpid())

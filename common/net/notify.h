@@ -14,10 +14,10 @@
 bool notify_send(const char *state);
 
 /* Returns the seconds within which WATCHDOG=1 is expected; 0 if it is not expected. */
-double notify_watchdog(void);
+double notify_watchdog_seconds(void);
 
 /* Returns the first listening Unix stream socket passed to this process, set to close on exec, which the caller then
  * owns; -1 if there is none. */
-int notify_inherited_unix(void);
+int notify_inherited_socket(void);
 
 #endif

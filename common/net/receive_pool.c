@@ -3,61 +3,61 @@
 
 static bool has_room(const struct receive_pool *p, uint64_t bytes)
 {
-	return p->used == 0 || (p->used <= p->limit && bytes <= p->limit - p->used);
+	return p->used_bytes == 0 || (p->used_bytes <= p->max_bytes && bytes <= p->max_bytes - p->used_bytes);
 }
 
 static void grant_bytes(struct receive_pool *p, struct receive_turn *t)
 {
-	p->used += t->bytes;
-	t->has = true;
+	p->used_bytes += t->bytes;
+	t->is_granted = true;
 }
 
 /* Lets a turn wait in the current round or, if its owner already waits, in the round after the owner's last turn. */
-static void enter_line(struct receive_pool *p, struct receive_turn *t)
+static void enqueue_turn(struct receive_pool *p, struct receive_turn *t)
 {
-	struct receive_turn **at = &p->first;
-	t->round = p->first ? p->first->round : 0;
-	for (const struct receive_turn *w = p->first; w; w = w->next)
+	struct receive_turn **link = &p->queue;
+	t->round = p->queue ? p->queue->round : 0;
+	for (const struct receive_turn *w = p->queue; w; w = w->next)
 		if (w->owner == t->owner)
 			t->round = w->round + 1;
-	while (*at && (*at)->round <= t->round)
-		at = &(*at)->next;
-	t->waits = true;
-	t->next = *at;
-	*at = t;
+	while (*link && (*link)->round <= t->round)
+		link = &(*link)->next;
+	t->is_waiting = true;
+	t->next = *link;
+	*link = t;
 }
 
-bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t bytes)
+bool receive_pool_acquire(struct receive_pool *p, struct receive_turn *t, uint64_t bytes)
 {
 	t->bytes = bytes;
-	if (!p->first && has_room(p, bytes)) {
+	if (!p->queue && has_room(p, bytes)) {
 		grant_bytes(p, t);
 		return true;
 	}
-	enter_line(p, t);
+	enqueue_turn(p, t);
 	return false;
 }
 
-static void leave_line(struct receive_pool *p, struct receive_turn *t)
+static void dequeue_turn(struct receive_pool *p, struct receive_turn *t)
 {
-	struct receive_turn **at = &p->first;
-	while (*at != t)
-		at = &(*at)->next;
-	*at = t->next;
-	t->waits = false;
+	struct receive_turn **link = &p->queue;
+	while (*link != t)
+		link = &(*link)->next;
+	*link = t->next;
+	t->is_waiting = false;
 }
 
-void receive_pool_give(struct receive_pool *p, struct receive_turn *t)
+void receive_pool_release(struct receive_pool *p, struct receive_turn *t)
 {
-	if (t->waits)
-		leave_line(p, t);
-	else if (t->has)
-		p->used -= t->bytes;
-	t->has = false;
-	while (p->first && has_room(p, p->first->bytes)) {
-		struct receive_turn *next = p->first;
-		leave_line(p, next);
+	if (t->is_waiting)
+		dequeue_turn(p, t);
+	else if (t->is_granted)
+		p->used_bytes -= t->bytes;
+	t->is_granted = false;
+	while (p->queue && has_room(p, p->queue->bytes)) {
+		struct receive_turn *next = p->queue;
+		dequeue_turn(p, next);
 		grant_bytes(p, next);
-		next->go(next);
+		next->on_granted(next);
 	}
 }

@@ -11,25 +11,25 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* The place of a connection in the pool. Initially zeroed except for `owner` and `go`. */
+/* The place of a connection in the pool. Initially zeroed except for `owner` and `on_granted`. */
 struct receive_turn {
 	uint64_t owner;
 	struct receive_turn *next;
-	uint64_t round;			   /* in each round, each owner that waits has one turn */
-	uint64_t bytes;			   /* taken, or waited for */
-	bool has, waits;		   /* the bytes have been taken; they are waited for */
-	void (*go)(struct receive_turn *); /* called when bytes that were waited for have been taken */
+	uint64_t round;				   /* in each round, each owner that waits has one turn */
+	uint64_t bytes;				   /* taken, or waited for */
+	bool is_granted, is_waiting;		   /* the bytes have been taken; they are waited for */
+	void (*on_granted)(struct receive_turn *); /* called when bytes that were waited for have been taken */
 };
 
 /* Initially zeroed except for the limit. */
 struct receive_pool {
-	uint64_t limit, used;	    /* bytes */
-	struct receive_turn *first; /* those that wait, in order of rounds */
+	uint64_t max_bytes, used_bytes; /* bytes */
+	struct receive_turn *queue;	/* those that wait, in order of rounds */
 };
 
-/* Takes bytes from the pool. Returns false if the turn has to wait; `go` is called later. */
-bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t bytes);
-/* Gives back the bytes, or stops waiting. May call `go` of others. */
-void receive_pool_give(struct receive_pool *p, struct receive_turn *t);
+/* Takes bytes from the pool. Returns false if the turn has to wait; `on_granted` is called later. */
+bool receive_pool_acquire(struct receive_pool *p, struct receive_turn *t, uint64_t bytes);
+/* Gives back the bytes, or stops waiting. May call `on_granted` of others. */
+void receive_pool_release(struct receive_pool *p, struct receive_turn *t);
 
 #endif

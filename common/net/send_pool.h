@@ -16,19 +16,20 @@
 
 /* The share of one connection. Initially zeroed except for the first three members. */
 struct send_share {
-	struct send_pool *pool;			     /* NULL: no limit */
-	uint64_t (*left)(const struct send_share *); /* bytes that the kernel has not taken; called at any time */
-	void (*give_way)(struct send_share *);	     /* must close the connection */
-	LIST_ENTRY(send_share) next;		     /* in the list of shares that hold something */
-	uint64_t bytes, seen;			     /* bytes held; result of left() when it was last called */
-	uint64_t moved;				     /* ms: when the peer last took something, or nothing waited */
-	bool leaves;				     /* the connection is being closed */
+	struct send_pool *pool; /* NULL: no limit */
+	uint64_t (*unsent_bytes)(
+		const struct send_share *); /* bytes that the kernel has not taken; called at any time */
+	void (*evict)(struct send_share *); /* must close the connection */
+	LIST_ENTRY(send_share) next;	    /* in the list of shares that hold something */
+	uint64_t bytes, last_unsent_bytes;  /* bytes held; result of unsent_bytes() when it was last called */
+	uint64_t progress_ms;		    /* ms: when the peer last took something, or nothing waited */
+	bool is_closing;		    /* the connection is being closed */
 };
 
 /* Initially zeroed except for the limit. */
 struct send_pool {
-	uint64_t limit, used;		 /* bytes */
-	uint64_t leaving;		 /* bytes of connections being closed, freed in the loop's next iteration */
+	uint64_t max_bytes, used_bytes;	 /* bytes */
+	uint64_t closing_bytes;		 /* bytes of connections being closed, freed in the loop's next iteration */
 	LIST_HEAD(, send_share) waiting; /* shares that hold something */
 };
 
@@ -36,13 +37,13 @@ struct send_pool {
  * itself had to give way; its share is then unchanged. */
 bool send_pool_add(struct send_share *s, uint64_t bytes, uint64_t now);
 /* Subtracts bytes that the kernel has taken or that were dropped. */
-void send_pool_sub(struct send_share *s, uint64_t bytes, uint64_t now);
+void send_pool_subtract(struct send_share *s, uint64_t bytes, uint64_t now);
 /* Corrects a share, while it is not empty, by memory that is used in addition (or no longer). Unlike send_pool_add and
- * send_pool_sub, this does not count as activity of the peer and closes no connection. */
+ * send_pool_subtract, this does not count as activity of the peer and closes no connection. */
 void send_pool_adjust(struct send_share *s, int64_t bytes);
 /* Notes whether the peer has taken something since the last call. */
-void send_pool_look(struct send_share *s, uint64_t now);
+void send_pool_note_progress(struct send_share *s, uint64_t now);
 /* Call when the connection is being closed: its bytes no longer count as used, and none may be added. */
-void send_pool_leave(struct send_share *s);
+void send_pool_close_share(struct send_share *s);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * In plaintext a frame goes to libuv at once, as two buffers: its checked prefix and its bytes. With TLS it waits in a
- * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write. A frame's memory is only freed
- * after its last piece, so until then the pool counts the encrypted pieces in addition (count_copied); they may exceed
- * the pool's limit until something else is to be sent. on_written encrypts more, and calls `drained` when nothing is
- * left.
+ * list and is encrypted piece by piece while libuv has less than WINDOW_BYTES bytes to write. A frame's memory is only
+ * freed after its last piece, so until then the pool counts the encrypted pieces in addition (set_copied); they may
+ * exceed the pool's limit until something else is to be sent. on_written encrypts more, and calls `drained` when
+ * nothing is left.
  *
  * A failure is reported once to the owner, who closes the stream: no memory, an error of the stream or of TLS, or a
  * peer that does not read, if this queue or all queues together hold too much.
@@ -18,32 +18,32 @@
 #include <string.h>
 
 enum {
-	PIECE = 1 << 16,  /* bytes encrypted at a time */
-	WINDOW = 1 << 20, /* most encrypted bytes that the kernel has not taken yet */
-	FRAME_COST = 256, /* memory per waiting frame besides its bytes */
+	PIECE_SIZE = 1 << 16,	/* bytes encrypted at a time */
+	WINDOW_BYTES = 1 << 20, /* most encrypted bytes that the kernel has not taken yet */
+	FRAME_OVERHEAD = 256,	/* memory per waiting frame besides its bytes */
 };
 
 /* The bytes that are sent in place of a frame's prefix. */
-struct head {
-	unsigned char bytes[FRAME_CHECKED_PREFIX];
+struct sent_prefix {
+	unsigned char bytes[FRAME_CHECKED_PREFIX_SIZE];
 	size_t size;
 };
 
 struct send_frame {
 	STAILQ_ENTRY(send_frame) next;
-	struct head head; /* empty once it has been encrypted */
+	struct sent_prefix prefix; /* empty once it has been encrypted */
 	unsigned char *bytes;
-	size_t size, at; /* of the bytes; offset of the next one to encrypt */
-	size_t plain;	 /* part of `unsent` that has not been passed on to a struct writing */
+	size_t size, offset;	/* of the bytes; offset of the next one to encrypt */
+	size_t plaintext_bytes; /* part of `unsent_bytes` that has not been passed on to a struct writing */
 };
 
 /* A write of libuv. */
-struct writing {
+struct write_request {
 	uv_write_t request;
 	struct send_queue *queue;
-	struct head head;
+	struct sent_prefix prefix;
 	unsigned char *bytes;
-	size_t size, plain; /* its parts of in_flight and of unsent */
+	size_t size, plaintext_bytes; /* its parts of in_flight_bytes and of unsent */
 };
 
 static uint64_t loop_ms(const struct send_queue *q)
@@ -52,46 +52,46 @@ static uint64_t loop_ms(const struct send_queue *q)
 }
 
 /* Adds to the bytes that wait; false if this connection has to give way. */
-static bool count(struct send_queue *q, size_t bytes)
+static bool add_unsent(struct send_queue *q, size_t bytes)
 {
 	if (!send_pool_add(&q->share, bytes, loop_ms(q)))
 		return false;
-	q->unsent += bytes;
+	q->unsent_bytes += bytes;
 	return true;
 }
 
-static void count_off(struct send_queue *q, size_t bytes)
+static void subtract_unsent(struct send_queue *q, size_t bytes)
 {
-	q->unsent -= bytes;
-	send_pool_sub(&q->share, bytes, loop_ms(q));
+	q->unsent_bytes -= bytes;
+	send_pool_subtract(&q->share, bytes, loop_ms(q));
 }
 
-static uint64_t unsent_bytes(const struct send_share *s)
+static uint64_t kernel_queue_bytes(const struct send_share *s)
 {
 	const struct send_queue *q = (const struct send_queue *)((const char *)s - offsetof(struct send_queue, share));
 	return uv_stream_get_write_queue_size(q->stream);
 }
 
-static void give_way(struct send_share *s);
+static void evict_queue(struct send_share *s);
 
 void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link *link, size_t limit,
 		     struct send_pool *pool, const struct send_events *events, void *user)
 {
-	*q = (struct send_queue){.stream = stream, .link = link, .limit = limit, .events = events, .user = user};
-	q->share = (struct send_share){.pool = pool, .left = unsent_bytes, .give_way = give_way};
+	*q = (struct send_queue){.stream = stream, .link = link, .max_bytes = limit, .events = events, .user = user};
+	q->share = (struct send_share){.pool = pool, .unsent_bytes = kernel_queue_bytes, .evict = evict_queue};
 	STAILQ_INIT(&q->frames);
 }
 
-static void count_copied(struct send_queue *q, size_t bytes)
+static void set_copied(struct send_queue *q, size_t bytes)
 {
-	send_pool_adjust(&q->share, (int64_t)bytes - (int64_t)q->copied);
-	q->copied = bytes;
+	send_pool_adjust(&q->share, (int64_t)bytes - (int64_t)q->copied_bytes);
+	q->copied_bytes = bytes;
 }
 
-static void drop_first(struct send_queue *q)
+static void drop_first_frame(struct send_queue *q)
 {
 	struct send_frame *f = STAILQ_FIRST(&q->frames);
-	count_copied(q, 0);
+	set_copied(q, 0);
 	STAILQ_REMOVE_HEAD(&q->frames, next);
 	mem_free(f->bytes);
 	mem_free(f);
@@ -101,13 +101,13 @@ void send_queue_fini(struct send_queue *q)
 {
 	send_queue_close(q, SEND_CLOSED);
 	while (!STAILQ_EMPTY(&q->frames))
-		drop_first(q);
-	count_off(q, q->unsent);
+		drop_first_frame(q);
+	subtract_unsent(q, q->unsent_bytes);
 }
 
 bool send_queue_is_empty(const struct send_queue *q)
 {
-	return !q->unsent && !q->in_flight;
+	return !q->unsent_bytes && !q->in_flight_bytes;
 }
 
 void send_queue_close(struct send_queue *q, enum send_state to)
@@ -115,34 +115,34 @@ void send_queue_close(struct send_queue *q, enum send_state to)
 	if (to > q->state)
 		q->state = to;
 	if (q->state == SEND_CLOSED)
-		send_pool_leave(&q->share);
+		send_pool_close_share(&q->share);
 }
 
-static void fail(struct send_queue *q, const char *why)
+static void report_failure(struct send_queue *q, const char *why)
 {
 	if (q->state != SEND_CLOSED)
 		q->events->failed(q->user, why);
 }
 
-static void give_way(struct send_share *s)
+static void evict_queue(struct send_share *s)
 {
 	struct send_queue *q = (struct send_queue *)((char *)s - offsetof(struct send_queue, share));
-	q->gave_way = true;
-	fail(q, "too much waits to be sent to all peers, and this one does not read its part");
+	q->was_evicted = true;
+	report_failure(q, "too much waits to be sent to all peers, and this one does not read its part");
 }
 
 static void send_pending(struct send_queue *q);
 
 static void on_written(uv_write_t *r, int status)
 {
-	struct writing *w = r->data;
+	struct write_request *w = r->data;
 	struct send_queue *q = w->queue;
-	q->in_flight -= w->size;
-	count_off(q, w->plain);
+	q->in_flight_bytes -= w->size;
+	subtract_unsent(q, w->plaintext_bytes);
 	mem_free(w->bytes);
 	mem_free(w);
 	if (status)
-		fail(q, uv_strerror(status));
+		report_failure(q, uv_strerror(status));
 	else
 		send_pending(q);
 	if (q->state != SEND_CLOSED && send_queue_is_empty(q))
@@ -150,83 +150,84 @@ static void on_written(uv_write_t *r, int status)
 }
 
 /* Sends `head`, then the bytes after the first `skip`. Frees the bytes, also after a failure. */
-static void to_kernel(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip,
-		      size_t plain)
+static void write_stream(struct send_queue *q, struct sent_prefix head, unsigned char *bytes, size_t size, size_t skip,
+			 size_t plain)
 {
-	struct writing *w = mem_alloc(1, sizeof *w);
+	struct write_request *w = mem_alloc(1, sizeof *w);
 	if (!w) {
 		mem_free(bytes);
-		fail(q, "no memory to send");
+		report_failure(q, "no memory to send");
 		return;
 	}
-	*w = (struct writing){
-		.queue = q, .head = head, .bytes = bytes, .size = head.size + size - skip, .plain = plain};
+	*w = (struct write_request){
+		.queue = q, .prefix = head, .bytes = bytes, .size = head.size + size - skip, .plaintext_bytes = plain};
 	w->request.data = w;
-	uv_buf_t both[] = {uv_buf_init((char *)w->head.bytes, (unsigned)head.size),
+	uv_buf_t both[] = {uv_buf_init((char *)w->prefix.bytes, (unsigned)head.size),
 			   uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
 	int rc = uv_write(&w->request, q->stream, both, 2, on_written);
 	if (rc) {
 		mem_free(bytes);
 		mem_free(w);
-		fail(q, uv_strerror(rc));
+		report_failure(q, uv_strerror(rc));
 		return;
 	}
-	q->in_flight += head.size + size - skip;
+	q->in_flight_bytes += head.size + size - skip;
 }
 
-static void copy_to_kernel(struct send_queue *q, const void *bytes, size_t size, size_t plain)
+static void write_copy(struct send_queue *q, const void *bytes, size_t size, size_t plain)
 {
 	unsigned char *copy = mem_alloc(size, 1);
 	if (copy)
-		to_kernel(q, (struct head){.size = 0}, memcpy(copy, bytes, size), size, 0, plain);
+		write_stream(q, (struct sent_prefix){.size = 0}, memcpy(copy, bytes, size), size, 0, plain);
 	else
-		fail(q, "no memory to send");
+		report_failure(q, "no memory to send");
 }
 
-void send_queue_raw(struct send_queue *q, const void *bytes, size_t size)
+void send_queue_send_raw(struct send_queue *q, const void *bytes, size_t size)
 {
-	copy_to_kernel(q, bytes, size, 0);
+	write_copy(q, bytes, size, 0);
 }
 
-/* Sends the output of TLS, which stands for `plain` bytes of frames. */
-static void flush(struct send_queue *q, size_t plain)
+/* Sends the output of TLS, which stands for `plaintext_bytes` bytes of frames. */
+static void flush_tls(struct send_queue *q, size_t plain)
 {
 	const unsigned char *bytes;
 	size_t size = tls_link_output(q->link, &bytes);
 	if (!size || q->state == SEND_CLOSED)
 		return;
-	if (q->in_flight > 2 * WINDOW) /* a peer that sends requests and does not read the answers */
-		fail(q, "the peer does not read what is sent to it");
+	if (q->in_flight_bytes > 2 * WINDOW_BYTES) /* a peer that sends requests and does not read the answers */
+		report_failure(q, "the peer does not read what is sent to it");
 	else
-		copy_to_kernel(q, bytes, size, plain);
-	tls_link_output_taken(q->link);
+		write_copy(q, bytes, size, plain);
+	tls_link_clear_output(q->link);
 }
 
 /* Encrypts the next piece of the first frame. Returns 1 if that was the last piece, 0 if more is left, -1 after a
  * failure. */
 static int encrypt_piece(struct send_queue *q)
 {
-	static _Thread_local unsigned char joined[PIECE];
+	static _Thread_local unsigned char joined[PIECE_SIZE];
 	struct send_frame *f = STAILQ_FIRST(&q->frames);
 	struct error e;
-	size_t most = PIECE - f->head.size, size = f->size - f->at < most ? f->size - f->at : most;
-	const unsigned char *bytes = f->bytes + f->at;
-	if (f->head.size) { /* joined, so that it shares a TLS record with the following bytes */
-		memcpy(joined, f->head.bytes, f->head.size);
-		memcpy(joined + f->head.size, bytes, size);
+	size_t max_size = PIECE_SIZE - f->prefix.size,
+	       size = f->size - f->offset < max_size ? f->size - f->offset : max_size;
+	const unsigned char *bytes = f->bytes + f->offset;
+	if (f->prefix.size) { /* joined, so that it shares a TLS record with the following bytes */
+		memcpy(joined, f->prefix.bytes, f->prefix.size);
+		memcpy(joined + f->prefix.size, bytes, size);
 		bytes = joined;
 	}
-	if (tls_link_write(q->link, bytes, f->head.size + size, &e)) {
-		fail(q, e.text);
+	if (tls_link_write(q->link, bytes, f->prefix.size + size, &e)) {
+		report_failure(q, e.text);
 		return -1;
 	}
-	f->head.size = 0;
-	f->at += size;
-	bool last = f->at == f->size;
-	size_t plain = last ? f->plain : size;
-	f->plain -= plain;
-	count_copied(q, q->copied + plain);
-	flush(q, plain);
+	f->prefix.size = 0;
+	f->offset += size;
+	bool last = f->offset == f->size;
+	size_t plain = last ? f->plaintext_bytes : size;
+	f->plaintext_bytes -= plain;
+	set_copied(q, q->copied_bytes + plain);
+	flush_tls(q, plain);
 	return last;
 }
 
@@ -234,70 +235,71 @@ static void send_pending(struct send_queue *q)
 {
 	if (!q->link || !tls_link_is_open(q->link))
 		return;
-	while (!STAILQ_EMPTY(&q->frames) && q->in_flight < WINDOW && q->state < SEND_REFUSED) {
+	while (!STAILQ_EMPTY(&q->frames) && q->in_flight_bytes < WINDOW_BYTES && q->state < SEND_REFUSED) {
 		int last = encrypt_piece(q);
 		if (last < 0)
 			return;
 		if (last)
-			drop_first(q);
+			drop_first_frame(q);
 	}
 }
 
 void send_queue_flush(struct send_queue *q)
 {
-	flush(q, 0);
+	flush_tls(q, 0);
 }
 
-void send_queue_opened(struct send_queue *q)
+void send_queue_start(struct send_queue *q)
 {
 	send_pending(q);
 }
 
 /* Appends a frame to the list. Takes ownership of the bytes, also after a failure. */
-static void append(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)
+static void append_frame(struct send_queue *q, struct sent_prefix head, unsigned char *bytes, size_t size, size_t skip)
 {
 	struct send_frame *f = mem_alloc(1, sizeof *f);
 	if (!f) {
 		mem_free(bytes);
-		fail(q, "no memory to send");
+		report_failure(q, "no memory to send");
 		return;
 	}
-	*f = (struct send_frame){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
+	*f = (struct send_frame){
+		.prefix = head, .bytes = bytes, .size = size, .offset = skip, .plaintext_bytes = size + FRAME_OVERHEAD};
 	STAILQ_INSERT_TAIL(&q->frames, f, next);
 	send_pending(q);
 }
 
-static void send_all(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)
+static void queue_bytes(struct send_queue *q, struct sent_prefix head, unsigned char *bytes, size_t size, size_t skip)
 {
-	size_t room = q->unsent < q->limit ? q->limit - q->unsent : 0;
+	size_t free_bytes = q->unsent_bytes < q->max_bytes ? q->max_bytes - q->unsent_bytes : 0;
 	if (q->state != SEND_OPEN) {
 		mem_free(bytes);
-	} else if (q->unsent && size > room) {
+	} else if (q->unsent_bytes && size > free_bytes) {
 		mem_free(bytes);
-		fail(q, "the peer does not read what is sent to it");
-	} else if (!count(q, size + FRAME_COST)) {
+		report_failure(q, "the peer does not read what is sent to it");
+	} else if (!add_unsent(q, size + FRAME_OVERHEAD)) {
 		mem_free(bytes);
 	} else if (q->link) {
-		append(q, head, bytes, size, skip);
+		append_frame(q, head, bytes, size, skip);
 	} else {
-		to_kernel(q, head, bytes, size, skip, size + FRAME_COST);
+		write_stream(q, head, bytes, size, skip, size + FRAME_OVERHEAD);
 	}
-	send_pool_look(&q->share, loop_ms(q));
+	send_pool_note_progress(&q->share, loop_ms(q));
 }
 
-void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size)
+void send_queue_send_frame(struct send_queue *q, unsigned char *frame, size_t size)
 {
-	struct head head = {.size = q->sent ? FRAME_CHECKED_PREFIX : FRAME_PREFIX};
-	assert(size > FRAME_PREFIX);
-	if (q->sent)
-		frame_add_checksums(head.bytes, frame, frame + FRAME_PREFIX, size - FRAME_PREFIX);
+	struct sent_prefix head = {.size = q->first_frame_sent ? FRAME_CHECKED_PREFIX_SIZE : FRAME_PREFIX_SIZE};
+	assert(size > FRAME_PREFIX_SIZE);
+	if (q->first_frame_sent)
+		frame_checked_prefix_write(head.bytes, frame, frame + FRAME_PREFIX_SIZE, size - FRAME_PREFIX_SIZE);
 	else
-		memcpy(head.bytes, frame, FRAME_PREFIX);
-	q->sent = true;
-	send_all(q, head, frame, size, FRAME_PREFIX);
+		memcpy(head.bytes, frame, FRAME_PREFIX_SIZE);
+	q->first_frame_sent = true;
+	queue_bytes(q, head, frame, size, FRAME_PREFIX_SIZE);
 }
 
-void send_queue_bytes(struct send_queue *q, unsigned char *bytes, size_t size)
+void send_queue_send_bytes(struct send_queue *q, unsigned char *bytes, size_t size)
 {
-	send_all(q, (struct head){.size = 0}, bytes, size, 0);
+	queue_bytes(q, (struct sent_prefix){.size = 0}, bytes, size, 0);
 }

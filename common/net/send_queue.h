@@ -35,15 +35,15 @@ struct send_queue {
 	struct tls_link *link; /* NULL: plaintext */
 	const struct send_events *events;
 	void *user;
-	size_t limit; /* most bytes of frames that wait; if a peer lets more pile up, the queue fails */
+	size_t max_bytes; /* most bytes of frames that wait; if a peer lets more pile up, the queue fails */
 	enum send_state state;
 	STAILQ_HEAD(, send_frame) frames; /* frames waiting to be encrypted */
-	size_t unsent;			  /* bytes of frames that the kernel has not taken, and their overhead */
-	size_t copied;			  /* bytes of the first frame that libuv also has, encrypted */
-	struct send_share share;	  /* share of the pool: unsent + copied */
-	size_t in_flight;		  /* bytes that libuv has to write; with TLS including its overhead */
-	bool sent;			  /* the first frame has been given to the queue */
-	bool gave_way;			  /* the queue failed because all queues together held too much */
+	size_t unsent_bytes;		  /* bytes of frames that the kernel has not taken, and their overhead */
+	size_t copied_bytes;		  /* bytes of the first frame that libuv also has, encrypted */
+	struct send_share share;	  /* share of the pool: unsent_bytes + copied */
+	size_t in_flight_bytes;		  /* bytes that libuv has to write; with TLS including its overhead */
+	bool first_frame_sent;		  /* the first frame has been given to the queue */
+	bool was_evicted;		  /* the queue failed because all queues together held too much */
 };
 
 /* Initialises a queue. pool: bounds all queues together, and must outlive them; NULL: no such bound. */
@@ -53,15 +53,15 @@ void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link 
 void send_queue_fini(struct send_queue *q);
 
 /* Sends a frame, allocated with mem_alloc; adds checksums unless it is the first. */
-void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size);
+void send_queue_send_frame(struct send_queue *q, unsigned char *frame, size_t size);
 /* Sends bytes, allocated with mem_alloc, as they are. */
-void send_queue_bytes(struct send_queue *q, unsigned char *bytes, size_t size);
+void send_queue_send_bytes(struct send_queue *q, unsigned char *bytes, size_t size);
 /* Sends a copy of bytes at once, before the frames that wait, and unencrypted. */
-void send_queue_raw(struct send_queue *q, const void *bytes, size_t size);
+void send_queue_send_raw(struct send_queue *q, const void *bytes, size_t size);
 /* Sends bytes that TLS has produced by itself, such as those of the handshake. */
 void send_queue_flush(struct send_queue *q);
 /* Call when the handshake is complete: sends frames that waited for it. */
-void send_queue_opened(struct send_queue *q);
+void send_queue_start(struct send_queue *q);
 
 /* Moves to a later state; an earlier one is ignored. */
 void send_queue_close(struct send_queue *q, enum send_state to);

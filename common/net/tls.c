@@ -22,10 +22,10 @@
 #include <sys/stat.h>
 
 enum {
-	BEFORE_OPEN_MAX = 1 << 16, /* bytes accepted from a peer before its certificate was checked */
+	HANDSHAKE_BYTES_MAX = 1 << 16, /* bytes accepted from a peer before its certificate was checked */
 	CERTIFICATES_MAX = 1 << 14,
-	DEPTH = 1,
-	ALERT_REASON = 1000, /* OpenSSL's number for the reason of a received alert */
+	CHAIN_DEPTH_MAX = 1,
+	ALERT_REASON_BASE = 1000, /* OpenSSL's number for the reason of a received alert */
 	ALERT_RECORD = 21,
 	HANDSHAKE_RECORD = 22,
 	BAD_CERTIFICATE = 42,
@@ -33,12 +33,12 @@ enum {
 	PROTOCOL_VERSION = 70,
 };
 
-const unsigned char tls_none_here[7] = {ALERT_RECORD, 3, 3, 0, 2, 2, PROTOCOL_VERSION};
+const unsigned char tls_mismatch_alert[7] = {ALERT_RECORD, 3, 3, 0, 2, 2, PROTOCOL_VERSION};
 
-enum { FILES = 4 };
-static const char *const file_names[FILES] = {"ca.pem", "cert.pem", "key.pem", "crl.pem"};
+enum { FILE_COUNT = 4 };
+static const char *const file_names[FILE_COUNT] = {"ca.pem", "cert.pem", "key.pem", "crl.pem"};
 
-struct stamp { /* identifies a version of a file; zeros: the file does not exist */
+struct file_version { /* identifies a version of a file; zeros: the file does not exist */
 	ino_t inode;
 	off_t size;
 	struct timespec changed;
@@ -47,22 +47,23 @@ struct stamp { /* identifies a version of a file; zeros: the file does not exist
 struct tls {
 	char folder[3072];
 	SSL_CTX *context;
-	struct stamp stamps[FILES]; /* of the files in use */
-	struct stamp seen[FILES];   /* of the files that were read last, usable or not */
+	struct file_version used_versions[FILE_COUNT]; /* of the files in use */
+	struct file_version read_versions[FILE_COUNT]; /* of the files that were read last, usable or not */
 	struct tls_peer self;
-	time_t authority_until;
-	time_t warned;	/* time of the last tls_warning_due that returned true; 0: not since the files were read */
-	double recheck; /* see tls_recheck_seconds */
+	time_t authority_expiry;
+	time_t warning_time; /* time of the last tls_expiry_warning_due that returned true; 0: not since the files were
+				read */
+	double recheck_seconds; /* see tls_recheck_seconds */
 };
 
 struct tls_link {
 	struct tls *tls;
 	SSL *ssl;
-	BIO *in, *out; /* owned by `ssl` */
+	BIO *input, *output; /* owned by `ssl` */
 	struct tls_peer peer;
-	size_t taken; /* bytes received before the handshake was complete */
-	bool listening, begun, open;
-	char distrust[128]; /* why the peer's certificate is refused although its chain is valid */
+	size_t handshake_bytes; /* bytes received before the handshake was complete */
+	bool is_server, has_input, is_open;
+	char role_error[128]; /* why the peer's certificate is refused although its chain is valid */
 };
 
 bool tls_is_first_byte(unsigned char c)
@@ -73,11 +74,11 @@ bool tls_is_first_byte(unsigned char c)
 /* ---- names and roles ---- */
 
 static const char role_prefix[] = "hslt:role:";
-static const char *const roles[TLS_ROLES] = {"nobody", "coordinator", "worker", "client", "operator"};
+static const char *const role_names[TLS_ROLES] = {"nobody", "coordinator", "worker", "client", "operator"};
 
 const char *tls_role_name(enum tls_role r)
 {
-	return roles[r];
+	return role_names[r];
 }
 
 static bool is_alphanumeric(char c)
@@ -85,7 +86,7 @@ static bool is_alphanumeric(char c)
 	return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
-bool tls_name_ok(const char *name)
+bool tls_name_is_valid(const char *name)
 {
 	size_t length = strlen(name);
 	if (length > TLS_NAME_MAX || !is_alphanumeric(*name))
@@ -96,37 +97,38 @@ bool tls_name_ok(const char *name)
 	return true;
 }
 
-static enum tls_role role_of(const ASN1_IA5STRING *uri)
+static enum tls_role role_from_uri(const ASN1_IA5STRING *uri)
 {
 	const char *text = (const char *)ASN1_STRING_get0_data(uri);
 	size_t length = (size_t)ASN1_STRING_length(uri), prefix = sizeof role_prefix - 1;
 	if (length <= prefix || memcmp(text, role_prefix, prefix) != 0)
-		return TLS_NOBODY;
+		return TLS_NO_ROLE;
 	for (int r = TLS_COORDINATOR; r < TLS_ROLES; r++)
-		if (length - prefix == strlen(roles[r]) && memcmp(text + prefix, roles[r], length - prefix) == 0)
+		if (length - prefix == strlen(role_names[r]) &&
+		    memcmp(text + prefix, role_names[r], length - prefix) == 0)
 			return (enum tls_role)r;
-	return TLS_NOBODY;
+	return TLS_NO_ROLE;
 }
 
-/* Returns the role of a certificate; TLS_NOBODY unless it has exactly one: with two, its rights would be unclear. */
+/* Returns the role of a certificate; TLS_NO_ROLE unless it has exactly one: with two, its rights would be unclear. */
 static enum tls_role read_role(X509 *cert)
 {
-	enum tls_role found = TLS_NOBODY;
+	enum tls_role found = TLS_NO_ROLE;
 	int count = 0;
 	GENERAL_NAMES *names = X509_get_ext_d2i(cert, NID_subject_alt_name, NULL, NULL);
 	for (int i = 0; i < sk_GENERAL_NAME_num(names); i++) {
 		const GENERAL_NAME *n = sk_GENERAL_NAME_value(names, i);
-		enum tls_role r = n->type == GEN_URI ? role_of(n->d.uniformResourceIdentifier) : TLS_NOBODY;
-		if (r != TLS_NOBODY) {
+		enum tls_role r = n->type == GEN_URI ? role_from_uri(n->d.uniformResourceIdentifier) : TLS_NO_ROLE;
+		if (r != TLS_NO_ROLE) {
 			found = r;
 			count++;
 		}
 	}
 	GENERAL_NAMES_free(names);
-	return count == 1 ? found : TLS_NOBODY;
+	return count == 1 ? found : TLS_NO_ROLE;
 }
 
-static time_t end_of(const X509 *cert)
+static time_t cert_expiry(const X509 *cert)
 {
 	struct tm tm;
 	return ASN1_TIME_to_tm(X509_get0_notAfter(cert), &tm) ? timegm(&tm) : 0;
@@ -135,7 +137,7 @@ static time_t end_of(const X509 *cert)
 int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 {
 	memset(p, 0, sizeof *p);
-	p->until = end_of(cert);
+	p->expiry_time = cert_expiry(cert);
 	X509_NAME *subject = X509_get_subject_name(cert);
 	int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
 	const ASN1_STRING *name = at < 0 ? NULL : X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at));
@@ -143,7 +145,7 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	if (length > 0 && length <= TLS_NAME_MAX &&
 	    strnlen((const char *)ASN1_STRING_get0_data(name), length) == length)
 		memcpy(p->name, ASN1_STRING_get0_data(name), length);
-	if (!tls_name_ok(p->name))
+	if (!tls_name_is_valid(p->name))
 		return error_set(e, EACCES, "the certificate has no name that is valid in this farm");
 	BIGNUM *serial = ASN1_INTEGER_to_BN(X509_get0_serialNumber(cert), NULL);
 	char *hex = serial ? BN_bn2hex(serial) : NULL;
@@ -151,14 +153,14 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	OPENSSL_free(hex);
 	BN_free(serial);
 	p->role = read_role(cert);
-	if (p->role == TLS_NOBODY)
+	if (p->role == TLS_NO_ROLE)
 		return error_set(e, EACCES, "the certificate of %s has no role in the farm", p->name);
 	return 0;
 }
 
 /* ---- certificates that expire soon ---- */
 
-static bool expiry_text(const char *what, time_t until, time_t now, char *text, size_t size)
+static bool describe_expiry(const char *subject, time_t until, time_t now, char *text, size_t size)
 {
 	char when[32];
 	struct tm tm;
@@ -169,54 +171,55 @@ static bool expiry_text(const char *what, time_t until, time_t now, char *text, 
 		return false;
 	strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&until, &tm));
 	if (days > 0)
-		snprintf(text, size, "%s expires in %.3g days, at %s", what, days, when);
+		snprintf(text, size, "%s expires in %.3g days, at %s", subject, days, when);
 	else
-		snprintf(text, size, "%s has expired, at %s", what, when);
+		snprintf(text, size, "%s has expired, at %s", subject, when);
 	return true;
 }
 
-bool tls_expiry(const struct tls_peer *p, time_t now, char *text, size_t size)
+bool tls_describe_expiry(const struct tls_peer *p, time_t now, char *text, size_t size)
 {
-	char what[TLS_NAME_MAX + 32];
-	snprintf(what, sizeof what, "the certificate of %s", p->name);
-	return expiry_text(what, p->until, now, text, size);
+	char subject[TLS_NAME_MAX + 32];
+	snprintf(subject, sizeof subject, "the certificate of %s", p->name);
+	return describe_expiry(subject, p->expiry_time, now, text, size);
 }
 
-bool tls_warning(const struct tls *t, time_t now, char *text, size_t size)
+bool tls_expiry_warning(const struct tls *t, time_t now, char *text, size_t size)
 {
-	char own[192], authority[160];
-	bool first = tls_expiry(&t->self, now, own, sizeof own);
-	bool second = expiry_text("the authority's certificate", t->authority_until, now, authority, sizeof authority);
-	snprintf(text, size, "%s%s%s", own, first && second ? "; " : "", authority);
+	char own_text[192], authority[160];
+	bool first = tls_describe_expiry(&t->self, now, own_text, sizeof own_text);
+	bool second =
+		describe_expiry("the authority's certificate", t->authority_expiry, now, authority, sizeof authority);
+	snprintf(text, size, "%s%s%s", own_text, first && second ? "; " : "", authority);
 	return first || second;
 }
 
-bool tls_warning_due(struct tls *t, time_t now, char *text, size_t size)
+bool tls_expiry_warning_due(struct tls *t, time_t now, char *text, size_t size)
 {
-	if ((t->warned && difftime(now, t->warned) < 86400) || !tls_warning(t, now, text, size))
+	if ((t->warning_time && difftime(now, t->warning_time) < 86400) || !tls_expiry_warning(t, now, text, size))
 		return false;
-	t->warned = now;
+	t->warning_time = now;
 	return true;
 }
 
-time_t tls_authority_until(const struct tls *t)
+time_t tls_authority_expiry(const struct tls *t)
 {
-	return t->authority_until;
+	return t->authority_expiry;
 }
 
 /* ---- the folder ---- */
 
-static int path_of(const struct tls *t, int file, char *path, size_t size)
+static int file_path(const struct tls *t, int file, char *path, size_t size)
 {
 	return snprintf(path, size, "%s/%s", t->folder, file_names[file]);
 }
 
-static void stat_files(const struct tls *t, struct stamp *stamps)
+static void stat_files(const struct tls *t, struct file_version *stamps)
 {
-	for (int i = 0; i < FILES; i++) {
+	for (int i = 0; i < FILE_COUNT; i++) {
 		char path[4096];
 		struct stat st;
-		path_of(t, i, path, sizeof path);
+		file_path(t, i, path, sizeof path);
 		memset(&stamps[i], 0, sizeof stamps[i]);
 		if (stat(path, &st))
 			continue;
@@ -244,18 +247,18 @@ static int verify_certificate(int good, X509_STORE_CTX *sc)
 	if (!l)
 		return good;
 	if (tls_read_peer(X509_STORE_CTX_get_current_cert(sc), &l->peer, &e) == 0) {
-		if (l->listening || l->peer.role == TLS_COORDINATOR)
+		if (l->is_server || l->peer.role == TLS_COORDINATOR)
 			return 1;
-		error_set(&e, EACCES, "it is the certificate of a %s, not of a coordinator", roles[l->peer.role]);
+		error_set(&e, EACCES, "it is the certificate of a %s, not of a coordinator", role_names[l->peer.role]);
 	}
-	text_copy(l->distrust, sizeof l->distrust, e.text);
+	text_copy(l->role_error, sizeof l->role_error, e.text);
 	X509_STORE_CTX_set_error(sc, X509_V_ERR_APPLICATION_VERIFICATION);
 	return 0;
 }
 
 /* Copies the revocation lists of an old context, so that certificates stay revoked if crl.pem is lost. Returns their
  * number; -1 if memory is out. */
-static int keep_lists(SSL_CTX *from, X509_STORE *to)
+static int copy_crls(SSL_CTX *from, X509_STORE *to)
 {
 	int count = 0;
 	STACK_OF(X509_OBJECT) *all = X509_STORE_get0_objects(SSL_CTX_get_cert_store(from));
@@ -272,18 +275,18 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 {
 	char path[4096];
 	X509_STORE *store = X509_STORE_new();
-	path_of(t, 0, path, sizeof path);
+	file_path(t, 0, path, sizeof path);
 	if (!store || X509_STORE_load_file(store, path) != 1) {
 		X509_STORE_free(store);
 		return set_file_error(e, EBADMSG, path);
 	}
 	SSL_CTX_set_cert_store(context, store); /* the context now owns the store */
-	int kept = revocations || !t->context ? 0 : keep_lists(t->context, store);
-	if (kept < 0)
+	int kept_crls = revocations || !t->context ? 0 : copy_crls(t->context, store);
+	if (kept_crls < 0)
 		return error_set(e, ENOMEM, "no memory for TLS");
-	if (!revocations && !kept)
+	if (!revocations && !kept_crls)
 		return 0;
-	path_of(t, 3, path, sizeof path);
+	file_path(t, 3, path, sizeof path);
 	if (revocations &&
 	    X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
 		return set_file_error(e, EBADMSG, path);
@@ -291,17 +294,17 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 	return 0;
 }
 
-static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self, struct error *e)
+static int load_key_pair(const struct tls *t, SSL_CTX *context, struct tls_peer *self, struct error *e)
 {
 	char path[4096], key[4096];
 	struct stat st;
-	path_of(t, 2, key, sizeof key);
+	file_path(t, 2, key, sizeof key);
 	if (stat(key, &st))
 		return error_file(e, errno, key);
 	if (st.st_mode & 0007)
 		return error_set(e, EPERM, "%s: everybody on this machine can read the key: chmod 600", key);
-	path_of(t, 1, path, sizeof path);
-	const char *bad = key_pair_use(context, key, path);
+	file_path(t, 1, path, sizeof path);
+	const char *bad = key_pair_load(context, key, path);
 	if (bad)
 		return set_file_error(e, EBADMSG, bad);
 	int rc = tls_read_peer(SSL_CTX_get0_certificate(context), self, e);
@@ -309,7 +312,7 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 }
 
 /* Returns when the certificate of the authority expires; the latest, if one authority is being replaced by another. */
-static time_t find_authority(SSL_CTX *context)
+static time_t find_authority_expiry(SSL_CTX *context)
 {
 	time_t last = 0;
 	STACK_OF(X509_OBJECT) *all = X509_STORE_get0_objects(SSL_CTX_get_cert_store(context));
@@ -317,7 +320,7 @@ static time_t find_authority(SSL_CTX *context)
 		X509 *cert = X509_OBJECT_get0_X509(sk_X509_OBJECT_value(all, i));
 		if (!cert || X509_check_issued(cert, SSL_CTX_get0_certificate(context)) != X509_V_OK)
 			continue;
-		time_t until = end_of(cert);
+		time_t until = cert_expiry(cert);
 		last = until > last ? until : last;
 	}
 	return last;
@@ -334,17 +337,17 @@ static void set_protocol(SSL_CTX *context)
 	SSL_CTX_set_mode(context, SSL_MODE_RELEASE_BUFFERS);
 	SSL_CTX_set_max_cert_list(context, CERTIFICATES_MAX);
 	SSL_CTX_set_verify(context, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, verify_certificate);
-	SSL_CTX_set_verify_depth(context, DEPTH);
+	SSL_CTX_set_verify_depth(context, CHAIN_DEPTH_MAX);
 }
 
-static int load(const struct tls *t, bool revocations, SSL_CTX **out, struct tls_peer *self, struct error *e)
+static int load_context(const struct tls *t, bool revocations, SSL_CTX **out, struct tls_peer *self, struct error *e)
 {
 	ERR_clear_error();
 	SSL_CTX *context = SSL_CTX_new(TLS_method());
 	if (!context)
 		return error_set(e, ENOMEM, "no memory for TLS");
 	set_protocol(context);
-	int rc = load_own(t, context, self, e);
+	int rc = load_key_pair(t, context, self, e);
 	if (!rc)
 		rc = load_store(t, context, revocations, e);
 	ERR_clear_error();
@@ -355,7 +358,7 @@ static int load(const struct tls *t, bool revocations, SSL_CTX **out, struct tls
 	return rc;
 }
 
-static bool is_there(const struct stamp *s)
+static bool file_exists(const struct file_version *s)
 {
 	return s->inode != 0;
 }
@@ -370,16 +373,16 @@ int tls_open(struct tls **out, const char *folder, struct error *e)
 	struct stat st;
 	if (!rc && (stat(folder, &st) || !S_ISDIR(st.st_mode)))
 		rc = error_set(e, EPERM, "%s is not a folder", folder);
-	t->recheck = 60;
-	stat_files(t, t->stamps);
-	memcpy(t->seen, t->stamps, sizeof t->seen);
+	t->recheck_seconds = 60;
+	stat_files(t, t->used_versions);
+	memcpy(t->read_versions, t->used_versions, sizeof t->read_versions);
 	if (!rc)
-		rc = load(t, is_there(&t->stamps[3]), &t->context, &t->self, e);
+		rc = load_context(t, file_exists(&t->used_versions[3]), &t->context, &t->self, e);
 	if (rc) {
 		mem_free(t);
 		return error_prefix(e, rc, "TLS");
 	}
-	t->authority_until = find_authority(t->context);
+	t->authority_expiry = find_authority_expiry(t->context);
 	*out = t;
 	return 0;
 }
@@ -394,49 +397,50 @@ void tls_close(struct tls *t)
 
 int tls_refresh(struct tls *t, struct error *e)
 {
-	struct stamp now[FILES];
+	struct file_version now[FILE_COUNT];
 	struct tls_peer self;
 	SSL_CTX *fresh;
 	stat_files(t, now);
-	bool news = memcmp(now, t->seen, sizeof now) != 0;
-	memcpy(t->seen, now, sizeof now);
-	if (memcmp(now, t->stamps, sizeof now) == 0)
+	bool files_changed = memcmp(now, t->read_versions, sizeof now) != 0;
+	memcpy(t->read_versions, now, sizeof now);
+	if (memcmp(now, t->used_versions, sizeof now) == 0)
 		return 0;
-	bool lost = is_there(&t->stamps[3]) && !is_there(&now[3]);
-	int rc = load(t, is_there(&now[3]), &fresh, &self, e);
-	if (rc && !news)
+	bool crl_lost = file_exists(&t->used_versions[3]) && !file_exists(&now[3]);
+	int rc = load_context(t, file_exists(&now[3]), &fresh, &self, e);
+	if (rc && !files_changed)
 		return 0;
 	if (rc)
 		return error_prefix(e, rc, "TLS; the previous files stay in use%s",
-				    lost ? ", including crl.pem, which is missing" : "");
-	memcpy(t->stamps, now, sizeof now);
+				    crl_lost ? ", including crl.pem, which is missing" : "");
+	memcpy(t->used_versions, now, sizeof now);
 	SSL_CTX_free(t->context);
 	t->context = fresh;
 	t->self = self;
-	t->authority_until = find_authority(fresh);
-	t->warned = 0;
-	return lost ? error_set(e, ENOENT, "TLS: %s/crl.pem is missing; the previous list stays in force", t->folder)
-		    : 1;
+	t->authority_expiry = find_authority_expiry(fresh);
+	t->warning_time = 0;
+	return crl_lost
+		       ? error_set(e, ENOENT, "TLS: %s/crl.pem is missing; the previous list stays in force", t->folder)
+		       : 1;
 }
 
-const struct tls_peer *tls_self(const struct tls *t)
+const struct tls_peer *tls_own_certificate(const struct tls *t)
 {
 	return &t->self;
 }
 
 void tls_set_recheck(struct tls *t, double seconds)
 {
-	t->recheck = seconds;
+	t->recheck_seconds = seconds;
 }
 
 double tls_recheck_seconds(const struct tls *t)
 {
-	return t->recheck;
+	return t->recheck_seconds;
 }
 
 /* ---- links ---- */
 
-int tls_link_new(struct tls_link **out, struct tls *t, bool listening, struct error *e)
+int tls_link_new(struct tls_link **out, struct tls *t, bool is_server, struct error *e)
 {
 	struct tls_link *l = mem_alloc(1, sizeof *l);
 	SSL *ssl = l ? SSL_new(t->context) : NULL;
@@ -450,11 +454,11 @@ int tls_link_new(struct tls_link **out, struct tls *t, bool listening, struct er
 	BIO_set_mem_eof_return(in, -1);
 	SSL_set_bio(ssl, in, to);
 	SSL_set_app_data(ssl, l);
-	if (listening)
+	if (is_server)
 		SSL_set_accept_state(ssl);
 	else
 		SSL_set_connect_state(ssl);
-	*l = (struct tls_link){.tls = t, .ssl = ssl, .in = in, .out = to, .listening = listening};
+	*l = (struct tls_link){.tls = t, .ssl = ssl, .input = in, .output = to, .is_server = is_server};
 	*out = l;
 	return 0;
 }
@@ -467,41 +471,41 @@ void tls_link_free(struct tls_link *l)
 	mem_free(l);
 }
 
-int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct error *e)
+int tls_link_receive(struct tls_link *l, const void *bytes, size_t size, struct error *e)
 {
 	if (!size)
 		return 0;
-	if (!l->begun && !tls_is_first_byte(*(const unsigned char *)bytes)) {
-		BIO_write(l->out, tls_none_here, sizeof tls_none_here);
+	if (!l->has_input && !tls_is_first_byte(*(const unsigned char *)bytes)) {
+		BIO_write(l->output, tls_mismatch_alert, sizeof tls_mismatch_alert);
 		return error_set(e, EACCES, "the peer does not use TLS, which is required here");
 	}
-	l->begun = true;
-	l->taken += l->open ? 0 : size;
-	if (BIO_write(l->in, bytes, (int)size) != (int)size)
+	l->has_input = true;
+	l->handshake_bytes += l->is_open ? 0 : size;
+	if (BIO_write(l->input, bytes, (int)size) != (int)size)
 		return error_set(e, ENOMEM, "no memory for TLS");
 	return 0;
 }
 
 /* Sets the error for a certificate that OpenSSL refuses. If its dates are the reason, this machine's clock may be
  * wrong, so the sentence names the time. */
-static int refuse(struct error *e, const char *what, int verdict)
+static int set_verify_error(struct error *e, const char *refusal, int verdict)
 {
 	char clock[64] = "";
 	time_t now = time(NULL);
 	struct tm tm;
-	bool dated = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED ||
-		     verdict == X509_V_ERR_CRL_NOT_YET_VALID || verdict == X509_V_ERR_CRL_HAS_EXPIRED;
-	if (dated)
+	bool is_date_error = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED ||
+			     verdict == X509_V_ERR_CRL_NOT_YET_VALID || verdict == X509_V_ERR_CRL_HAS_EXPIRED;
+	if (is_date_error)
 		strftime(clock, sizeof clock, " by the clock of this machine, %Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
-	return error_set(e, dated ? EKEYEXPIRED : EACCES, "%s: %s%s", what, X509_verify_cert_error_string(verdict),
-			 clock);
+	return error_set(e, is_date_error ? EKEYEXPIRED : EACCES, "%s: %s%s", refusal,
+			 X509_verify_cert_error_string(verdict), clock);
 }
 
 /* Sets the error for an alert of the peer. OpenSSL sends "bad certificate" for one that is not valid yet. */
-static int refused(struct error *e, int alert)
+static int set_alert_error(struct error *e, int alert)
 {
-	bool dated = alert == CERTIFICATE_EXPIRED || alert == BAD_CERTIFICATE;
-	return error_set(e, dated ? EKEYEXPIRED : EACCES, "the peer does not accept this certificate: %s%s",
+	bool is_date_error = alert == CERTIFICATE_EXPIRED || alert == BAD_CERTIFICATE;
+	return error_set(e, is_date_error ? EKEYEXPIRED : EACCES, "the peer does not accept this certificate: %s%s",
 			 SSL_alert_desc_string_long(alert),
 			 alert == CERTIFICATE_EXPIRED ? " by the clock of its machine" : "");
 }
@@ -510,19 +514,19 @@ static int refused(struct error *e, int alert)
 static int explain_failure(struct tls_link *l, struct error *e)
 {
 	unsigned long code = ERR_peek_error();
-	int reason = ERR_GET_REASON(code), alert = reason - ALERT_REASON;
+	int reason = ERR_GET_REASON(code), alert = reason - ALERT_REASON_BASE;
 	long verdict = SSL_get_verify_result(l->ssl);
 	const char *text = code ? ERR_reason_error_string(code) : NULL;
-	if (*l->distrust)
-		return error_set(e, EACCES, "the peer's certificate is not accepted: %s", l->distrust);
+	if (*l->role_error)
+		return error_set(e, EACCES, "the peer's certificate is not accepted: %s", l->role_error);
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && reason == SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE)
 		return error_set(e, EACCES, "the peer has no certificate");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert == PROTOCOL_VERSION)
 		return error_set(e, EACCES, "the peer does not speak TLS 1.3: was it started without --tls?");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert >= 40 && alert < 256)
-		return refused(e, alert);
+		return set_alert_error(e, alert);
 	if (verdict != X509_V_OK)
-		return refuse(e, "the peer's certificate is not accepted", (int)verdict);
+		return set_verify_error(e, "the peer's certificate is not accepted", (int)verdict);
 	return error_set(e, EPROTO, "TLS: %s", text ? text : "invalid data on the wire");
 }
 
@@ -530,10 +534,10 @@ static int explain_failure(struct tls_link *l, struct error *e)
  * *b by a new buffer if it is large and empty; `set` gives it to the SSL object. */
 static void replace_large_buffer(struct tls_link *l, BIO **b, void (*set)(SSL *, BIO *))
 {
-	enum { KEPT = 4096 };
+	enum { KEPT_BYTES_MAX = 4096 };
 	BUF_MEM *m = NULL;
 	BIO_get_mem_ptr(*b, &m);
-	BIO *fresh = l->open && BIO_pending(*b) == 0 && m && m->max > KEPT ? BIO_new(BIO_s_mem()) : NULL;
+	BIO *fresh = l->is_open && BIO_pending(*b) == 0 && m && m->max > KEPT_BYTES_MAX ? BIO_new(BIO_s_mem()) : NULL;
 	if (!fresh)
 		return;
 	BIO_set_mem_eof_return(fresh, -1);
@@ -543,19 +547,19 @@ static void replace_large_buffer(struct tls_link *l, BIO **b, void (*set)(SSL *,
 
 ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *e)
 {
-	size_t got = 0;
+	size_t count = 0;
 	ERR_clear_error();
-	int ok = SSL_read_ex(l->ssl, out, size, &got);
-	if (!l->open && SSL_is_init_finished(l->ssl))
-		l->open = true;
+	int ok = SSL_read_ex(l->ssl, out, size, &count);
+	if (!l->is_open && SSL_is_init_finished(l->ssl))
+		l->is_open = true;
 	if (ok == 1)
-		return (ssize_t)got;
+		return (ssize_t)count;
 	int rc;
 	switch (SSL_get_error(l->ssl, ok)) {
 	case SSL_ERROR_WANT_READ: /* all input is used up. (Bytes that follow the handshake do not count against it.) */
-		if (!l->open && l->taken > BEFORE_OPEN_MAX)
-			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
-		replace_large_buffer(l, &l->in, SSL_set0_rbio);
+		if (!l->is_open && l->handshake_bytes > HANDSHAKE_BYTES_MAX)
+			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", HANDSHAKE_BYTES_MAX);
+		replace_large_buffer(l, &l->input, SSL_set0_rbio);
 		return 0;
 	case SSL_ERROR_ZERO_RETURN:
 		return error_set(e, ECONNRESET, "the peer hung up");
@@ -580,20 +584,20 @@ int tls_link_write(struct tls_link *l, const void *bytes, size_t size, struct er
 size_t tls_link_output(struct tls_link *l, const unsigned char **bytes)
 {
 	char *at = NULL;
-	long size = BIO_get_mem_data(l->out, &at);
+	long size = BIO_get_mem_data(l->output, &at);
 	*bytes = (const unsigned char *)at;
 	return size > 0 ? (size_t)size : 0;
 }
 
-void tls_link_output_taken(struct tls_link *l)
+void tls_link_clear_output(struct tls_link *l)
 {
-	(void)BIO_reset(l->out);
-	replace_large_buffer(l, &l->out, SSL_set0_wbio);
+	(void)BIO_reset(l->output);
+	replace_large_buffer(l, &l->output, SSL_set0_wbio);
 }
 
 bool tls_link_is_open(const struct tls_link *l)
 {
-	return l->open;
+	return l->is_open;
 }
 
 const struct tls_peer *tls_link_peer(const struct tls_link *l)
@@ -609,10 +613,10 @@ int tls_link_recheck(struct tls_link *l, struct error *e)
 	if (!sc || !cert ||
 	    X509_STORE_CTX_init(sc, SSL_CTX_get_cert_store(l->tls->context), cert, SSL_get_peer_cert_chain(l->ssl)) !=
 		    1 ||
-	    X509_STORE_CTX_set_default(sc, l->listening ? "ssl_client" : "ssl_server") != 1)
+	    X509_STORE_CTX_set_default(sc, l->is_server ? "ssl_client" : "ssl_server") != 1)
 		rc = error_set(e, ENOMEM, "the peer's certificate cannot be checked again");
 	else if (X509_verify_cert(sc) != 1)
-		rc = refuse(e, "the peer's certificate is no longer accepted", X509_STORE_CTX_get_error(sc));
+		rc = set_verify_error(e, "the peer's certificate is no longer accepted", X509_STORE_CTX_get_error(sc));
 	X509_STORE_CTX_free(sc);
 	ERR_clear_error();
 	return rc;

@@ -25,32 +25,32 @@ enum plan_kind { PLAN_SAMPLES, PLAN_CHAINS };
 enum lease_kind { LEASE_BOOTSTRAP = 1, LEASE_RENDER = 2 };
 
 enum {
-	PLAN_MAX_GROUPS = 64,
-	PLAN_MAX_PIXELS = 1 << 24, /* pixels of the crop: bounds a batch */
-	PLAN_MAX_SIZE = 65536,	   /* width and height of the full film */
-	PLAN_MAX_FILM = 1 << 28,   /* pixels of the full film; a film above PLAN_MAX_PIXELS is rendered in crops */
-	PLAN_MAX_BORDER = 256,
-	PLAN_MAX_PARTS = 64,
-	PLAN_MAX_CHAINS = 1 << 20,
-	PLAN_MAX_LEASE_CHAINS = 1 << 14, /* bounds the message header (seeds, sizes of states) and payload (states) */
-	PLAN_MAX_BOOTSTRAP = 1 << 26,
-	PLAN_MAX_DEPTH = 128,	    /* edges */
-	PLAN_MUTATIONS_MAX = 160,   /* bytes of the mixture's text, with the final 0 */
-	PLAN_MAX_STRATEGIES = 8,    /* entries of the mixture */
-	PLAN_ACCURACY_MAX = 320,    /* bytes of the accuracy settings' text, with the final 0 */
-	PLAN_EFFECTS_MAX = 320,	    /* bytes of the effects' text, with the final 0 */
-	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second: more than one thread can ever make */
+	PLAN_GROUPS_MAX = 64,
+	PLAN_PIXELS_MAX = 1 << 24,	/* pixels of the crop: bounds a batch */
+	PLAN_SIDE_MAX = 65536,		/* width and height of the full film */
+	PLAN_FILM_PIXELS_MAX = 1 << 28, /* pixels of the full film; a film above PLAN_PIXELS_MAX is rendered in crops */
+	PLAN_BORDER_MAX = 256,
+	PLAN_PARTS_MAX = 64,
+	PLAN_CHAINS_MAX = 1 << 20,
+	PLAN_LEASE_CHAINS_MAX = 1 << 14, /* bounds the message header (seeds, sizes of states) and payload (states) */
+	PLAN_BOOTSTRAP_MAX = 1 << 26,
+	PLAN_DEPTH_MAX = 128,	   /* edges */
+	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, with the final 0 */
+	PLAN_STRATEGIES_MAX = 8,   /* entries of the mixture */
+	PLAN_ACCURACY_MAX = 320,   /* bytes of the accuracy settings' text, with the final 0 */
+	PLAN_EFFECTS_MAX = 320,	   /* bytes of the effects' text, with the final 0 */
+	PLAN_SPEED_MAX = 20000000, /* mutations or samples a second: more than one thread can ever make */
 };
 
 /*
  * Light that few samples are unlikely to find at all, such as reflections inside the glass around a lamp for `path`, as
- * estimated by a pilot (worker/render/unseen_light.h). at[i] is for 4^i samples per pixel (for chains: bootstrap
- * samples and independent proposals): the share of such light in the light of a part of the film, squared and averaged
- * over the film. All 0: there is no such light, or no pilot has run.
+ * estimated by a pilot (worker/render/unseen_light.h). mean_squares[i] is for 4^i samples per pixel (for chains:
+ * bootstrap samples and independent proposals): the share of such light in the light of a part of the film, squared and
+ * averaged over the film. All 0: there is no such light, or no pilot has run.
  */
-enum { PLAN_UNSEEN = 12 };
+enum { PLAN_UNSEEN_COUNT = 12 };
 struct plan_unseen {
-	double at[PLAN_UNSEEN];
+	double mean_squares[PLAN_UNSEEN_COUNT];
 };
 
 /* Mean numbers of rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: not counted. */
@@ -106,15 +106,15 @@ struct plan {
 	struct plan_unseen unseen; /* has no influence on the image, only on the error that is stated */
 };
 
-/* Lists of the numeric fields of struct plan and struct plan_request, except `kind`: PLAN_GIVEN are copied from the
- * request, PLAN_CHOSEN may be chosen by plan_make. Messages have fields of the same names. */
+/* Lists of the numeric fields of struct plan and struct plan_request, except `kind`: PLAN_COPIED_NUMBERS are copied
+ * from the request, PLAN_CHOSEN_NUMBERS may be chosen by plan_make. Messages have fields of the same names. */
 /* clang-format off */
-#define PLAN_FILM(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border)
-#define PLAN_GIVEN(X) PLAN_FILM(X) X(seed) X(min_depth) X(max_depth)
-#define PLAN_CHOSEN(X) X(groups) X(parts) X(chains) X(bootstrap) X(epoch)
-#define PLAN_BITS(X) PLAN_GIVEN(X) PLAN_CHOSEN(X)
-#define PLAN_NUMBERS(X) PLAN_BITS(X) X(rounds) X(seconds) X(target_error)
-#define PLAN_REQUEST_NUMBERS(X) PLAN_BITS(X) X(spp) X(mutations) X(seconds) X(target_error) X(speed)
+#define PLAN_FILM_NUMBERS(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border)
+#define PLAN_COPIED_NUMBERS(X) PLAN_FILM_NUMBERS(X) X(seed) X(min_depth) X(max_depth)
+#define PLAN_CHOSEN_NUMBERS(X) X(groups) X(parts) X(chains) X(bootstrap) X(epoch)
+#define PLAN_SHARED_NUMBERS(X) PLAN_COPIED_NUMBERS(X) PLAN_CHOSEN_NUMBERS(X)
+#define PLAN_NUMBERS(X) PLAN_SHARED_NUMBERS(X) X(rounds) X(seconds) X(target_error)
+#define PLAN_REQUEST_NUMBERS(X) PLAN_SHARED_NUMBERS(X) X(spp) X(mutations) X(seconds) X(target_error) X(speed)
 /* clang-format on */
 
 /* Returns whether the request says when to stop: by samples, mutations, time or an error. */
@@ -148,7 +148,7 @@ bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
 bool plan_wants_rays(const struct plan_request *r);
 /* Returns how many bootstrap samples one thread is assumed to draw in that time, at least 256; the largest possible
  * number if no rays were counted. */
-uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
+uint64_t plan_affordable_bootstrap(const struct plan_request *r, double seconds);
 /* Checks a plan from the wire: 0, or -EINVAL with a sentence. Every such plan must pass before it is used. */
 int plan_check(const struct plan *p, struct error *e);
 /* Returns the mean square of struct plan_unseen after that many samples per pixel, interpolated linearly in their
@@ -156,7 +156,7 @@ int plan_check(const struct plan *p, struct error *e);
 double plan_unseen_after(const struct plan *p, double spp);
 /* Describes the rule by which plan_make chose the length of an epoch; empty if the length was requested. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
-enum { PLAN_TEXT = 1536 }; /* bytes that suffice for the text of any plan_describe... function */
+enum { PLAN_TEXT_MAX = 1536 }; /* bytes that suffice for the text of any plan_describe... function */
 
 /* A half-open range. */
 struct plan_range {
@@ -169,19 +169,19 @@ struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 /* Returns the rows of a part, of the crop extended by the border, counted from the top of the extended crop. */
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
 /* Returns the parts that plan_make chooses for this plan's chains and groups, or its film, if none are requested. */
-uint32_t plan_parts_usual(const struct plan *p);
+uint32_t plan_default_parts(const struct plan *p);
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
 uint64_t plan_lease_mutations(const struct plan *p); /* samples or mutations in the longest lease of a round */
 uint64_t plan_extended_pixels(const struct plan *p); /* pixels of the crop extended by the border on each side */
 
 /* Returns the number of entries of a mixture's text, 0 if it is empty, or -1 if it is invalid: an empty entry, more
- * than PLAN_MAX_STRATEGIES, a character that no entry has, or no end within PLAN_MUTATIONS_MAX bytes. */
+ * than PLAN_STRATEGIES_MAX, a character that no entry has, or no end within PLAN_MUTATIONS_MAX bytes. */
 int plan_strategy_count(const char *mixture);
 /* Copies the i-th entry without its share ("hslt", "hslt@b2c0"), cut to fit. */
 void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size);
 
 /* Returns whether a text of a plan ends within `size` bytes, is followed by zeros only, and has no character that is
  * special to a shell. */
-bool plan_text_ok(const char *text, size_t size);
+bool plan_text_is_valid(const char *text, size_t size);
 
 #endif

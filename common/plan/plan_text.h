@@ -10,7 +10,7 @@ void plan_describe(const struct plan *p, char *text, size_t size);
 /* Describes which numbers of the request plan_make changed ("chains 100 -> 128: ..."); empty if none. */
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 /* Prints the options that reproduce the bits after `rounds` rounds, whatever bound ended this job. */
-void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
+void plan_print_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
 
 /* The options -D and --path, on which the contents of the scene depend. */
 struct plan_define {
@@ -23,8 +23,9 @@ struct plan_scene {
 	size_t path_count;
 	const char *paths[PLAN_PATHS_MAX];
 };
-/* Like plan_options, followed by the options of `s`, quoted for a shell. */
-void plan_options_with(const struct plan *p, uint64_t rounds, const struct plan_scene *s, char *text, size_t size);
-enum { PLAN_OPTIONS_TEXT = 16384 }; /* bytes for the options; longer texts are cut */
+/* Like plan_print_options, followed by the options of `s`, quoted for a shell. */
+void plan_print_options_with_scene(const struct plan *p, uint64_t rounds, const struct plan_scene *s, char *text,
+				   size_t size);
+enum { PLAN_OPTIONS_TEXT_MAX = 16384 }; /* bytes for the options; longer texts are cut */
 
 #endif

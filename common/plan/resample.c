@@ -5,7 +5,7 @@
 
 enum { STREAM_RESAMPLING = 5 }; /* the same number as the renderer's RNG_RESAMPLING, so that no other stream uses it */
 
-double plan_resample_u(const struct plan *p, uint32_t group)
+double plan_resample_offset(const struct plan *p, uint32_t group)
 {
 	threefry4x64_key_t key = {{p->seed, STREAM_RESAMPLING, 0, 0}};
 	threefry4x64_ctr_t counter = {{group, 0, 0, 0}};
@@ -28,10 +28,10 @@ bool plan_resample(const struct plan *p, uint32_t group, const float *weight, ui
 	double sum = (double)weight[0];
 	uint64_t i = 0;
 	for (uint32_t k = 0; k < count; k++) {
-		double at = ((double)k + u) / count * total;
-		/* `at` may be rounded up to the total: `last` then prevents running past the last index with a weight.
-		 * An index of weight 0 is never chosen. */
-		while (i < last && sum <= at)
+		double position = ((double)k + u) / count * total;
+		/* `position` may be rounded up to the total: `last` then prevents running past the last index with a
+		 * weight. An index of weight 0 is never chosen. */
+		while (i < last && sum <= position)
 			sum += (double)weight[++i];
 		index[k] = first + i;
 	}

@@ -11,6 +11,6 @@
 bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
 		   uint32_t count, uint64_t *index);
 /* Returns u for plan_resample, a function of the plan's seed and the group. */
-double plan_resample_u(const struct plan *p, uint32_t group);
+double plan_resample_offset(const struct plan *p, uint32_t group);
 
 #endif

@@ -17,20 +17,20 @@
 #include <assert.h>
 #include <string.h>
 
-enum { PAYLOAD_MOST = 1 << 30 };
+enum { PAYLOAD_MAX = 1 << 30 };
 
 static uint32_t chains_per_lease(const struct plan *p)
 {
 	return p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) : 0;
 }
 
-uint32_t states_payload_max(const struct plan *p)
+uint32_t chain_states_payload_max(const struct plan *p)
 {
-	uint64_t n = (uint64_t)chains_per_lease(p) * chain_state_max(p);
-	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
+	uint64_t n = (uint64_t)chains_per_lease(p) * chain_state_max_bytes(p);
+	return n < PAYLOAD_MAX ? (uint32_t)n : PAYLOAD_MAX;
 }
 
-static uint64_t tiles_most(const struct plan *p)
+static uint64_t max_tile_count(const struct plan *p)
 {
 	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE,
 		 down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
@@ -39,27 +39,28 @@ static uint64_t tiles_most(const struct plan *p)
 
 uint32_t batch_payload_max(const struct plan *p)
 {
-	uint64_t tiles = tiles_most(p) * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
+	uint64_t tiles = max_tile_count(p) * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
 	uint64_t moments = batch_moment_count(p, LEASE_RENDER) * sizeof(float);
-	uint64_t render = tiles + states_payload_max(p) + moments;
+	uint64_t render = tiles + chain_states_payload_max(p) + moments;
 	uint64_t weights = p->bootstrap / ((uint64_t)p->groups * p->parts) * sizeof(float);
 	uint64_t n = render > weights ? render : weights;
-	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
+	return n < PAYLOAD_MAX ? (uint32_t)n : PAYLOAD_MAX;
 }
 
 /* ---- digests of chain states ---- */
 
-int states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e)
+int chain_states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e)
 {
-	struct blob_hash *each = mem_alloc(count, sizeof *each);
-	if (!each)
+	struct blob_hash *digests = mem_alloc(count, sizeof *digests);
+	if (!digests)
 		return error_set(e, ENOMEM, "no memory for a digest of %u chain states", count);
 	int rc = 0;
 	for (uint32_t i = 0; i < count && !rc; i++)
-		rc = blob_hash_bytes(states[i].size ? (const void *)states[i].bytes : "", states[i].size, &each[i], e);
+		rc = blob_hash_bytes(states[i].size ? (const void *)states[i].bytes : "", states[i].size, &digests[i],
+				     e);
 	if (!rc)
-		rc = blob_hash_bytes(each, count * sizeof *each, out, e);
-	mem_free(each);
+		rc = blob_hash_bytes(digests, count * sizeof *digests, out, e);
+	mem_free(digests);
 	return rc ? -ENOMEM : 0;
 }
 
@@ -70,10 +71,10 @@ static int digest_to_wire(const struct chain_state *states, uint32_t count, stru
 	if (count == 0)
 		return 0;
 	*out = (ProtobufCBinaryData){sizeof h->bytes, h->bytes};
-	return states_digest(states, count, h, e);
+	return chain_states_digest(states, count, h, e);
 }
 
-int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e)
+int chain_states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e)
 {
 	if (m->len != sizeof out->bytes)
 		return error_set(e, EBADMSG, "a digest of chain states with %zu bytes", m->len);
@@ -85,12 +86,13 @@ int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out,
 static int check_digest(const struct chain_state *states, uint32_t count, const ProtobufCBinaryData *m,
 			struct blob_hash *out, struct error *e)
 {
-	struct blob_hash said;
-	int rc = states_digest_from_wire(m, &said, e);
+	struct blob_hash stated;
+	int rc = chain_states_digest_from_wire(m, &stated, e);
 	if (!rc)
-		rc = states_digest(states, count, out, e);
-	return rc || blob_hash_equal(&said, out) ? rc
-						 : error_set(e, EBADMSG, "the chain states do not match their digest");
+		rc = chain_states_digest(states, count, out, e);
+	return rc || blob_hash_equal(&stated, out)
+		       ? rc
+		       : error_set(e, EBADMSG, "the chain states do not match their digest");
 }
 
 /* ---- packing ---- */
@@ -98,7 +100,7 @@ static int check_digest(const struct chain_state *states, uint32_t count, const 
 struct packing {
 	unsigned char **tile_bytes;
 	uint32_t *tile_sizes, *state_sizes;
-	size_t payload;
+	size_t payload_size;
 };
 
 static void packing_fini(struct packing *k, uint32_t tiles)
@@ -124,29 +126,29 @@ static int packing_init(struct packing *k, const struct batch *b, const struct p
 		if (rc)
 			return rc;
 		k->tile_sizes[i] = (uint32_t)n;
-		k->payload += n;
+		k->payload_size += n;
 	}
 	for (uint32_t i = 0; i < b->state_count; i++) {
 		k->state_sizes[i] = b->states[i].size;
-		k->payload += b->states[i].size;
+		k->payload_size += b->states[i].size;
 	}
-	k->payload += (b->weight_count + b->moment_count) * sizeof(float);
+	k->payload_size += (b->weight_count + b->moment_count) * sizeof(float);
 	return 0;
 }
 
-static void write_payload(unsigned char *at, const struct batch *b, const struct packing *k)
+static void write_payload(unsigned char *destination, const struct batch *b, const struct packing *k)
 {
 	for (uint32_t i = 0; i < b->tile_count; i++) {
-		memcpy(at, k->tile_bytes[i], k->tile_sizes[i]);
-		at += k->tile_sizes[i];
+		memcpy(destination, k->tile_bytes[i], k->tile_sizes[i]);
+		destination += k->tile_sizes[i];
 	}
 	for (uint32_t i = 0; i < b->state_count; i++) {
 		if (b->states[i].size)
-			memcpy(at, b->states[i].bytes, b->states[i].size);
-		at += b->states[i].size;
+			memcpy(destination, b->states[i].bytes, b->states[i].size);
+		destination += b->states[i].size;
 	}
-	copy_numbers(at, b->weights, sizeof(float), b->weight_count);
-	copy_numbers(at + b->weight_count * sizeof(float), b->moments, sizeof(float), b->moment_count);
+	copy_numbers(destination, b->weights, sizeof(float), b->weight_count);
+	copy_numbers(destination + b->weight_count * sizeof(float), b->moments, sizeof(float), b->moment_count);
 }
 
 int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
@@ -158,7 +160,7 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 	Farm__LeaseKey key;
 	Farm__LeaseResult m;
 	memcpy(counters, b->counters, sizeof counters);
-	memcpy(strategy, b->strategy, sizeof strategy);
+	memcpy(strategy, b->strategies, sizeof strategy);
 	memcpy(classes, b->classes, sizeof classes);
 	int rc = packing_init(&k, b, p, e);
 	if (!rc) {
@@ -184,9 +186,9 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		rc = digest_to_wire(b->states, b->state_count, &digest, &m.states_digest, e);
 	}
 	if (!rc)
-		rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, &m), NULL, k.payload, frame, size, e);
+		rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, &m), NULL, k.payload_size, frame, size, e);
 	if (!rc)
-		write_payload(*frame + *size - k.payload, b, &k);
+		write_payload(*frame + *size - k.payload_size, b, &k);
 	packing_fini(&k, b->tile_count);
 	return rc;
 }
@@ -194,37 +196,38 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 /* ---- unpacking ---- */
 
 /* The part of a payload that has not been used yet. */
-struct cutter {
-	const unsigned char *at;
-	size_t left;
+struct payload_reader {
+	const unsigned char *next;
+	size_t remaining;
 };
 
-/* The pointer must not be NULL even if there is no payload: cut_bytes returns it for states of 0 bytes. */
-static struct cutter cutter_of(const unsigned char *payload, size_t size)
+/* The pointer must not be NULL even if there is no payload: read_bytes returns it for states of 0 bytes. */
+static struct payload_reader payload_reader_from(const unsigned char *payload, size_t size)
 {
-	static const unsigned char nothing[1];
-	return (struct cutter){payload ? payload : nothing, size};
+	static const unsigned char empty[1];
+	return (struct payload_reader){payload ? payload : empty, size};
 }
 
 /* Cuts `size` bytes off the front of the payload; NULL if it has fewer. */
-static const unsigned char *cut_bytes(struct cutter *c, size_t size)
+static const unsigned char *read_bytes(struct payload_reader *c, size_t size)
 {
-	if (size > c->left)
+	if (size > c->remaining)
 		return NULL;
-	const unsigned char *p = c->at;
-	c->at += size;
-	c->left -= size;
+	const unsigned char *p = c->next;
+	c->next += size;
+	c->remaining -= size;
 	return p;
 }
 
-static int cut_states(struct cutter *c, const uint32_t *sizes, size_t count, struct chain_state **out, struct error *e)
+static int read_states(struct payload_reader *c, const uint32_t *sizes, size_t count, struct chain_state **out,
+		       struct error *e)
 {
 	struct chain_state *states = mem_alloc(count, sizeof *states);
 	*out = states;
 	if (!states)
 		return error_set(e, ENOMEM, "no memory for %zu chain states", count);
 	for (size_t i = 0; i < count; i++) {
-		const unsigned char *from = sizes[i] <= CHAIN_STATE_MAX ? cut_bytes(c, sizes[i]) : NULL;
+		const unsigned char *from = sizes[i] <= CHAIN_STATE_MAX ? read_bytes(c, sizes[i]) : NULL;
 		if (!from)
 			return error_set(e, EBADMSG, "chain state %zu of %u bytes does not fit", i, sizes[i]);
 		if (sizes[i] == 0)
@@ -238,14 +241,14 @@ static int cut_states(struct cutter *c, const uint32_t *sizes, size_t count, str
 	return 0;
 }
 
-static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct plan *p, struct batch *b,
-		     struct error *e)
+static int read_tiles(struct payload_reader *c, const Farm__LeaseResult *m, const struct plan *p, struct batch *b,
+		      struct error *e)
 {
 	b->tiles = mem_alloc(m->n_tile_sizes, sizeof *b->tiles);
 	if (!b->tiles)
 		return error_set(e, ENOMEM, "no memory for %zu tiles", m->n_tile_sizes);
 	for (size_t i = 0; i < m->n_tile_sizes; i++) {
-		const unsigned char *from = cut_bytes(c, m->tile_sizes[i]);
+		const unsigned char *from = read_bytes(c, m->tile_sizes[i]);
 		if (!from)
 			return error_set(e, EBADMSG, "tile %zu of %u bytes does not fit", i, m->tile_sizes[i]);
 		int rc = exr_tile_read(from, m->tile_sizes[i], p->width, p->height, &b->tiles[i], e);
@@ -256,17 +259,17 @@ static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct 
 	return 0;
 }
 
-static int cut_floats(struct cutter *c, const char *what, uint64_t count, float **out, uint64_t *out_count,
-		      struct error *e)
+static int read_floats(struct payload_reader *c, const char *noun, uint64_t count, float **out, uint64_t *out_count,
+		       struct error *e)
 {
-	if (count > c->left / sizeof(float))
-		return error_set(e, EBADMSG, "%llu %s do not fit the payload", (unsigned long long)count, what);
+	if (count > c->remaining / sizeof(float))
+		return error_set(e, EBADMSG, "%llu %s do not fit the payload", (unsigned long long)count, noun);
 	if (count == 0)
 		return 0;
 	*out = mem_alloc(count, sizeof **out);
 	if (!*out)
-		return error_set(e, ENOMEM, "no memory for %llu %s", (unsigned long long)count, what);
-	copy_numbers(*out, cut_bytes(c, count * sizeof(float)), sizeof(float), count);
+		return error_set(e, ENOMEM, "no memory for %llu %s", (unsigned long long)count, noun);
+	copy_numbers(*out, read_bytes(c, count * sizeof(float)), sizeof(float), count);
 	*out_count = count;
 	return 0;
 }
@@ -274,7 +277,7 @@ static int cut_floats(struct cutter *c, const char *what, uint64_t count, float 
 int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult *m, const unsigned char *payload,
 		 size_t payload_size, struct error *e)
 {
-	struct cutter c = cutter_of(payload, payload_size);
+	struct payload_reader c = payload_reader_from(payload, payload_size);
 	struct blob_hash digest;
 	memset(b, 0, sizeof *b);
 	int rc = lease_key_from_wire(m->key, &b->key, e);
@@ -286,7 +289,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = error_set(e, EBADMSG, "a batch with %zu path classes", m->n_classes);
 	/* Counts are checked against the plan before memory is allocated for them, and before a message with thousands
 	 * of tiny tiles costs time. */
-	if (!rc && m->n_tile_sizes > tiles_most(p))
+	if (!rc && m->n_tile_sizes > max_tile_count(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu tiles", m->n_tile_sizes);
 	if (!rc && m->n_state_sizes > chains_per_lease(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
@@ -294,26 +297,26 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		memcpy(b->counters, m->counters, sizeof b->counters);
 		b->strategy_count = (uint32_t)(m->n_strategies / STRATEGY_COUNTERS);
 		if (m->n_strategies)
-			memcpy(b->strategy, m->strategies, m->n_strategies * sizeof *m->strategies);
+			memcpy(b->strategies, m->strategies, m->n_strategies * sizeof *m->strategies);
 		b->independent_sum = m->independent_sum;
 		b->independent_square = m->independent_square;
 		b->beyond_sum = m->beyond_sum;
 		b->cpu_seconds = m->cpu_seconds;
 		memcpy(b->classes, m->classes, sizeof b->classes);
-		rc = cut_tiles(&c, m, p, b, e);
+		rc = read_tiles(&c, m, p, b, e);
 	}
 	if (!rc) {
 		b->state_count = (uint32_t)m->n_state_sizes;
-		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &b->states, e);
+		rc = read_states(&c, m->state_sizes, m->n_state_sizes, &b->states, e);
 	}
 	if (!rc && m->states_digest.len)
 		rc = check_digest(b->states, b->state_count, &m->states_digest, &digest, e);
 	if (!rc)
-		rc = cut_floats(&c, "weights", m->weight_count, &b->weights, &b->weight_count, e);
+		rc = read_floats(&c, "weights", m->weight_count, &b->weights, &b->weight_count, e);
 	if (!rc)
-		rc = cut_floats(&c, "moments", m->moment_count, &b->moments, &b->moment_count, e);
-	if (!rc && c.left)
-		rc = error_set(e, EBADMSG, "%zu extra bytes after a batch", c.left);
+		rc = read_floats(&c, "moments", m->moment_count, &b->moments, &b->moment_count, e);
+	if (!rc && c.remaining)
+		rc = error_set(e, EBADMSG, "%zu extra bytes after a batch", c.remaining);
 	if (!rc)
 		rc = batch_check(b, p, e);
 	if (rc)
@@ -359,10 +362,10 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 	if (!rc)
 		rc = envelope_pack(ENVELOPE_OF(LEASE_GRANT, lease_grant, &m), NULL, payload, frame, size, e);
 	if (!rc && states) {
-		unsigned char *at = *frame + *size - payload;
-		for (uint32_t i = 0; i < chain_count; at += states[i++].size)
+		unsigned char *destination = *frame + *size - payload;
+		for (uint32_t i = 0; i < chain_count; destination += states[i++].size)
 			if (states[i].size)
-				memcpy(at, states[i].bytes, states[i].size);
+				memcpy(destination, states[i].bytes, states[i].size);
 	}
 	mem_free(seed_copy);
 	mem_free(sizes);
@@ -372,7 +375,7 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char *payload, size_t payload_size,
 		 struct error *e)
 {
-	struct cutter c = cutter_of(payload, payload_size);
+	struct payload_reader c = payload_reader_from(payload, payload_size);
 	memset(g, 0, sizeof *g);
 	int rc = lease_key_from_wire(m->key, &g->key, e);
 	if (!rc && m->n_seeds && m->n_state_sizes)
@@ -387,12 +390,12 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 	}
 	if (!rc && m->n_state_sizes) {
 		g->chain_count = (uint32_t)m->n_state_sizes;
-		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &g->states, e);
+		rc = read_states(&c, m->state_sizes, m->n_state_sizes, &g->states, e);
 		if (!rc)
 			rc = check_digest(g->states, g->chain_count, &m->states_digest, &g->digest, e);
 	}
-	if (!rc && c.left)
-		rc = error_set(e, EBADMSG, "%zu extra bytes after a lease", c.left);
+	if (!rc && c.remaining)
+		rc = error_set(e, EBADMSG, "%zu extra bytes after a lease", c.remaining);
 	if (rc)
 		grant_fini(g);
 	return rc;
@@ -401,11 +404,11 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 void grant_fini(struct grant *g)
 {
 	mem_free(g->seeds);
-	states_fini(g->states, g->chain_count);
+	chain_states_free(g->states, g->chain_count);
 	memset(g, 0, sizeof *g);
 }
 
-void states_fini(struct chain_state *states, uint32_t count)
+void chain_states_free(struct chain_state *states, uint32_t count)
 {
 	for (uint32_t i = 0; states && i < count; i++)
 		mem_free(states[i].bytes);

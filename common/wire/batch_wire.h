@@ -13,13 +13,13 @@
 
 /* Return the longest payload of a valid batch, or of a grant, of this plan: the limit to set for a connection. */
 uint32_t batch_payload_max(const struct plan *p);
-uint32_t states_payload_max(const struct plan *p);
+uint32_t chain_states_payload_max(const struct plan *p);
 
 /* Computes the digest that identifies the chain states of a lease: SHA-256 of the SHA-256 of each, in order. Returns 0
  * or -ENOMEM. */
-int states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e);
+int chain_states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e);
 /* Reads a digest from a message; -EBADMSG if its length is wrong. */
-int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e);
+int chain_states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e);
 /* Returns the hash of a scene's file from a message in which the length of the hash has been checked. */
 struct blob_hash file_hash_from_wire(const Farm__File *f);
 
@@ -52,6 +52,6 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 		 struct error *e);
 void grant_fini(struct grant *g);
 
-void states_fini(struct chain_state *states, uint32_t count); /* frees the states and the array */
+void chain_states_free(struct chain_state *states, uint32_t count); /* frees the states and the array */
 
 #endif

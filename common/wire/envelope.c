@@ -24,15 +24,15 @@
 
 enum {
 	BLOCK_BYTES = 1 << 14,
-	/* The first block has FIRST_BYTES + FIRST_TIMES * the message's length, at most BLOCK_BYTES, because thousands
-	 * of small messages may be held at the same time. */
-	FIRST_BYTES = 512,
-	FIRST_TIMES = 4,
-	/* Memory allowed per byte of a message, in addition to LEAST_BYTES. Valid messages need at most 8 (packed
-	 * varints of one byte each). */
+	/* The first block has FIRST_BLOCK_BASE + FIRST_BLOCK_FACTOR * the message's length, at most BLOCK_BYTES,
+	 * because thousands of small messages may be held at the same time. */
+	FIRST_BLOCK_BASE = 512,
+	FIRST_BLOCK_FACTOR = 4,
+	/* Memory allowed per byte of a message, in addition to UNPACKED_BYTES_BASE. Valid messages need at most 8
+	 * (packed varints of one byte each). */
 	AMPLIFICATION = 16,
-	LEAST_BYTES = 1 << 16,
-	CHECK_BYTES = 4, /* the checksum, a fixed32 with the highest field number, so it comes last in the message */
+	UNPACKED_BYTES_BASE = 1 << 16,
+	CHECKSUM_SIZE = 4, /* the checksum, a fixed32 with the highest field number, so it comes last in the message */
 };
 
 struct envelope_block {
@@ -49,16 +49,17 @@ static void *allocate_bounded(void *user, size_t size)
 		return NULL;
 	struct envelope_block *b = env->blocks;
 	if (!b || b->size - b->used < need) {
-		size_t first = FIRST_BYTES + FIRST_TIMES * ((env->limit - LEAST_BYTES) / AMPLIFICATION),
-		       usual = b || first > BLOCK_BYTES ? BLOCK_BYTES : first, room = need > usual ? need : usual;
-		b = mem_alloc(1, sizeof *b + room);
-		env->memory_out = !b;
+		size_t first = FIRST_BLOCK_BASE +
+			       FIRST_BLOCK_FACTOR * ((env->limit - UNPACKED_BYTES_BASE) / AMPLIFICATION),
+		       usual = b || first > BLOCK_BYTES ? BLOCK_BYTES : first, capacity = need > usual ? need : usual;
+		b = mem_alloc(1, sizeof *b + capacity);
+		env->out_of_memory = !b;
 		if (!b)
 			return NULL;
-		b->size = room;
+		b->size = capacity;
 		b->next = env->blocks;
 		env->blocks = b;
-		env->bytes += sizeof *b + room;
+		env->bytes += sizeof *b + capacity;
 	}
 	void *p = b->bytes + b->used;
 	b->used += need;
@@ -66,32 +67,32 @@ static void *allocate_bounded(void *user, size_t size)
 	return p;
 }
 
-static void give_back(void *user, void *p)
+static void ignore_free(void *user, void *p)
 {
 	(void)user;
 	(void)p;
 }
 
-static bool is_known(const ProtobufCMessage *m);
+static bool has_only_known_fields(const ProtobufCMessage *m);
 
 /* Returns whether all fields of the sub-messages in field f of m are known. */
-static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescriptor *f)
+static bool submessages_are_known(const ProtobufCMessage *m, const ProtobufCFieldDescriptor *f)
 {
 	const char *base = (const char *)m;
-	const void *at = base + f->offset;
+	const void *field = base + f->offset;
 	if (f->label == PROTOBUF_C_LABEL_REPEATED) {
 		size_t count = *(const size_t *)(const void *)(base + f->quantifier_offset);
-		ProtobufCMessage *const *many = *(ProtobufCMessage *const *const *)at;
+		ProtobufCMessage *const *messages = *(ProtobufCMessage *const *const *)field;
 		for (size_t i = 0; i < count; i++)
-			if (!is_known(many[i]))
+			if (!has_only_known_fields(messages[i]))
 				return false;
 		return true;
 	}
 	if ((f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF) &&
 	    *(const uint32_t *)(const void *)(base + f->quantifier_offset) != f->id)
 		return true;
-	const ProtobufCMessage *one = *(ProtobufCMessage *const *)at;
-	return !one || is_known(one);
+	const ProtobufCMessage *message = *(ProtobufCMessage *const *)field;
+	return !message || has_only_known_fields(message);
 }
 
 /* Hello and its answer may have unknown fields: a peer of a newer version says so in Hello and must get an answer. */
@@ -101,13 +102,13 @@ static bool may_be_newer(const ProtobufCMessage *m)
 }
 
 /* Returns whether the message has no unknown fields. The schema is not recursive, so the depth is bounded. */
-static bool is_known(const ProtobufCMessage *m)
+static bool has_only_known_fields(const ProtobufCMessage *m)
 {
 	if (m->n_unknown_fields && !may_be_newer(m))
 		return false;
 	for (unsigned i = 0; i < m->descriptor->n_fields; i++) {
 		const ProtobufCFieldDescriptor *f = &m->descriptor->fields[i];
-		if (f->type == PROTOBUF_C_TYPE_MESSAGE && !field_is_known(m, f))
+		if (f->type == PROTOBUF_C_TYPE_MESSAGE && !submessages_are_known(m, f))
 			return false;
 	}
 	return true;
@@ -115,44 +116,44 @@ static bool is_known(const ProtobufCMessage *m)
 
 /* Returns whether the message contains a checksum: Hello and its answer, of this version. Their frames have none, since
  * other versions could not read it. */
-static bool has_check(const Farm__Envelope *m)
+static bool has_checksum(const Farm__Envelope *m)
 {
 	return (m->body_case == FARM__ENVELOPE__BODY_HELLO && m->hello->version == FARM_VERSION) ||
 	       (m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK && m->hello_ack->version == FARM_VERSION);
 }
 
-static bool check_holds(const unsigned char *bytes, size_t size)
+static bool checksum_matches(const unsigned char *bytes, size_t size)
 {
-	if (size < CHECK_BYTES)
+	if (size < CHECKSUM_SIZE)
 		return false;
-	return crc32c(0, bytes, size - CHECK_BYTES) == get32(bytes + size - CHECK_BYTES);
+	return crc32c(0, bytes, size - CHECKSUM_SIZE) == get32(bytes + size - CHECKSUM_SIZE);
 }
 
-static void write_check(unsigned char *bytes, size_t size)
+static void write_checksum(unsigned char *bytes, size_t size)
 {
-	put32(bytes + size - CHECK_BYTES, crc32c(0, bytes, size - CHECK_BYTES));
+	put32(bytes + size - CHECKSUM_SIZE, crc32c(0, bytes, size - CHECKSUM_SIZE));
 }
 
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e)
 {
 	memset(env, 0, sizeof *env);
-	env->limit = LEAST_BYTES + AMPLIFICATION * size;
-	ProtobufCAllocator allocator = {allocate_bounded, give_back, env};
+	env->limit = UNPACKED_BYTES_BASE + AMPLIFICATION * size;
+	ProtobufCAllocator allocator = {allocate_bounded, ignore_free, env};
 	Farm__Envelope *m = farm__envelope__unpack(&allocator, size, bytes);
 	const char *fault = NULL;
 	if (!m)
 		fault = "a message that does not parse";
-	else if (!is_known(&m->base))
+	else if (!has_only_known_fields(&m->base))
 		fault = "a message with fields that this version of the protocol does not know";
 	else if (m->body_case == FARM__ENVELOPE__BODY__NOT_SET)
 		fault = "an envelope without a message";
 	if (fault) {
-		bool memory_out = env->memory_out;
+		bool out_of_memory = env->out_of_memory;
 		envelope_fini(env);
-		return memory_out ? error_set(e, ENOMEM, "no memory for a message")
-				  : error_set(e, EBADMSG, "%s", fault);
+		return out_of_memory ? error_set(e, ENOMEM, "no memory for a message")
+				     : error_set(e, EBADMSG, "%s", fault);
 	}
-	if (has_check(m) && !check_holds(bytes, size)) {
+	if (has_checksum(m) && !checksum_matches(bytes, size)) {
 		envelope_fini(env);
 		return error_set(e, EILSEQ, "a hello was changed in transit");
 	}
@@ -170,45 +171,45 @@ void envelope_fini(struct envelope *env)
 	memset(env, 0, sizeof *env);
 }
 
-int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
-			  const unsigned char **payload, size_t *payload_size, struct error *e)
+int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase expected, const unsigned char *frame,
+			  size_t size, const unsigned char **payload, size_t *payload_size, struct error *e)
 {
-	uint32_t header = 0, rest = 0;
+	uint32_t header = 0, payload_length = 0;
 	*payload = NULL;
 	*payload_size = 0;
-	if (size >= FRAME_PREFIX)
-		frame_prefix_read(frame, &header, &rest);
-	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
+	if (size >= FRAME_PREFIX_SIZE)
+		frame_prefix_read(frame, &header, &payload_length);
+	if (size < FRAME_PREFIX_SIZE || (uint64_t)header + payload_length != size - FRAME_PREFIX_SIZE)
 		return error_set(e, EBADMSG, "a frame of another length");
-	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
-	if (!rc && env->message->body_case != want) {
+	int rc = envelope_unpack(env, frame + FRAME_PREFIX_SIZE, header, e);
+	if (!rc && env->message->body_case != expected) {
 		envelope_fini(env);
 		rc = error_set(e, EBADMSG, "another message than was expected");
 	}
-	*payload = frame + FRAME_PREFIX + header;
-	*payload_size = rest;
+	*payload = frame + FRAME_PREFIX_SIZE + header;
+	*payload_size = payload_length;
 	return rc;
 }
 
-static int pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
-		size_t *size, struct error *e)
+static int pack_frame(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
+		      size_t *size, struct error *e)
 {
 	size_t header = farm__envelope__get_packed_size(message);
 	if (header == 0 || header > UINT32_MAX || payload_size > UINT32_MAX)
 		return error_set(e, EMSGSIZE, "a message of %zu + %zu bytes does not fit into a frame", header,
 				 payload_size);
-	size_t all = FRAME_PREFIX + header + payload_size;
-	unsigned char *p = mem_alloc(all, 1);
+	size_t frame_size = FRAME_PREFIX_SIZE + header + payload_size;
+	unsigned char *p = mem_alloc(frame_size, 1);
 	if (!p)
-		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", all);
+		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", frame_size);
 	frame_prefix_write(p, (uint32_t)header, (uint32_t)payload_size);
-	farm__envelope__pack(message, p + FRAME_PREFIX);
-	if (has_check(message))
-		write_check(p + FRAME_PREFIX, header);
+	farm__envelope__pack(message, p + FRAME_PREFIX_SIZE);
+	if (has_checksum(message))
+		write_checksum(p + FRAME_PREFIX_SIZE, header);
 	if (payload && payload_size)
-		memcpy(p + FRAME_PREFIX + header, payload, payload_size);
+		memcpy(p + FRAME_PREFIX_SIZE + header, payload, payload_size);
 	*bytes = p;
-	*size = all;
+	*size = frame_size;
 	return 0;
 }
 
@@ -218,19 +219,19 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 	Farm__Envelope copy = *message;
 	Farm__Hello hello;
 	Farm__HelloAck ack;
-	if (has_check(message) && message->body_case == FARM__ENVELOPE__BODY_HELLO) {
+	if (has_checksum(message) && message->body_case == FARM__ENVELOPE__BODY_HELLO) {
 		hello = *message->hello;
 		hello.check = 1; /* makes room for the checksum: a value of 0 would not be packed */
 		copy.hello = &hello;
-	} else if (has_check(message)) {
+	} else if (has_checksum(message)) {
 		ack = *message->hello_ack;
 		ack.check = 1;
 		copy.hello_ack = &ack;
 	}
-	return pack(&copy, payload, payload_size, bytes, size, e);
+	return pack_frame(&copy, payload, payload_size, bytes, size, e);
 }
 
-bool envelope_text_ok(const char *text, size_t max)
+bool envelope_text_is_valid(const char *text, size_t max)
 {
 	return text && strnlen(text, max + 1) <= max && text_is_clean(text);
 }

@@ -37,7 +37,7 @@ struct envelope {
 	struct envelope_block *blocks;
 	size_t bytes;	    /* memory of all blocks */
 	size_t used, limit; /* while unpacking: bytes handed out to protobuf-c, and their limit */
-	bool memory_out;    /* an allocation failed */
+	bool out_of_memory; /* an allocation failed */
 };
 
 /* Unpacks a message. Returns 0; -EBADMSG if the message does not parse, has unknown fields or no body, or needs more
@@ -59,6 +59,6 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 
 /* Returns whether a text from outside may be displayed and stored: not NULL, valid UTF-8, no control characters, at
  * most `max` bytes. */
-bool envelope_text_ok(const char *text, size_t max);
+bool envelope_text_is_valid(const char *text, size_t max);
 
 #endif

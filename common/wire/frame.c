@@ -18,22 +18,23 @@ static void write_u32(unsigned char *p, uint32_t v)
 	p[3] = (unsigned char)v;
 }
 
-void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size)
+void frame_prefix_write(unsigned char out[FRAME_PREFIX_SIZE], uint32_t header_size, uint32_t payload_size)
 {
 	write_u32(out, header_size);
 	write_u32(out + 4, payload_size);
 }
 
-void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_size, uint32_t *payload_size)
+void frame_prefix_read(const unsigned char in[FRAME_PREFIX_SIZE], uint32_t *header_size, uint32_t *payload_size)
 {
 	*header_size = read_u32(in);
 	*payload_size = read_u32(in + 4);
 }
 
-void frame_add_checksums(unsigned char out[FRAME_CHECKED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
-			 const unsigned char *content, size_t size)
+void frame_checked_prefix_write(unsigned char out[FRAME_CHECKED_PREFIX_SIZE],
+				const unsigned char prefix[FRAME_PREFIX_SIZE], const unsigned char *content,
+				size_t size)
 {
-	memcpy(out, prefix, FRAME_PREFIX);
+	memcpy(out, prefix, FRAME_PREFIX_SIZE);
 	write_u32(out + 8, crc32c(0, content, size));
 	write_u32(out + 12, crc32c(0, out, 12));
 }
@@ -50,51 +51,51 @@ void frame_reader_fini(struct frame_reader *r)
 	buf_fini(&r->payload);
 }
 
-static uint32_t prefix_wanted(const struct frame_reader *r)
+static uint32_t expected_prefix_size(const struct frame_reader *r)
 {
-	return r->checked ? FRAME_CHECKED_PREFIX : FRAME_PREFIX;
+	return r->has_checksums ? FRAME_CHECKED_PREFIX_SIZE : FRAME_PREFIX_SIZE;
 }
 
-static bool is_whole(const struct frame_reader *r)
+static bool is_complete(const struct frame_reader *r)
 {
-	return r->prefix_size && r->prefix_size == prefix_wanted(r) && r->header.size == r->header_size &&
+	return r->prefix_size && r->prefix_size == expected_prefix_size(r) && r->header.size == r->header_size &&
 	       r->payload.size == r->payload_size;
 }
 
 bool frame_reader_is_midway(const struct frame_reader *r)
 {
-	return r->prefix_size && !is_whole(r);
+	return r->prefix_size && !is_complete(r);
 }
 
-uint64_t frame_reader_size(const struct frame_reader *r)
+uint64_t frame_reader_frame_size(const struct frame_reader *r)
 {
 	return (uint64_t)r->header_size + r->payload_size;
 }
 
 /* Frees large buffers, so that an idle connection holds little memory. */
-void frame_reader_drop(struct frame_reader *r)
+void frame_reader_reset(struct frame_reader *r)
 {
-	enum { KEEP = 1 << 16 };
-	bool whole = is_whole(r);
-	if (r->header.capacity > KEEP)
+	enum { KEPT_BYTES_MAX = 1 << 16 };
+	bool complete = is_complete(r);
+	if (r->header.capacity > KEPT_BYTES_MAX)
 		buf_fini(&r->header);
-	if (r->payload.capacity > KEEP)
+	if (r->payload.capacity > KEPT_BYTES_MAX)
 		buf_fini(&r->payload);
 	r->header.size = r->payload.size = 0;
-	r->checked = r->checked || whole;
-	r->prefix_size = r->header_size = r->payload_size = r->sum = 0;
+	r->has_checksums = r->has_checksums || complete;
+	r->prefix_size = r->header_size = r->payload_size = r->crc = 0;
 }
 
-static int refuse_changed(struct error *e)
+static int refuse_corrupted(struct error *e)
 {
 	return error_set(e, EILSEQ, "data was changed in transit: the checksum of a message does not match");
 }
 
 /* Checks the prefix, sets the sizes, and bounds the buffers by them. */
-static int take_prefix(struct frame_reader *r, struct error *e)
+static int parse_prefix(struct frame_reader *r, struct error *e)
 {
-	if (r->checked && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
-		return refuse_changed(e);
+	if (r->has_checksums && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
+		return refuse_corrupted(e);
 	frame_prefix_read(r->prefix, &r->header_size, &r->payload_size);
 	if (r->header_size == 0)
 		return error_set(e, EBADMSG, "a frame without a header");
@@ -109,38 +110,38 @@ static int take_prefix(struct frame_reader *r, struct error *e)
 	return 0;
 }
 
-/* Appends bytes to one of the two buffers until it holds `want` bytes. */
-static int take_part(struct frame_reader *r, struct buf *b, size_t want, const unsigned char *bytes, size_t count,
-		     size_t *used, struct error *e)
+/* Appends bytes to one of the two buffers until it holds `expected` bytes. */
+static int fill_buffer(struct frame_reader *r, struct buf *b, size_t expected, const unsigned char *bytes, size_t count,
+		       size_t *used, struct error *e)
 {
-	size_t n = want - b->size < count - *used ? want - b->size : count - *used;
+	size_t n = expected - b->size < count - *used ? expected - b->size : count - *used;
 	if (!buf_append(b, bytes + *used, n))
-		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", want);
-	if (r->checked)
-		r->sum = crc32c(r->sum, bytes + *used, n);
+		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", expected);
+	if (r->has_checksums)
+		r->crc = crc32c(r->crc, bytes + *used, n);
 	*used += n;
 	return 0;
 }
 
-int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
+int frame_reader_feed(struct frame_reader *r, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
 {
 	*used = 0;
-	if (is_whole(r))
-		frame_reader_drop(r);
-	uint32_t prefix = prefix_wanted(r);
+	if (is_complete(r))
+		frame_reader_reset(r);
+	uint32_t prefix = expected_prefix_size(r);
 	if (r->prefix_size < prefix) {
 		while (r->prefix_size < prefix && *used < count)
 			r->prefix[r->prefix_size++] = bytes[(*used)++];
 		if (r->prefix_size < prefix)
 			return 0;
-		int rc = take_prefix(r, e);
+		int rc = parse_prefix(r, e);
 		if (rc)
 			return rc;
 	}
-	int rc = take_part(r, &r->header, r->header_size, bytes, count, used, e);
+	int rc = fill_buffer(r, &r->header, r->header_size, bytes, count, used, e);
 	if (!rc)
-		rc = take_part(r, &r->payload, r->payload_size, bytes, count, used, e);
-	if (rc || !is_whole(r))
+		rc = fill_buffer(r, &r->payload, r->payload_size, bytes, count, used, e);
+	if (rc || !is_complete(r))
 		return rc;
-	return r->checked && r->sum != read_u32(r->prefix + 8) ? refuse_changed(e) : 1;
+	return r->has_checksums && r->crc != read_u32(r->prefix + 8) ? refuse_corrupted(e) : 1;
 }

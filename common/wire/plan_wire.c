@@ -10,34 +10,34 @@ static size_t unseen_to_wire(const struct plan_unseen *u, double **out)
 	union { /* casts const away: protobuf-c's structures have no const, but packing only reads them */
 		const double *from;
 		double *to;
-	} borrowed = {u->at};
+	} borrowed = {u->mean_squares};
 	*out = borrowed.to;
-	for (size_t i = 0; i < PLAN_UNSEEN; i++)
-		if (u->at[i] > 0)
-			return PLAN_UNSEEN;
+	for (size_t i = 0; i < PLAN_UNSEEN_COUNT; i++)
+		if (u->mean_squares[i] > 0)
+			return PLAN_UNSEEN_COUNT;
 	return 0;
 }
 
 static int unseen_from_wire(const double *at, size_t count, struct plan_unseen *out, struct error *e)
 {
-	if (count && count != PLAN_UNSEEN)
+	if (count && count != PLAN_UNSEEN_COUNT)
 		return error_set(e, EBADMSG, "a plan with %zu numbers of unseen light", count);
 	for (size_t i = 0; i < count; i++)
-		out->at[i] = at[i];
+		out->mean_squares[i] = at[i];
 	return 0;
 }
 
 void plan_to_wire(const struct plan *p, Farm__Plan *out)
 {
 	farm__plan__init(out);
-	out->integrator = text_borrow(p->integrator);
+	out->integrator = text_unconst(p->integrator);
 	out->kind = (uint32_t)p->kind;
 #define X(name) out->name = p->name;
 	PLAN_NUMBERS(X)
 #undef X
-	out->mutations = text_borrow(p->mutations);
-	out->accuracy = text_borrow(p->accuracy);
-	out->effects = text_borrow(p->effects);
+	out->mutations = text_unconst(p->mutations);
+	out->accuracy = text_unconst(p->accuracy);
+	out->effects = text_unconst(p->effects);
 	out->n_unseen = unseen_to_wire(&p->unseen, &out->unseen);
 }
 
@@ -45,7 +45,7 @@ static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, 
 {
 	if (kind != PLAN_SAMPLES && kind != PLAN_CHAINS)
 		return error_set(e, EBADMSG, "a plan of unknown kind %u", kind);
-	if (!envelope_text_ok(name, 15))
+	if (!envelope_text_is_valid(name, 15))
 		return error_set(e, EBADMSG, "a plan whose integrator has no name of at most 15 bytes");
 	*out = (enum plan_kind)kind;
 	memset(integrator, 0, 16);
@@ -69,7 +69,7 @@ static int text_from_wire(const char *text, char *out, size_t size, struct error
 		return error_set(e, EBADMSG, "a plan whose settings or effects are a text of %zu bytes", n);
 	memset(out, 0, size);
 	memcpy(out, text, n);
-	return plan_text_ok(out, size) ? 0 : error_set(e, EBADMSG, "a plan whose settings or effects are none");
+	return plan_text_is_valid(out, size) ? 0 : error_set(e, EBADMSG, "a plan whose settings or effects are none");
 }
 
 int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
@@ -97,16 +97,16 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 {
 	farm__plan_request__init(out);
-	out->integrator = text_borrow(r->integrator);
+	out->integrator = text_unconst(r->integrator);
 	out->kind = (uint32_t)r->kind;
 #define X(name) out->name = r->name;
 	PLAN_REQUEST_NUMBERS(X)
 #undef X
 	out->bootstrap_rays = r->rays.bootstrap;
 	out->step_rays = r->rays.step;
-	out->mixture = text_borrow(r->mixture);
-	out->accuracy = text_borrow(r->accuracy);
-	out->effects = text_borrow(r->effects);
+	out->mixture = text_unconst(r->mixture);
+	out->accuracy = text_unconst(r->accuracy);
+	out->effects = text_unconst(r->effects);
 	out->n_unseen = unseen_to_wire(&r->unseen, &out->unseen);
 }
 
@@ -124,7 +124,7 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
 	if (!rc)
 		rc = unseen_from_wire(m->unseen, m->n_unseen, &r->unseen, e);
-	if (!rc && !(m->speed >= 0 && m->speed <= PLAN_SPEED_MOST))
+	if (!rc && !(m->speed >= 0 && m->speed <= PLAN_SPEED_MAX))
 		rc = error_set(e, EBADMSG, "a pilot of %g a second", m->speed);
 	if (!rc && !(m->bootstrap_rays >= 0 && m->bootstrap_rays < 1e15 && m->step_rays >= 0 && m->step_rays < 1e15))
 		rc = error_set(e, EBADMSG, "a pilot of %g and %g rays", m->bootstrap_rays, m->step_rays);

@@ -4,8 +4,8 @@
  *
  * Happy path: answer_batch judges a result (judge_result). If it is the next epoch of its slot it is merged: the
  * action tells the shell to add it to the films, the worker is acknowledged, other copies of the lease are revoked,
- * and job_merge reports whether the round is complete. If the lease is verified, the result counts only once a second
- * worker has sent an equal one (verify). answer_stored does the same for results read from a journal.
+ * and job_merge_epoch reports whether the round is complete. If the lease is verified, the result counts only once a
+ * second worker has sent an equal one (verify). answer_stored does the same for results read from a journal.
  *
  * Failures: a verdict of REPEAT means that the lease was merged before; REFUSE that the result does not count now,
  * through no fault of the worker; FAULT that no correct worker sends such content, which counts towards quarantine. A
@@ -28,11 +28,11 @@
 
 #include <math.h>
 
-enum { TRIES_FATAL = 3 };
+enum { FAILED_ATTEMPTS_FATAL = 3 };
 
 enum verdict { MERGE, NOTE, REPEAT, REFUSE, FAULT };
 
-static struct slot *slot_of(const struct job *j, const struct lease_key *k)
+static struct slot *find_slot(const struct job *j, const struct lease_key *k)
 {
 	if ((k->kind != LEASE_BOOTSTRAP && k->kind != LEASE_RENDER) || k->group >= j->plan.groups ||
 	    k->part >= j->plan.parts)
@@ -41,16 +41,16 @@ static struct slot *slot_of(const struct job *j, const struct lease_key *k)
 	return k->epoch < limit ? job_slot(j, k->group, k->part) : NULL;
 }
 
-static bool is_next(const struct job *j, const struct slot *s, const struct lease_key *k)
+static bool is_next_lease(const struct job *j, const struct slot *s, const struct lease_key *k)
 {
-	return s && k->kind == j->kind && k->epoch == s->next;
+	return s && k->kind == j->kind && k->epoch == s->next_epoch;
 }
 
 /* Whether merging the slot's next epoch would complete the round. While the error of the complete rounds is being
  * estimated such a result is refused, because the prefix of the image must not change meanwhile. */
-static bool would_complete(const struct job *j, const struct slot *s)
+static bool would_complete_round(const struct job *j, const struct slot *s)
 {
-	return s->next == j->rounds && j->done + 1 == j->slot_count;
+	return s->next_epoch == j->rounds && j->slots_done + 1 == j->slot_count;
 }
 
 static enum verdict judge_result(const struct peer *p, const struct job *j, const struct event *ev, const char **why)
@@ -59,11 +59,11 @@ static enum verdict judge_result(const struct peer *p, const struct job *j, cons
 	*why = !p ? "unknown worker" : !j ? "no such job" : !job_is_live(j) ? "the job is over" : "";
 	if (**why)
 		return REFUSE;
-	if (p->who->quarantined) {
+	if (p->identity->quarantined) {
 		*why = "the worker is quarantined: its results do not count";
 		return REFUSE;
 	}
-	const struct slot *s = slot_of(j, k);
+	const struct slot *s = find_slot(j, k);
 	if (!s) {
 		*why = "not a lease of this job";
 		return FAULT;
@@ -72,7 +72,7 @@ static enum verdict judge_result(const struct peer *p, const struct job *j, cons
 		*why = ev->text ? ev->text : "invalid content";
 		return FAULT;
 	}
-	if (!job_takes(j, p->class)) {
+	if (!job_accepts_class(j, p->class)) {
 		*why = "the job belongs to workers with another fingerprint";
 		return REFUSE;
 	}
@@ -80,61 +80,62 @@ static enum verdict judge_result(const struct peer *p, const struct job *j, cons
 		*why = "the bootstrap is not complete";
 		return REFUSE;
 	}
-	if (k->kind != j->kind || k->epoch < s->next) {
+	if (k->kind != j->kind || k->epoch < s->next_epoch) {
 		*why = "merged already";
 		return REPEAT;
 	}
-	if (j->ending != END_NONE)
+	if (j->pending_end != END_NONE)
 		*why = "the job is ending";
-	else if (k->epoch > s->next || s->next - j->rounds > 1)
+	else if (k->epoch > s->next_epoch || s->next_epoch - j->rounds > 1)
 		*why = "the epoch is not open";
-	else if (j->evaluating && would_complete(j, s))
+	else if (j->evaluating && would_complete_round(j, s))
 		*why = "the job's error is being estimated";
 	return **why ? REFUSE : MERGE;
 }
 
-static void acknowledge(struct farm *f, const struct event *ev, enum ack ack, const char *text)
+static void add_ack_action(struct farm *f, const struct event *ev, enum ack ack, const char *text)
 {
-	text_copy(f->text, sizeof f->text, text);
+	text_copy(f->answer_text, sizeof f->answer_text, text);
 	struct action *a = update_add(f, ACTION_ACK);
 	a->peer = ev->peer;
 	a->key = ev->lease.key;
 	a->job = a->key.job;
 	a->ack = ack;
-	a->text = f->text;
+	a->text = f->answer_text;
 }
 
-static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s, const struct event *ev, bool verified)
+static void merge_result(struct farm *f, struct peer *p, struct job *j, struct slot *s, const struct event *ev,
+			 bool verified)
 {
 	struct action *a = update_add(f, ACTION_MERGE);
 	a->peer = p->id;
 	a->key = ev->lease.key;
 	a->job = j->id;
-	a->who = p->who->id;
+	a->worker_id = p->identity->id;
 	a->verified = verified;
-	acknowledge(f, ev, ACK_MERGED, "");
-	struct lease *l = lease_of(s, p);
-	double duration = l ? f->now - l->sent : NAN;
-	double sent = l ? l->sent : -INFINITY;
+	add_ack_action(f, ev, ACK_MERGED, "");
+	struct lease *l = lease_find(s, p);
+	double duration = l ? f->now - l->sent_at : NAN;
+	double sent = l ? l->sent_at : -INFINITY;
 	if (l)
 		lease_drop(f, l);
 	for (const struct lease *k = s->leases; k; k = k->next)
-		if (k->sent < sent && !k->delivered && !k->overdue) /* a copy sent later has overtaken this one */
-			peer_was_late(f, k->peer);
+		if (k->sent_at < sent && !k->delivered && !k->overdue) /* a copy sent later has overtaken this one */
+			peer_note_lateness(f, k->peer);
 	lease_revoke_slot(f, s);
 	j->counts.verified += verified;
 	if (verified)
-		quarantine_settle(f, j, s, &ev->lease.digest);
-	doubt_settle(f, j, s, p->who, &ev->lease.key);
-	peer_succeeded(f, p, j->id);
+		quarantine_judge_answers(f, j, s, &ev->lease.digest);
+	doubt_settle(f, j, s, p->identity, &ev->lease.key);
+	peer_note_success(f, p, j->id);
 	if (!j->mixed)
 		job_pin(j, p->class);
 	j->progress_floor = job_progress(j, f->now);
-	if (job_merge(j, s, f->now, duration))
-		rounds_complete(f, j);
+	if (job_merge_epoch(j, s, f->now, duration))
+		rounds_round_complete(f, j);
 }
 
-static void count(struct peer *p, struct job *j, enum verdict v)
+static void count_verdict(struct peer *p, struct job *j, enum verdict v)
 {
 	if (p) {
 		p->repeats += v == REPEAT;
@@ -148,17 +149,17 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 }
 
 /* Decides a result of a verified lease, which is merged only if another worker has sent an equal one. */
-static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev,
-			   const char **why)
+static enum verdict verify_result(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev,
+				  const char **why)
 {
 	/* A late answer may come from a class that the job no longer belongs to. It must not be compared with answers
 	 * of another class. */
-	if (!j->class && !verify_may_begin(f, j, p->class)) {
+	if (!j->class && !verify_can_begin(f, j, p->class)) {
 		*why = "the job is not pinned, and cannot be to a lone worker";
 		return REFUSE;
 	}
 	job_pin(j, p->class);
-	switch (proof_take(j, s, p->who, &ev->lease.digest)) {
+	switch (proof_add_answer(j, s, p->identity, &ev->lease.digest)) {
 	case VERIFY_AGREES:
 		return MERGE;
 	case VERIFY_NOTED:
@@ -177,17 +178,17 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 	return FAULT;
 }
 
-/* Ends the job if VERIFY_MOST workers gave as many different answers. Either the job's workers cannot compute this
- * lease reproducibly, or some are wrong in the same way each time, and a further answer would not help. */
-static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
+/* Ends the job if VERIFY_ANSWERS_MAX workers gave as many different answers. Either the job's workers cannot compute
+ * this lease reproducibly, or some are wrong in the same way each time, and a further answer would not help. */
+static void fail_if_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
 {
 	char names[160], text[256];
-	if (j->proofs[s - j->slots].count < VERIFY_MOST)
+	if (j->proofs[s - j->slots].count < VERIFY_ANSWERS_MAX)
 		return;
-	proof_names(j, s, names, sizeof names);
-	text_print(text, sizeof text, "no two of %d workers agree on " LEASE_WORDS ": %s", VERIFY_MOST, LEASE_PLACE(k),
-		   names);
-	rounds_end(f, j, END_FAILED, text);
+	proof_format_names(j, s, names, sizeof names);
+	text_print(text, sizeof text, "no two of %d workers agree on " LEASE_POSITION_FORMAT ": %s", VERIFY_ANSWERS_MAX,
+		   LEASE_POSITION_VALUES(k), names);
+	rounds_end_job(f, j, END_FAILED, text);
 }
 
 void answer_batch(struct farm *f, const struct event *ev)
@@ -196,159 +197,159 @@ void answer_batch(struct farm *f, const struct event *ev)
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	const char *why;
 	enum verdict v = judge_result(p, j, ev, &why);
-	struct slot *s = j && job_is_live(j) ? slot_of(j, &ev->lease.key) : NULL;
-	bool verified = v == MERGE && proof_chosen(j, &ev->lease.key);
+	struct slot *s = j && job_is_live(j) ? find_slot(j, &ev->lease.key) : NULL;
+	bool verified = v == MERGE && proof_is_required(j, &ev->lease.key);
 	if (verified)
-		v = verify(f, j, s, p, ev, &why);
+		v = verify_result(f, j, s, p, ev, &why);
 	if (v == MERGE) {
-		merge(f, p, j, s, ev, verified);
+		merge_result(f, p, j, s, ev, verified);
 		return;
 	}
-	count(p, j, v);
-	acknowledge(f, ev, v == NOTE ? ACK_NOTED : v == REPEAT ? ACK_REPEAT : ACK_REFUSED, why);
-	struct lease *l = p && is_next(j, s, &ev->lease.key) ? lease_of(s, p) : NULL;
+	count_verdict(p, j, v);
+	add_ack_action(f, ev, v == NOTE ? ACK_NOTED : v == REPEAT ? ACK_REPEAT : ACK_REFUSED, why);
+	struct lease *l = p && is_next_lease(j, s, &ev->lease.key) ? lease_find(s, p) : NULL;
 	if (l)
 		lease_drop(f, l);
 	else if (v == NOTE)
-		job_place(j, s);
+		job_place_slot(j, s);
 	if (v == FAULT)
-		quarantine_fault(f, p, f->text);
+		quarantine_note_fault(f, p, f->answer_text);
 	if (v == NOTE)
-		give_up_where_hopeless(f, j, s, &ev->lease.key);
+		fail_if_hopeless(f, j, s, &ev->lease.key);
 }
 
 void answer_stored(struct farm *f, const struct event *ev)
 {
 	const struct lease_key *k = &ev->lease.key;
 	struct job *j = farm_find_job(f, k->job);
-	struct slot *s = j && job_is_live(j) ? slot_of(j, k) : NULL;
-	if (!is_next(j, s, k) || s->next - j->rounds > 1 || j->ending != END_NONE ||
-	    (j->evaluating && would_complete(j, s)))
+	struct slot *s = j && job_is_live(j) ? find_slot(j, k) : NULL;
+	if (!is_next_lease(j, s, k) || s->next_epoch - j->rounds > 1 || j->pending_end != END_NONE ||
+	    (j->evaluating && would_complete_round(j, s)))
 		return;
 	struct action *a = update_add(f, ACTION_MERGE);
 	a->key = *k;
 	a->job = j->id;
 	a->verified = true; /* it met all requirements when it arrived */
 	lease_revoke_slot(f, s);
-	if (proof_chosen(j, k))
-		quarantine_settle(f, j, s, &ev->lease.digest);
+	if (proof_is_required(j, k))
+		quarantine_judge_answers(f, j, s, &ev->lease.digest);
 	s->doubt = (struct doubt){0};
 	j->progress_floor = job_progress(j, f->now);
-	if (job_merge(j, s, f->now, NAN))
-		rounds_complete(f, j);
+	if (job_merge_epoch(j, s, f->now, NAN))
+		rounds_round_complete(f, j);
 }
 
-bool answer_all_failed(const struct farm *f, const struct job *j)
+bool answer_all_workers_failed(const struct farm *f, const struct job *j)
 {
-	uint32_t here = 0;
+	uint32_t worker_count = 0;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state != PEER_ACTIVE || !job_takes(j, p->class))
+		if (p->state != PEER_ACTIVE || !job_accepts_class(j, p->class))
 			continue;
-		if (isinf(peer_avoids_until(p, j->id)) || peer_waits_for_room(p, j->id))
+		if (isinf(peer_backoff_end(p, j->id)) || peer_waits_for_memory(p, j->id))
 			return false;
-		here++;
+		worker_count++;
 	}
-	return here > 0;
+	return worker_count > 0;
 }
 
 /* Nothing of the job was ever computed, and no connected worker is left that might compute it: there is nothing to
  * lose and nobody to wait for. Workers whose own machine is at fault do not count. */
-static bool never_works(const struct farm *f, const struct job *j)
+static bool cannot_succeed(const struct farm *f, const struct job *j)
 {
-	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
+	return j->failed_attempts >= FAILED_ATTEMPTS_FATAL && answer_all_workers_failed(f, j);
 }
 
 /* Returns the slot whose next lease the event is about; NULL if the worker or job is unknown or this is not the next
  * lease. */
-static struct slot *next_slot(const struct farm *f, const struct event *ev)
+static struct slot *find_next_slot(const struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	if (!farm_find_peer(f, ev->peer) || !j || !job_is_live(j))
 		return NULL;
-	struct slot *s = slot_of(j, &ev->lease.key);
-	return is_next(j, s, &ev->lease.key) ? s : NULL;
+	struct slot *s = find_slot(j, &ev->lease.key);
+	return is_next_lease(j, s, &ev->lease.key) ? s : NULL;
 }
 
 static struct lease *lease_held_by_sender(const struct farm *f, const struct event *ev)
 {
-	struct slot *s = next_slot(f, ev);
-	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
+	struct slot *s = find_next_slot(f, ev);
+	return s ? lease_find(s, farm_find_peer(f, ev->peer)) : NULL;
 }
 
 /* Whether the refusal of the chain states concerns an earlier grant of this lease, so that the worker has, or will
  * get, a grant with the current states. */
 static bool is_late_refusal(const struct slot *s, const struct event *ev)
 {
-	return ev->lease.bad_states && (ev->lease.other_states || s->doubt.anew);
+	return ev->lease.bad_states && (ev->lease.states_outdated || s->doubt.from_seeds);
 }
 
 /* Whether the lease was granted before the job's files were repaired: the failure is probably due to the damaged
  * files. */
-static bool is_files_fault(const struct lease *l, const struct event *ev)
+static bool is_due_to_files(const struct lease *l, const struct event *ev)
 {
-	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
+	return l && !ev->lease.worker_at_fault && !ev->lease.bad_states && l->sent_at < l->job->files_changed_at;
 }
 
 /* Keeps the text of the failure, which the status shows. */
 static void note_failure(struct farm *f, struct peer *p, struct job *j, const struct event *ev)
 {
-	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
-	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
-	if (!ev->lease.later) /* this is no failure, and it passes: status.c reads the text from the worker */
-		text_copy(j->text, sizeof j->text, f->text);
+	text_copy(p->last_fault, sizeof p->last_fault, ev->text ? ev->text : "");
+	text_print(f->answer_text, sizeof f->answer_text, "%s: %s", p->name, p->last_fault);
+	if (!ev->lease.memory_full) /* this is no failure, and it passes: status.c reads the text from the worker */
+		text_copy(j->text, sizeof j->text, f->answer_text);
 }
 
 void answer_failed(struct farm *f, const struct event *ev)
 {
-	struct slot *s = next_slot(f, ev);
+	struct slot *s = find_next_slot(f, ev);
 	if (s && is_late_refusal(s, ev))
 		return;
 	struct peer *p = farm_find_peer(f, ev->peer);
-	struct lease *l = s ? lease_of(s, p) : NULL;
+	struct lease *l = s ? lease_find(s, p) : NULL;
 	/* A worker's supervisor may report, after reconnecting, a lease that ended the previous process. */
-	bool was_lost = s && lost_holders_remove(&s->lost, p->who);
+	bool was_lost = s && lost_holders_remove(&s->lost_holders, p->identity);
 	if (!l && !was_lost)
 		return;
-	if (is_files_fault(l, ev)) {
+	if (is_due_to_files(l, ev)) {
 		lease_drop(f, l);
 		return;
 	}
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	if (l)
 		lease_drop(f, l);
-	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next > 0) {
+	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next_epoch > 0) {
 		j->counts.failures++;
-		doubt_refused(f, j, s, p, ev->lease.can_take_back, ev->text ? ev->text : "");
+		doubt_refused(f, j, s, p, ev->lease.can_roll_back, ev->text ? ev->text : "");
 		return;
 	}
-	if (ev->lease.own && ev->lease.later) {
-		peer_has_no_room(f, p, j->id);
+	if (ev->lease.worker_at_fault && ev->lease.memory_full) {
+		peer_note_memory_full(f, p, j->id);
 		note_failure(f, p, j, ev);
 		return;
 	}
 	/* Several leases that fail at once count as one. */
-	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id);
-	peer_failed(f, p, j->id, ev->lease.own);
+	bool is_repeat = peer_backoff_end(p, j->id) > f->now && !peer_is_at_fault(p, j->id);
+	peer_note_failure(f, p, j->id, ev->lease.worker_at_fault);
 	note_failure(f, p, j, ev);
 	j->counts.failures++;
-	if (ev->lease.own) /* a fault of the worker's machine says nothing about the job */
+	if (ev->lease.worker_at_fault) /* a fault of the worker's machine says nothing about the job */
 		return;
-	j->tries += !again;
-	bool fatal = failure_quorum_add(&s->failure_quorum, f, p->who),
-	     in_all = failure_quorum_add(&j->failure_quorum, f, p->who);
-	if (!fatal && (job_is_proven(j) || !(in_all || never_works(f, j))))
+	j->failed_attempts += !is_repeat;
+	bool is_lease_fatal = failure_quorum_add(&s->failure_quorum, f, p->identity),
+	     is_job_fatal = failure_quorum_add(&j->failure_quorum, f, p->identity);
+	if (!is_lease_fatal && (job_has_answers(j) || !(is_job_fatal || cannot_succeed(f, j))))
 		return;
 	if (was_lost)
 		owner_limit(j->owner, f->now);
-	rounds_end(f, j, END_FAILED, f->text);
+	rounds_end_job(f, j, END_FAILED, f->answer_text);
 }
 
 void answer_delivered(struct farm *f, const struct event *ev)
 {
 	struct lease *l = lease_held_by_sender(f, ev);
 	if (l)
-		lease_deliver(f, l);
+		lease_mark_delivered(f, l);
 }
 
 void answer_returned(struct farm *f, const struct event *ev)
@@ -358,15 +359,15 @@ void answer_returned(struct farm *f, const struct event *ev)
 		lease_drop(f, l);
 }
 
-bool answer_counts(const struct farm *f, uint64_t peer, const struct lease_key *k)
+bool answer_failure_counts(const struct farm *f, uint64_t peer, const struct lease_key *k)
 {
 	const struct event ev = {.peer = peer, .lease = {.key = *k}};
-	const struct slot *s = next_slot(f, &ev);
+	const struct slot *s = find_next_slot(f, &ev);
 	const struct peer *p = farm_find_peer(f, peer);
-	return s && (lease_of(s, p) || lost_holders_have(&s->lost, p->who));
+	return s && (lease_find(s, p) || lost_holders_contain(&s->lost_holders, p->identity));
 }
 
-enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
+enum farm_delivery answer_delivery(const struct farm *f, uint64_t peer, const struct lease_key *k)
 {
 	const struct event ev = {.peer = peer, .lease = {.key = *k}};
 	const struct peer *p = farm_find_peer(f, peer);
@@ -374,6 +375,7 @@ enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const stru
 	const struct lease *l = lease_held_by_sender(f, &ev);
 	if (l && !l->delivered)
 		return DELIVERY_AWAITED;
-	bool open = p && !p->who->quarantined && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p->class);
-	return open && is_next(j, slot_of(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
+	bool open = p && !p->identity->quarantined && j && job_is_live(j) && j->pending_end == END_NONE &&
+		    job_accepts_class(j, p->class);
+	return open && is_next_lease(j, find_slot(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
 }

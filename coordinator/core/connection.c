@@ -16,57 +16,57 @@ static struct peer *peer_new(struct farm *f, const struct event_join *e, uint32_
 	struct peer *p = mem_alloc(1, sizeof *p + limit * sizeof *p->leases);
 	if (!p)
 		return NULL;
-	p->class = peer_class_use(&f->classes, e->fingerprint);
+	p->class = peer_class_acquire(&f->classes, e->fingerprint);
 	if (!p->class) {
 		mem_free(p);
 		return NULL;
 	}
-	p->lease_limit = limit;
+	p->lease_capacity = limit;
 	return p;
 }
 
-struct peer *connection_join(struct farm *f, const struct event_join *e, const char **refused)
+struct peer *connection_join(struct farm *f, const struct event_join *e, const char **refusal)
 {
 	if (f->peer_count == f->config.max_peers) {
-		*refused = "the farm has as many workers as it accepts";
+		*refusal = "the farm has as many workers as it accepts";
 		return NULL;
 	}
-	if (!*e->name || strlen(e->name) >= PEER_NAME) {
-		*refused = "a worker needs a name, of at most 127 bytes";
+	if (!*e->name || strlen(e->name) >= PEER_NAME_SIZE) {
+		*refusal = "a worker needs a name, of at most 127 bytes";
 		return NULL;
 	}
 	if (e->threads == 0 || strlen(e->fingerprint) >= FINGERPRINT_SIZE) {
-		*refused = e->threads ? "the fingerprint is too long" : "a worker without threads";
+		*refusal = e->threads ? "the fingerprint is too long" : "a worker without threads";
 		return NULL;
 	}
 	/* Room for 1.5 leases per thread and for some overdue leases. */
 	uint32_t limit = f->config.max_peer_leases;
 	if (e->threads < limit / 2)
 		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;
-	struct identity *who = worker_registry_use(f, e, refused);
-	if (!who)
+	struct identity *identity = worker_registry_acquire(f, e, refusal);
+	if (!identity)
 		return NULL;
 	struct peer *p = peer_new(f, e, limit);
 	if (!p) {
-		worker_registry_drop(f, who);
-		*refused = "the coordinator has no memory for another worker";
+		worker_registry_release(f, identity);
+		*refusal = "the coordinator has no memory for another worker";
 		return NULL;
 	}
 	p->id = e->peer;
-	p->who = who;
+	p->identity = identity;
 	text_copy(p->home, sizeof p->home, e->home);
 	p->restarts = e->restarts;
 	text_copy(p->name, sizeof p->name, e->name);
 	p->threads = e->threads;
-	p->joined = p->last_seen = f->now;
-	p->state = who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
-	if (who->quarantined)
-		memcpy(p->text, who->text, sizeof p->text);
-	p->class->active += p->state == PEER_ACTIVE;
-	list_init(&p->waiting);
-	f->lease_limit += limit;
-	if (f->now + f->config.silent_after < f->check_at)
-		f->check_at = f->now + f->config.silent_after;
+	p->joined_at = p->last_seen = f->now;
+	p->state = identity->quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
+	if (identity->quarantined)
+		memcpy(p->last_fault, identity->last_fault, sizeof p->last_fault);
+	p->class->active_count += p->state == PEER_ACTIVE;
+	list_init(&p->waiting_link);
+	f->lease_capacity += limit;
+	if (f->now + f->config.silence_timeout < f->expiry_check_at)
+		f->expiry_check_at = f->now + f->config.silence_timeout;
 	uint32_t i = f->peer_count++;
 	for (; i > 0 && f->peers[i - 1]->id > p->id; i--)
 		f->peers[i] = f->peers[i - 1];
@@ -76,9 +76,9 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 
 void connection_drop_leases(struct farm *f, struct peer *p, bool revoke)
 {
-	for (uint32_t i = 0; i < p->lease_limit; i++) {
+	for (uint32_t i = 0; i < p->lease_capacity; i++) {
 		struct lease *l = &p->leases[i];
-		if (!l->used)
+		if (!l->in_use)
 			continue;
 		if (revoke)
 			lease_revoke(f, l);
@@ -89,14 +89,14 @@ void connection_drop_leases(struct farm *f, struct peer *p, bool revoke)
 
 void connection_leave(struct farm *f, struct peer *p)
 {
-	p->want = 0;
+	p->wanted_leases = 0;
 	peer_requeue(f, p);
 	connection_drop_leases(f, p, false);
 	if (p->state == PEER_ACTIVE)
-		p->class->active--;
-	peer_class_drop(p->class);
-	worker_registry_drop(f, p->who);
-	f->lease_limit -= p->lease_limit;
+		p->class->active_count--;
+	peer_class_release(p->class);
+	worker_registry_release(f, p->identity);
+	f->lease_capacity -= p->lease_capacity;
 	uint32_t i = 0;
 	while (f->peers[i] != p)
 		i++;
@@ -107,47 +107,48 @@ void connection_leave(struct farm *f, struct peer *p)
 
 void connection_lose_leases(struct farm *f, struct peer *p)
 {
-	for (uint32_t i = 0; i < p->lease_limit; i++)
-		if (p->leases[i].used)
+	for (uint32_t i = 0; i < p->lease_capacity; i++)
+		if (p->leases[i].in_use)
 			lost_holders_add(f, &p->leases[i]);
 }
 
 void connection_lose(struct farm *f, struct peer *p)
 {
-	p->want = 0;
+	p->wanted_leases = 0;
 	peer_requeue(f, p);
 	connection_lose_leases(f, p);
 	connection_leave(f, p);
 }
 
-static bool is_at(const struct peer *p, const struct event_join *e)
+static bool is_same_home(const struct peer *p, const struct event_join *e)
 {
-	return strcmp(p->home, e->home) == 0 && strcmp(p->who->certificate, e->certificate) == 0;
+	return strcmp(p->home, e->home) == 0 && strcmp(p->identity->certificate, e->certificate) == 0;
 }
 
-bool connection_replace(struct farm *f, const struct event_join *e, const char **refused)
+bool connection_supersede_earlier(struct farm *f, const struct event_join *e, const char **refusal)
 {
 	if (!*e->home)
 		return true;
 	const struct identity *k = worker_registry_find(f, e);
-	uint64_t last = k && strcmp(k->home, e->home) == 0 ? k->restarts : 0;
+	uint64_t last_start = k && strcmp(k->home, e->home) == 0 ? k->restarts : 0;
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
-			last = f->peers[i]->restarts;
-	if (last > e->restarts) {
-		text_print(f->text, sizeof f->text, "this is start %llu of %s, and its start %llu has connected before",
-			   (unsigned long long)e->restarts, e->name, (unsigned long long)last);
-		*refused = f->text;
+		if (is_same_home(f->peers[i], e) && f->peers[i]->restarts > last_start)
+			last_start = f->peers[i]->restarts;
+	if (last_start > e->restarts) {
+		text_print(f->answer_text, sizeof f->answer_text,
+			   "this is start %llu of %s, and its start %llu has connected before",
+			   (unsigned long long)e->restarts, e->name, (unsigned long long)last_start);
+		*refusal = f->answer_text;
 		return false;
 	}
 	for (uint32_t i = f->peer_count; i-- > 0;) {
 		struct peer *p = f->peers[i];
-		if (!is_at(p, e))
+		if (!is_same_home(p, e))
 			continue;
 		struct action *a = update_add(f, ACTION_CLOSE_PEER);
 		a->peer = p->id;
 		a->text = "the same worker has reconnected";
-		p->returns = true;
+		p->is_superseded = true;
 		connection_lose(f, p);
 	}
 	return true;

@@ -18,6 +18,6 @@ void connection_drop_leases(struct farm *f, struct peer *p, bool revoke);
 
 /* Closes the connections of earlier runs of the same home. Returns false and sets *refused if the event itself
  * belongs to an earlier run. */
-bool connection_replace(struct farm *f, const struct event_join *e, const char **refused);
+bool connection_supersede_earlier(struct farm *f, const struct event_join *e, const char **refused);
 
 #endif

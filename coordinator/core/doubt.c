@@ -9,157 +9,165 @@
 
 #include <assert.h>
 
-static const char *name_of(const struct farm *f, uint64_t who)
+static const char *worker_name(const struct farm *f, uint64_t worker_id)
 {
-	const struct identity *k = who ? identity_index_id(&f->index, who) : NULL;
-	return k ? k->name : who ? "a worker no longer known" : "a worker of an earlier run";
+	const struct identity *k = worker_id ? identity_index_find_by_id(&f->identity_index, worker_id) : NULL;
+	return k ? k->name : worker_id ? "a worker no longer known" : "a worker of an earlier run";
 }
 
-const char *doubt_maker(const struct farm *f, const struct lease_key *k)
+const char *doubt_maker_name(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
 	bool known_slot =
 		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
 	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
-	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker)
-							: "?"; /* only the maker of the latest states is known */
+	return s && s->next_epoch == k->epoch && k->epoch > 0 ? worker_name(f, s->doubt.maker)
+							      : "?"; /* only the maker of the latest states is known */
 }
 
-static bool is_party(const struct slot *s, uint64_t who)
+static bool is_party(const struct slot *s, uint64_t worker_id)
 {
 	const struct doubt *d = &s->doubt;
-	return who == d->barred || (doubt_waits(s) && (who == d->maker || who == d->refuser));
+	return worker_id == d->barred || (doubt_is_pending(s) && (worker_id == d->maker || worker_id == d->refuser));
 }
 
 /* Whether a connected worker is neither the maker nor a refuser of the states, so that it could be asked. */
-static bool third_is_here(const struct farm *f, const struct job *j, const struct slot *s)
+static bool has_third_worker(const struct farm *f, const struct job *j, const struct slot *s)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state == PEER_ACTIVE && job_takes(j, p->class) && !is_party(s, p->who->id))
+		if (p->state == PEER_ACTIVE && job_accepts_class(j, p->class) && !is_party(s, p->identity->id))
 			return true;
 	}
 	return false;
 }
 
-bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
+bool doubt_is_barred(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
 {
-	return is_party(s, p->who->id) && third_is_here(f, j, s);
+	return is_party(s, p->identity->id) && has_third_worker(f, j, s);
 }
 
 /* Takes the slot's last epoch back, so that it becomes the slot's next epoch again. If its round was complete, that
  * round and all later ones are open again, and leases more than one round ahead are revoked. */
-static void open_again(struct farm *f, struct job *j, struct slot *s)
+static void reopen_epoch(struct farm *f, struct job *j, struct slot *s)
 {
-	assert(j->kind == LEASE_RENDER && s->next > 0);
+	assert(j->kind == LEASE_RENDER && s->next_epoch > 0);
 	j->progress_floor = job_progress(j, f->now);
 	lease_revoke_slot(f, s);
-	s->next--;
-	s->timeouts = 0;
+	s->next_epoch--;
+	s->timeout_count = 0;
 	s->failure_quorum.count = 0;
-	s->lost.count = 0;
+	s->lost_holders.count = 0;
 	j->leases_merged--;
-	if (s->next < j->rounds) {
-		j->rounds = s->next;
+	if (s->next_epoch < j->rounds) {
+		j->rounds = s->next_epoch;
 		/* a pending estimate would be of rounds that are no longer complete; the update may contain other
 		 * actions, too */
 		j->evaluating = false;
 	}
 	for (uint32_t i = 0; i < j->slot_count; i++)
-		if (j->slots[i].next - j->rounds > 1)
+		if (j->slots[i].next_epoch - j->rounds > 1)
 			lease_revoke_slot(f, &j->slots[i]);
-	job_place_all(j);
+	job_place_all_slots(j);
 }
 
 /* Asks the shell to take the batch of the last epoch out of the films. The epoch's sums are not verified even if they
  * were before: its chain states may be wrong although the sums are right. */
-static void take_back(struct farm *f, struct job *j, struct slot *s, const char *refusers)
+static void roll_back_epoch(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	struct doubt *d = &s->doubt;
-	uint64_t maker = d->maker, reach = d->reach > s->next ? d->reach : s->next;
-	open_again(f, j, s);
-	*d = (struct doubt){.maker = d->before, .barred = maker, .reach = reach, .again = d->again + 1};
-	struct action *a = update_add(f, ACTION_TAKE_BACK);
-	a->who = maker;
+	uint64_t maker = d->maker,
+		 watermark = d->rollback_watermark > s->next_epoch ? d->rollback_watermark : s->next_epoch;
+	reopen_epoch(f, j, s);
+	*d = (struct doubt){.maker = d->previous_maker,
+			    .barred = maker,
+			    .rollback_watermark = watermark,
+			    .rollback_count = d->rollback_count + 1};
+	struct action *a = update_add(f, ACTION_ROLL_BACK);
+	a->worker_id = maker;
 	a->job = j->id;
-	a->key = slot_key(j, s);
-	text_print(f->text, sizeof f->text,
-		   LEASE_WORDS " is computed again: its chain states, made by %s, were refused by %s",
-		   LEASE_PLACE(&a->key), name_of(f, maker), refusers);
-	a->text = f->text;
+	a->key = slot_lease_key(j, s);
+	text_print(f->answer_text, sizeof f->answer_text,
+		   LEASE_POSITION_FORMAT " is computed again: its chain states, made by %s, were refused by %s",
+		   LEASE_POSITION_VALUES(&a->key), worker_name(f, maker), refusers);
+	a->text = f->answer_text;
 }
 
-static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
+static void restart_chains(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
-	const struct lease_key k = slot_key(j, s);
+	const struct lease_key k = slot_lease_key(j, s);
 	lease_revoke_slot(f, s); /* some workers may still hold the refused states */
-	s->doubt.anew = true;
-	text_print(f->text, sizeof f->text,
+	s->doubt.from_seeds = true;
+	text_print(f->answer_text, sizeof f->answer_text,
 		   "the chains of group %u part %u start epoch %llu from their seeds: their states, made by %s, were "
 		   "refused by %s",
-		   k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
-	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
+		   k.group, k.part, (unsigned long long)k.epoch, worker_name(f, s->doubt.maker), refusers);
+	struct action *a = update_add(f, ACTION_RESTART_CHAINS);
 	a->job = j->id;
 	a->key = k;
-	a->text = f->text;
+	a->text = f->answer_text;
 }
 
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text)
+void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
+		   const char *text)
 {
 	struct doubt *d = &s->doubt;
-	uint64_t who = p->who->id;
-	bool second = d->refuser && d->refuser != who && d->maker != who;
+	uint64_t worker_id = p->identity->id;
+	bool is_second_refusal = d->refuser && d->refuser != worker_id && d->maker != worker_id;
 	if (!d->refuser)
-		d->refuser = who;
-	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text, name_of(f, d->maker));
-	if (!second && third_is_here(f, j, s)) {
-		job_place(j, s);
+		d->refuser = worker_id;
+	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text, worker_name(f, d->maker));
+	if (!is_second_refusal && has_third_worker(f, j, s)) {
+		job_place_slot(j, s);
 		return;
 	}
-	struct lease_key made = slot_key(j, s);
-	made.epoch--;
-	char refusers[2 * JOIN_NAME];
-	if (d->refuser == who)
+	struct lease_key made_by_lease = slot_lease_key(j, s);
+	made_by_lease.epoch--;
+	char refusers[2 * JOIN_NAME_SIZE];
+	if (d->refuser == worker_id)
 		text_copy(refusers, sizeof refusers, p->name);
 	else
-		text_print(refusers, sizeof refusers, "%s and %s", name_of(f, d->refuser), p->name);
-	struct identity *maker =
-		second && !j->mixed && d->maker != d->refuser ? identity_index_id(&f->index, d->maker) : NULL;
-	if (can && d->again < AGAIN_MOST)
-		take_back(f, j, s, refusers);
+		text_print(refusers, sizeof refusers, "%s and %s", worker_name(f, d->refuser), p->name);
+	struct identity *maker = is_second_refusal && !j->mixed && d->maker != d->refuser
+					 ? identity_index_find_by_id(&f->identity_index, d->maker)
+					 : NULL;
+	if (can_roll_back && d->rollback_count < DOUBT_ROLLBACKS_MAX)
+		roll_back_epoch(f, j, s, refusers);
 	else
-		begin_anew(f, j, s, refusers);
+		restart_chains(f, j, s, refusers);
 	if (maker)
-		quarantine_wrong(f, maker, "wrong chain states", &made);
-	job_place(j, s);
+		quarantine_note_wrong_result(f, maker, "wrong chain states", &made_by_lease);
+	job_place_slot(j, s);
 }
 
-void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
+void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *identity,
 		  const struct lease_key *k)
 {
 	struct doubt *d = &s->doubt;
-	bool went_on = doubt_waits(s) && !is_party(s, who->id) && !j->mixed;
-	struct identity *refuser = went_on ? identity_index_id(&f->index, d->refuser) : NULL;
-	bool behind = s->next < d->reach;
-	*d = (struct doubt){.maker = who->id,
-			    .before = d->anew ? 0 : d->maker,
-			    .reach = behind ? d->reach : 0,
-			    .again = behind ? d->again : 0};
+	bool contradicts_refusal = doubt_is_pending(s) && !is_party(s, identity->id) && !j->mixed;
+	struct identity *refuser =
+		contradicts_refusal ? identity_index_find_by_id(&f->identity_index, d->refuser) : NULL;
+	bool is_behind_watermark = s->next_epoch < d->rollback_watermark;
+	*d = (struct doubt){.maker = identity->id,
+			    .previous_maker = d->from_seeds ? 0 : d->maker,
+			    .rollback_watermark = is_behind_watermark ? d->rollback_watermark : 0,
+			    .rollback_count = is_behind_watermark ? d->rollback_count : 0};
 	if (refuser)
-		quarantine_wrong(f, refuser, "refused good chain states", k);
+		quarantine_note_wrong_result(f, refuser, "refused good chain states", k);
 }
 
-bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size)
+bool doubt_describe_wait(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		const struct slot *s = &j->slots[i];
-		if (!doubt_waits(s) || s->holders)
+		if (!doubt_is_pending(s) || s->holder_count)
 			continue;
-		const struct lease_key k = slot_key(j, s);
+		const struct lease_key k = slot_lease_key(j, s);
 		text_print(text, size,
-			   "a third worker will decide whether the chain states of " LEASE_WORDS " are wrong: "
+			   "a third worker will decide whether the chain states of " LEASE_POSITION_FORMAT
+			   " are wrong: "
 			   "%s made them, %s refused them",
-			   LEASE_PLACE(&k), name_of(f, s->doubt.maker), name_of(f, s->doubt.refuser));
+			   LEASE_POSITION_VALUES(&k), worker_name(f, s->doubt.maker), worker_name(f, s->doubt.refuser));
 		return true;
 	}
 	return false;

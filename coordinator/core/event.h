@@ -15,24 +15,25 @@
 #include "coordinator/core/job_fields.h"
 
 enum event_kind {
-	EVENT_TICK,	 /* none: time has passed; due at update.wake at the latest */
-	EVENT_JOINED,	 /* join */
-	EVENT_LEFT,	 /* peer: its connection is closed */
-	EVENT_HEARTBEAT, /* peer: every other event of a peer counts as a heartbeat, too */
-	EVENT_REQUEST,	 /* peer, want */
-	EVENT_BATCH,	 /* peer, key, valid, text: the result of a lease */
-	EVENT_STORED,	 /* key, digest: a result stored by an earlier run, which may count now */
+	EVENT_TICK,	    /* none: time has passed; due at update.wake at the latest */
+	EVENT_JOINED,	    /* join */
+	EVENT_LEFT,	    /* peer: its connection is closed */
+	EVENT_HEARTBEAT,    /* peer: every other event of a peer counts as a heartbeat, too */
+	EVENT_REQUEST,	    /* peer, want */
+	EVENT_BATCH,	    /* peer, key, valid, text: the result of a lease */
+	EVENT_STORED_BATCH, /* key, digest: a result stored by an earlier run, which may count now */
 	/* peer, key: a result has arrived and will be judged later (EVENT_BATCH); meanwhile the worker may get
 	 * another lease */
-	EVENT_DELIVERED,
+	EVENT_BATCH_DELIVERED,
 	EVENT_LEASE_FAILED, /* peer, key, text: the worker failed to compute the lease */
 	/* peer, key: the worker is stopping and returns the lease unfinished, which is no failure */
 	EVENT_LEASE_RETURNED,
-	EVENT_SUBMIT,	   /* tag, submit */
-	EVENT_CANCEL,	   /* tag, job */
-	EVENT_PREPARED,	   /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
-	EVENT_ERROR_KNOWN, /* error_known: the answer to ACTION_EVALUATE_ERROR */
-	EVENT_IMAGE_KNOWN, /* image_known: statistics of the final image after ACTION_PUBLISH; the job has ended */
+	EVENT_SUBMIT,	       /* tag, submit */
+	EVENT_CANCEL,	       /* tag, job */
+	EVENT_PREPARED,	       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
+	EVENT_ERROR_ESTIMATED, /* error_estimated: the answer to ACTION_EVALUATE_ERROR */
+	EVENT_IMAGE_PUBLISHED, /* image_published: statistics of the final image after ACTION_PUBLISH; the job has ended
+				*/
 	/* tag, restore: continues a job of an earlier run, or a job that has ended. With tag 0 max_jobs does not
 	 * apply, and only lack of memory can prevent it. */
 	EVENT_RESTORE,
@@ -48,8 +49,8 @@ enum event_kind {
 enum job_hold {
 	HOLD_STORAGE, /* its results cannot be stored */
 	HOLD_FILES,   /* a file of its scene is missing or damaged */
-	HOLD_ORDERED, /* a user asked for it */
-	JOB_HOLDS,
+	HOLD_BY_USER, /* a user asked for it */
+	JOB_HOLD_COUNT,
 };
 
 /* SHA-256 over everything in a batch that affects bits. */
@@ -57,7 +58,10 @@ struct batch_digest {
 	uint8_t bytes[32];
 };
 
-enum { JOIN_HOME = 40, JOIN_NAME = 128 /* sizes of the names of a home and of a worker, including the final 0 */ };
+enum {
+	JOIN_HOME_SIZE = 40,
+	JOIN_NAME_SIZE = 128 /* sizes of the names of a home and of a worker, including the final 0 */
+};
 
 struct event_join {
 	uint64_t peer;		 /* chosen by the caller, not 0, never reused */
@@ -78,16 +82,16 @@ struct event_submit {
 	bool mixed; /* accepts workers of any numeric fingerprint */
 	/* Fraction of the job's leases that two workers compute; ignored for mixed jobs, whose results cannot be
 	 * compared. */
-	double verify;
+	double verify_fraction;
 };
 
 /* The state of a job that continues, described by which leases are merged. */
 struct event_restore {
 	uint64_t job; /* the job's id */
 	struct event_submit submit;
-	const char *fingerprint; /* "": the job is not pinned */
-	enum lease_kind kind;	 /* kind of the open leases; LEASE_RENDER: b and seeds exist */
-	const uint64_t *next;	 /* [groups][parts]: first epoch of this kind that is not merged */
+	const char *fingerprint;     /* "": the job is not pinned */
+	enum lease_kind kind;	     /* kind of the open leases; LEASE_RENDER: b and seeds exist */
+	const uint64_t *next_epochs; /* [groups][parts]: first epoch of this kind that is not merged */
 	/* [groups][parts]: the worker that made the last merged batch (peer, fingerprint and threads are not set);
 	 * its name is NULL if unknown. The array is NULL if no maker is known. */
 	const struct event_join *makers;
@@ -102,9 +106,9 @@ struct event_restore {
 struct event {
 	enum event_kind kind;
 	double time;
-	/* In seconds. Messages that arrived during the last `unread` seconds may not have been read yet, so no worker
-	 * is blamed for silence in that time. */
-	double unread;
+	/* In seconds. Messages that arrived during the last `unread_seconds` seconds may not have been read yet, so no
+	 * worker is blamed for silence in that time. */
+	double unread_seconds;
 	uint64_t peer;
 	uint64_t job;
 	/* Returned in the answer. For events other than SUBMIT and CANCEL there is an answer only if they are
@@ -116,23 +120,23 @@ struct event {
 		/* How many leases the worker wants to hold in total: its number of threads plus one to hide the
 		 * network's latency, or 0 when it is stopping. The core keeps the number until the next request, so
 		 * requests and leases may cross on the wire in any order. */
-		uint32_t want;
+		uint32_t wanted_leases;
 		struct {
 			struct lease_key key;
 			/* BATCH: the result passed batch_check and the checks of the frame; otherwise text says what
 			 * is wrong. */
 			bool valid;
-			/* BATCH, STORED: set for leases for which farm_verifies returns true. */
+			/* BATCH, STORED: set for leases for which farm_lease_is_verified returns true. */
 			struct batch_digest digest;
-			bool own;	 /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
-			bool later;	 /* with own: temporary, because the worker's memory is in use */
-			bool bad_states; /* LEASE_FAILED: the worker refuses the chain states of the grant */
+			bool worker_at_fault; /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
+			bool memory_full;     /* with own: temporary, because the worker's memory is in use */
+			bool bad_states;      /* LEASE_FAILED: the worker refuses the chain states of the grant */
 			/* With bad_states: the refused states are not the lease's current states but those of an
 			 * earlier grant. */
-			bool other_states;
+			bool states_outdated;
 			/* With bad_states: the batch that produced the states can be taken out of the films, and the
 			 * earlier states are available. */
-			bool can_take_back;
+			bool can_roll_back;
 		} lease;
 		enum job_hold hold;
 		int priority;
@@ -151,11 +155,11 @@ struct event {
 			double rel_mse, degrees; /* estimated relMSE and its degrees of freedom; 0: unknown */
 			double cpu_seconds;	 /* CPU time of all merged render leases */
 			bool black;		 /* the image is black and therefore has no relative error */
-		} error_known;
+		} error_estimated;
 		struct {
 			uint64_t job;
-			bool disagrees; /* the job's chains disagree (common/estimate/convergence.h) */
-		} image_known;
+			bool chains_disagree; /* the job's chains disagree (common/estimate/convergence.h) */
+		} image_published;
 	};
 };
 

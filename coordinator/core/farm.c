@@ -15,7 +15,7 @@
 #include <assert.h>
 #include <math.h>
 
-enum { KNOWN_PER_PEER = 4 };
+enum { REGISTRY_ENTRIES_PER_PEER = 4 };
 
 int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 {
@@ -26,19 +26,19 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for the farm");
 	f->config = *c;
-	f->next_job = c->first_job;
-	f->live_limit = c->max_jobs;
-	f->check_at = f->schedule_at = INFINITY;
+	f->next_job_id = c->first_job_id;
+	f->live_job_capacity = c->max_jobs;
+	f->expiry_check_at = f->schedule_at = INFINITY;
 	f->now = -INFINITY;
 	list_init(&f->classes);
 	list_init(&f->owners);
-	f->jobs = mem_alloc((size_t)c->max_jobs + c->max_ended + 1, sizeof(struct job *));
-	f->live = mem_alloc(c->max_jobs, sizeof(struct job *));
+	f->jobs = mem_alloc((size_t)c->max_jobs + c->max_ended_jobs + 1, sizeof(struct job *));
+	f->live_jobs = mem_alloc(c->max_jobs, sizeof(struct job *));
 	f->peers = mem_alloc(c->max_peers, sizeof(struct peer *));
-	f->known_limit = KNOWN_PER_PEER * c->max_peers;
-	f->known = mem_alloc(f->known_limit, sizeof(struct identity *));
-	if (!f->jobs || !f->live || !f->peers || !f->known || identity_index_init(&f->index, f->known_limit) < 0 ||
-	    update_reserve(f, 0) < 0) {
+	f->registry_capacity = REGISTRY_ENTRIES_PER_PEER * c->max_peers;
+	f->registry = mem_alloc(f->registry_capacity, sizeof(struct identity *));
+	if (!f->jobs || !f->live_jobs || !f->peers || !f->registry ||
+	    identity_index_init(&f->identity_index, f->registry_capacity) < 0 || update_reserve(f, 0) < 0) {
 		farm_free(f);
 		return error_set(e, ENOMEM, "no memory for the farm");
 	}
@@ -54,18 +54,18 @@ void farm_free(struct farm *f)
 		connection_leave(f, f->peers[f->peer_count - 1]);
 	for (uint32_t i = 0; i < f->job_count; i++) {
 		if (f->jobs[i]->class)
-			peer_class_drop(f->jobs[i]->class);
+			peer_class_release(f->jobs[i]->class);
 		job_free(f->jobs[i]);
 	}
 	worker_registry_free(f);
 	mem_free(f->jobs);
-	mem_free(f->live);
+	mem_free(f->live_jobs);
 	mem_free(f->peers);
 	mem_free(f->actions);
 	mem_free(f);
 }
 
-static struct event_join complete(const struct event_join *e)
+static struct event_join with_join_defaults(const struct event_join *e)
 {
 	struct event_join j = *e;
 	j.certificate = e->certificate ? e->certificate : "";
@@ -73,76 +73,76 @@ static struct event_join complete(const struct event_join *e)
 	return j;
 }
 
-static void joined(struct farm *f, const struct event *ev)
+static void handle_joined(struct farm *f, const struct event *ev)
 {
-	const struct event_join join = complete(&ev->join);
-	const char *refused = "";
+	const struct event_join join = with_join_defaults(&ev->join);
+	const char *refusal = "";
 	assert(join.peer && !farm_find_peer(f, join.peer));
-	if (connection_replace(f, &join, &refused) && connection_join(f, &join, &refused))
+	if (connection_supersede_earlier(f, &join, &refusal) && connection_join(f, &join, &refusal))
 		return;
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->peer = ev->join.peer;
-	a->text = refused;
+	a->text = refusal;
 }
 
-static void add_quarantined(struct farm *f, const struct event *ev)
+static void handle_quarantined(struct farm *f, const struct event *ev)
 {
-	const struct event_join join = complete(&ev->join);
+	const struct event_join join = with_join_defaults(&ev->join);
 	worker_registry_restore_quarantined(f, &join, ev->text);
 }
 
-static void peer_left(struct farm *f, const struct event *ev)
+static void handle_left(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (p)
 		connection_lose(f, p);
 }
 
-static void requested(struct farm *f, const struct event *ev)
+static void handle_request(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (!p)
 		return;
-	p->want = ev->want < p->lease_limit ? ev->want : p->lease_limit;
-	if (list_is_empty(&p->waiting) || !peer_has_wish(p))
+	p->wanted_leases = ev->wanted_leases < p->lease_capacity ? ev->wanted_leases : p->lease_capacity;
+	if (list_is_empty(&p->waiting_link) || !peer_wants_lease(p))
 		peer_requeue(f, p);
 }
 
-static void broken(struct farm *f, const struct event *ev)
+static void handle_job_broken(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
 	if (j && job_is_live(j))
-		rounds_end(f, j, END_FAILED, ev->text ? ev->text : "");
+		rounds_end_job(f, j, END_FAILED, ev->text ? ev->text : "");
 }
 
-static void take_no_action(struct farm *f, const struct event *ev)
+static void ignore_event(struct farm *f, const struct event *ev)
 {
 	(void)f;
 	(void)ev;
 }
 
-static void (*const on_event[])(struct farm *, const struct event *) = {
-	[EVENT_TICK] = take_no_action,
-	[EVENT_JOINED] = joined,
-	[EVENT_LEFT] = peer_left,
-	[EVENT_HEARTBEAT] = take_no_action,
-	[EVENT_REQUEST] = requested,
+static void (*const event_handlers[])(struct farm *, const struct event *) = {
+	[EVENT_TICK] = ignore_event,
+	[EVENT_JOINED] = handle_joined,
+	[EVENT_LEFT] = handle_left,
+	[EVENT_HEARTBEAT] = ignore_event,
+	[EVENT_REQUEST] = handle_request,
 	[EVENT_BATCH] = answer_batch,
-	[EVENT_STORED] = answer_stored,
-	[EVENT_DELIVERED] = answer_delivered,
+	[EVENT_STORED_BATCH] = answer_stored,
+	[EVENT_BATCH_DELIVERED] = answer_delivered,
 	[EVENT_LEASE_FAILED] = answer_failed,
 	[EVENT_LEASE_RETURNED] = answer_returned,
 	[EVENT_SUBMIT] = rounds_submit,
 	[EVENT_CANCEL] = rounds_cancel,
 	[EVENT_PREPARED] = rounds_prepared,
-	[EVENT_ERROR_KNOWN] = rounds_error_known,
-	[EVENT_IMAGE_KNOWN] = rounds_image_known,
+	[EVENT_ERROR_ESTIMATED] = rounds_error_estimated,
+	[EVENT_IMAGE_PUBLISHED] = rounds_image_published,
 	[EVENT_RESTORE] = restore_job,
 	[EVENT_HOLD] = orders_hold,
 	[EVENT_PRIORITY] = orders_priority,
 	[EVENT_EXTEND] = orders_extend,
-	[EVENT_QUARANTINED] = add_quarantined,
-	[EVENT_JOB_BROKEN] = broken,
+	[EVENT_QUARANTINED] = handle_quarantined,
+	[EVENT_JOB_BROKEN] = handle_job_broken,
 };
 
 void farm_step(struct farm *f, const struct event *ev, struct update *u)
@@ -152,11 +152,11 @@ void farm_step(struct farm *f, const struct event *ev, struct update *u)
 	f->action_count = 0;
 	struct peer *p = ev->peer ? farm_find_peer(f, ev->peer) : NULL;
 	if (p)
-		peer_heard(f, p);
-	schedule_expire(f, f->now - ev->unread);
-	on_event[ev->kind](f, ev);
-	schedule(f);
+		peer_note_contact(f, p);
+	schedule_expire(f, f->now - ev->unread_seconds);
+	event_handlers[ev->kind](f, ev);
+	schedule_leases(f);
 	u->actions = f->actions;
 	u->count = f->action_count;
-	u->wake = fmin(f->check_at, f->schedule_at);
+	u->wake_time = fmin(f->expiry_check_at, f->schedule_at);
 }

@@ -12,7 +12,7 @@
  *   its sender has the job's fingerprint, no matter who holds the lease by then. A repeat is counted and dropped.
  * - Epoch e + 1 of a (group, part) opens when its epoch e is merged and round e + 1 is at most one ahead of the
  *   first incomplete round: two rounds are open.
- * - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as
+ * - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_is_due() says so, as
  *   in hslt-render, and when another bound ends the job. After the end nothing is merged: the image is exactly the
  *   prefix that met the bound, and depends on workers and order only if the bound is a time.
  *

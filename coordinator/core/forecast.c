@@ -6,12 +6,12 @@
 
 #include <math.h>
 
-static double bootstrap_total(const struct job *j)
+static double bootstrap_work(const struct job *j)
 {
 	return (double)j->plan.bootstrap;
 }
 
-static double lease_share(uint64_t merged, double total, const struct job *j)
+static double work_of_leases(uint64_t merged, double total, const struct job *j)
 {
 	return (double)merged * total / ((double)j->plan.groups * j->plan.parts);
 }
@@ -19,18 +19,18 @@ static double lease_share(uint64_t merged, double total, const struct job *j)
 /* Bootstrap samples and mutations merged so far. */
 static double work_done(const struct job *j)
 {
-	return lease_share(j->bootstrap_merged, bootstrap_total(j), j) +
-	       lease_share(j->leases_merged, (double)plan_round_mutations(&j->plan), j);
+	return work_of_leases(j->bootstrap_merged, bootstrap_work(j), j) +
+	       work_of_leases(j->leases_merged, (double)plan_round_mutations(&j->plan), j);
 }
 
 static double work_of_rounds(const struct job *j, double rounds)
 {
-	return bootstrap_total(j) + rounds * (double)plan_round_mutations(&j->plan);
+	return bootstrap_work(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
 
 /* Returns the rounds that the target error needs if only the last error is known, without a history: it is assumed to
  * fall as 1/sqrt(rounds). */
-static double rounds_by_rule(const struct job *j)
+static double rounds_by_sqrt_rule(const struct job *j)
 {
 	double factor = j->rel_error / j->plan.target_error;
 	return (double)j->rel_error_rounds * factor * factor;
@@ -45,28 +45,28 @@ static struct forecast_range work_total(const struct job *j)
 		total.low = total.middle = total.high = work_of_rounds(j, (double)j->plan.rounds);
 	if (!(j->plan.target_error > 0) || isnan(j->rel_error))
 		return total;
-	double least = (double)j->rounds + 2, rule = rounds_by_rule(j);
+	double min_rounds = (double)j->rounds + 2, rule = rounds_by_sqrt_rule(j);
 	struct forecast_range rounds = {rule, rule, rule};
 	if (j->looks.count)
-		rounds = j->stop.rounds;
-	total.low = fmin(total.low, work_of_rounds(j, fmax(rounds.low, least)));
-	total.middle = fmin(total.middle, work_of_rounds(j, fmax(rounds.middle, least)));
-	total.high = fmin(total.high, work_of_rounds(j, fmax(rounds.high, least)));
+		rounds = j->target_cost.rounds;
+	total.low = fmin(total.low, work_of_rounds(j, fmax(rounds.low, min_rounds)));
+	total.middle = fmin(total.middle, work_of_rounds(j, fmax(rounds.middle, min_rounds)));
+	total.high = fmin(total.high, work_of_rounds(j, fmax(rounds.high, min_rounds)));
 	return total;
 }
 
-static bool has_time(const struct job *j)
+static bool has_time_bound(const struct job *j)
 {
 	return j->plan.seconds > 0 && !isnan(j->started);
 }
 
 /* Returns the seconds until the job's time bound ends it; NAN if the time is over and the rate of the round that has
  * to be completed is unknown. */
-static double time_left(const struct job *j, double rate, double now)
+static double seconds_to_time_bound(const struct job *j, double rate, double now)
 {
 	double round = (double)plan_round_mutations(&j->plan);
-	return merge_seconds_left(&j->plan, job_elapsed(j, now), (work_done(j) - bootstrap_total(j)) / round,
-				  rate / round);
+	return merge_seconds_remaining(&j->plan, job_elapsed(j, now), (work_done(j) - bootstrap_work(j)) / round,
+				       rate / round);
 }
 
 double job_progress(const struct job *j, double now)
@@ -74,7 +74,7 @@ double job_progress(const struct job *j, double now)
 	if (j->state == JOB_DONE)
 		return 1;
 	double p = work_done(j) / work_total(j).middle;
-	if (has_time(j) && job_is_live(j)) /* elapsed time never decreases, unlike an estimate from a rate */
+	if (has_time_bound(j) && job_is_live(j)) /* elapsed time never decreases, unlike an estimate from a rate */
 		p = fmax(p, fmin(0.99, job_elapsed(j, now) / j->plan.seconds));
 	return fmin(1, fmax(j->progress_floor, p));
 }
@@ -82,14 +82,14 @@ double job_progress(const struct job *j, double now)
 /* Returns the seconds until `total` samples and mutations are merged, or until the job's time is over; NAN: unknown.
  * The rate of the bootstrap is not used to predict that of rounds, because the bootstrap of `path` is so short that
  * its leases mostly wait. */
-static double seconds_left(const struct job *j, double total, bool idle, double now)
+static double remaining_seconds(const struct job *j, double total, bool idle, double now)
 {
-	double left = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);
+	double remaining = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);
 	if (rate > 0)
-		left = fmax(0, total - work_done(j)) / rate;
-	if (has_time(j))
-		left = fmin(left, time_left(j, rate, now)); /* fmin ignores a NAN */
-	return isfinite(left) ? left : NAN;
+		remaining = fmax(0, total - work_done(j)) / rate;
+	if (has_time_bound(j))
+		remaining = fmin(remaining, seconds_to_time_bound(j, rate, now)); /* fmin ignores a NAN */
+	return isfinite(remaining) ? remaining : NAN;
 }
 
 struct forecast_range job_eta(const struct job *j, bool idle, double now)
@@ -97,40 +97,41 @@ struct forecast_range job_eta(const struct job *j, bool idle, double now)
 	if (!job_is_live(j) || job_is_held(j))
 		return (struct forecast_range){NAN, NAN, NAN};
 	struct forecast_range total = work_total(j);
-	return (struct forecast_range){seconds_left(j, total.low, idle, now), seconds_left(j, total.middle, idle, now),
-				       seconds_left(j, total.high, idle, now)};
+	return (struct forecast_range){remaining_seconds(j, total.low, idle, now),
+				       remaining_seconds(j, total.middle, idle, now),
+				       remaining_seconds(j, total.high, idle, now)};
 }
 
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds)
 {
 	/* Some leases are merged ahead of the complete rounds; their CPU time is spent, but they are not in the image
 	 * yet. */
-	double in_prefix = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
+	double prefix_fraction = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
 	struct forecast_look l = {.work = (double)j->rounds * (double)plan_round_mutations(&j->plan),
-				  .cpu_seconds = cpu_seconds * in_prefix,
-				  .seconds = j->looked_at - j->opened,
+				  .cpu_seconds = cpu_seconds * prefix_fraction,
+				  .seconds = j->estimate_requested_at - j->opened,
 				  .rel_mse = rel_mse,
 				  .rel_mse_upper = rel_error * rel_error,
 				  .degrees = degrees > 0 ? degrees : j->plan.groups - 1.0,
 				  .doubtful = doubtful};
 	uint32_t count = j->looks.count;
 	forecast_add_look(&j->looks, &l);
-	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS))
+	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS_MAX))
 		return;
-	job_forecast(j);
+	job_update_forecast(j);
 }
 
-void job_forecast(struct job *j)
+void job_update_forecast(struct job *j)
 {
-	forecast_target(&j->looks, &j->plan, j->plan.target_error, FORECAST_SAME, &j->stop);
-	forecast_halving(&j->looks, &j->plan, &j->halving);
+	forecast_cost_of_target(&j->looks, &j->plan, j->plan.target_error, FORECAST_SAME, &j->target_cost);
+	forecast_cost_of_halving(&j->looks, &j->plan, &j->halving_cost);
 }
 
 struct forecast_range job_halving_seconds(const struct job *j, double now)
 {
 	double rate = rate_value(&j->rate, now);
-	const struct forecast_range *work = &j->halving.work;
+	const struct forecast_range *work = &j->halving_cost.work;
 	if (!job_is_live(j) || !(rate > 0))
-		return j->halving.seconds;
+		return j->halving_cost.seconds;
 	return (struct forecast_range){work->low / rate, work->middle / rate, work->high / rate};
 }

@@ -6,11 +6,11 @@
 
 #include <string.h>
 
-int identity_index_init(struct identity_index *x, uint32_t buckets)
+int identity_index_init(struct identity_index *x, uint32_t bucket_count)
 {
-	*x = (struct identity_index){.buckets = buckets};
-	for (int i = 0; i < IDENTITY_KEYS; i++)
-		if (!(x->first[i] = mem_alloc(buckets, sizeof *x->first[i]))) {
+	*x = (struct identity_index){.bucket_count = bucket_count};
+	for (int i = 0; i < IDENTITY_KEY_COUNT; i++)
+		if (!(x->bucket_heads[i] = mem_alloc(bucket_count, sizeof *x->bucket_heads[i]))) {
 			identity_index_fini(x);
 			return -ENOMEM;
 		}
@@ -19,22 +19,22 @@ int identity_index_init(struct identity_index *x, uint32_t buckets)
 
 void identity_index_fini(struct identity_index *x)
 {
-	for (int i = 0; i < IDENTITY_KEYS; i++)
-		mem_free(x->first[i]);
-	*x = (struct identity_index){.buckets = 0};
+	for (int i = 0; i < IDENTITY_KEY_COUNT; i++)
+		mem_free(x->bucket_heads[i]);
+	*x = (struct identity_index){.bucket_count = 0};
 }
 
 static struct identity **bucket_of_id(const struct identity_index *x, uint64_t id)
 {
-	return &x->first[IDENTITY_BY_ID][id % x->buckets];
+	return &x->bucket_heads[IDENTITY_BY_ID][id % x->bucket_count];
 }
 
 static struct identity **bucket_of_text(const struct identity_index *x, enum identity_key by, const char *certificate,
 					const char *text)
 {
 	/* The final 0 is hashed, too: it separates the certificate from the text. */
-	uint64_t hash = fnv_add(fnv_add(FNV_BEGIN, certificate, strlen(certificate) + 1), text, strlen(text));
-	return &x->first[by][hash % x->buckets];
+	uint64_t hash = fnv_add(fnv_add(FNV_OFFSET_BASIS, certificate, strlen(certificate) + 1), text, strlen(text));
+	return &x->bucket_heads[by][hash % x->bucket_count];
 }
 
 static struct identity **bucket_of(const struct identity_index *x, enum identity_key by, const struct identity *k)
@@ -45,7 +45,7 @@ static struct identity **bucket_of(const struct identity_index *x, enum identity
 
 void identity_index_add(struct identity_index *x, struct identity *k)
 {
-	for (enum identity_key by = 0; by < IDENTITY_KEYS; by++) {
+	for (enum identity_key by = 0; by < IDENTITY_KEY_COUNT; by++) {
 		struct identity **at = bucket_of(x, by, k);
 		k->next[by] = *at;
 		*at = k;
@@ -54,7 +54,7 @@ void identity_index_add(struct identity_index *x, struct identity *k)
 
 void identity_index_remove(struct identity_index *x, struct identity *k)
 {
-	for (enum identity_key by = 0; by < IDENTITY_KEYS; by++) {
+	for (enum identity_key by = 0; by < IDENTITY_KEY_COUNT; by++) {
 		struct identity **at = bucket_of(x, by, k);
 		while (*at != k)
 			at = &(*at)->next[by];
@@ -62,7 +62,7 @@ void identity_index_remove(struct identity_index *x, struct identity *k)
 	}
 }
 
-struct identity *identity_index_id(const struct identity_index *x, uint64_t id)
+struct identity *identity_index_find_by_id(const struct identity_index *x, uint64_t id)
 {
 	struct identity *k = *bucket_of_id(x, id);
 	while (k && k->id != id)
@@ -70,7 +70,7 @@ struct identity *identity_index_id(const struct identity_index *x, uint64_t id)
 	return k;
 }
 
-struct identity *identity_index_home(const struct identity_index *x, const char *certificate, const char *home)
+struct identity *identity_index_find_by_home(const struct identity_index *x, const char *certificate, const char *home)
 {
 	struct identity *k = *bucket_of_text(x, IDENTITY_BY_HOME, certificate, home);
 	while (k && (strcmp(k->home, home) != 0 || strcmp(k->certificate, certificate) != 0))
@@ -78,12 +78,12 @@ struct identity *identity_index_home(const struct identity_index *x, const char 
 	return k;
 }
 
-struct identity *identity_index_name(const struct identity_index *x, const char *certificate, const char *name)
+struct identity *identity_index_find_by_name(const struct identity_index *x, const char *certificate, const char *name)
 {
 	struct identity *last = NULL;
 	for (struct identity *k = *bucket_of_text(x, IDENTITY_BY_NAME, certificate, name); k;
 	     k = k->next[IDENTITY_BY_NAME])
-		if ((!last || k->place > last->place) && strcmp(k->name, name) == 0 &&
+		if ((!last || k->registry_index > last->registry_index) && strcmp(k->name, name) == 0 &&
 		    strcmp(k->certificate, certificate) == 0)
 			last = k;
 	return last;

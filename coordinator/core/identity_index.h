@@ -18,8 +18,8 @@ void identity_index_remove(struct identity_index *x, struct identity *k);
 
 /* Each returns NULL if there is none. Of several identities with the same name, the one whose place is the highest is
  * returned. */
-struct identity *identity_index_id(const struct identity_index *x, uint64_t id);
-struct identity *identity_index_home(const struct identity_index *x, const char *certificate, const char *home);
-struct identity *identity_index_name(const struct identity_index *x, const char *certificate, const char *name);
+struct identity *identity_index_find_by_id(const struct identity_index *x, uint64_t id);
+struct identity *identity_index_find_by_home(const struct identity_index *x, const char *certificate, const char *home);
+struct identity *identity_index_find_by_name(const struct identity_index *x, const char *certificate, const char *name);
 
 #endif

@@ -4,7 +4,7 @@
  *
  * A slot is in one list, depending on its next epoch (the first incomplete round, the one after it, or blocked behind
  * both) and on its holders: ready (nobody holds its lease), out (one worker does), or second (it waits for another
- * worker's answer). With two holders it is in no list. job_place moves it after each change. When all slots have
+ * worker's answer). With two holders it is in no list. job_place_slot moves it after each change. When all slots have
  * merged a round, the lists of the next round take its place as a whole; only after an epoch was taken back is each
  * slot placed individually.
  *
@@ -24,68 +24,68 @@
 enum { TIMEOUT_MEDIANS = 10, TIMEOUT_DOUBLINGS = 16 };
 static const double straggler_medians = 1.5;
 
-static void begin_kind(struct job *j, enum lease_kind kind, uint64_t limit, double now)
+static void begin_lease_kind(struct job *j, enum lease_kind kind, uint64_t limit, double now)
 {
 	j->kind = kind;
-	j->limit = limit;
+	j->round_limit = limit;
 	j->rounds = 0;
-	j->done = j->ahead = 0;
-	j->spread = false;
+	j->slots_done = j->slots_ahead = 0;
+	j->has_slots_far_ahead = false;
 	j->duration_count = 0;
-	j->median = NAN;
+	j->median_duration = NAN;
 	rate_init(&j->rate, now);
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		struct slot *s = &j->slots[i];
 		assert(!s->leases);
-		s->next = 0;
+		s->next_epoch = 0;
 		s->doubt = (struct doubt){0};
-		job_place(j, s);
+		job_place_slot(j, s);
 	}
 }
 
-static void init(struct job *j, const struct event_submit *e, double now)
+static void init_job(struct job *j, const struct event_submit *e, double now)
 {
 	text_copy(j->name, sizeof j->name, e->name);
 	j->priority = e->priority;
 	j->mixed = e->mixed;
-	j->verify = e->verify;
+	j->verify_fraction = e->verify_fraction;
 	j->plan = *e->plan;
 	j->submitted = now;
 	j->started = j->ended = j->rel_error = j->opened = j->held_since = NAN;
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
-		list_init(&j->out[i]);
-		list_init(&j->second[i]);
+		list_init(&j->leased[i]);
+		list_init(&j->awaiting_second[i]);
 	}
 	list_init(&j->blocked);
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		list_init(&j->slots[i].link);
-	begin_kind(j, LEASE_BOOTSTRAP, 1, now);
+	begin_lease_kind(j, LEASE_BOOTSTRAP, 1, now);
 }
 
-struct job *job_new(struct farm *f, const struct event_submit *e, const char **refused)
+struct job *job_new(struct farm *f, const struct event_submit *e, const char **refusal)
 {
 	uint64_t slots = (uint64_t)e->plan->groups * e->plan->parts;
-	if (slots == 0 || slots > f->config.max_slots) {
-		*refused = "the plan has more leases in a round than the coordinator takes";
+	if (slots == 0 || slots > f->config.max_job_slots) {
+		*refusal = "the plan has more leases in a round than the coordinator takes";
 		return NULL;
 	}
 	struct job *j = mem_alloc(1, sizeof *j);
 	if (j)
 		j->slots = mem_alloc(slots, sizeof *j->slots);
-	bool verified = e->verify > 0 && !e->mixed;
+	bool verified = e->verify_fraction > 0 && !e->mixed;
 	if (j && j->slots && verified)
 		j->proofs = mem_alloc(slots, sizeof *j->proofs);
 	if (j && j->slots && (j->proofs || !verified))
-		j->owner = owner_use(&f->owners, e->owner ? e->owner : "");
+		j->owner = owner_acquire(&f->owners, e->owner ? e->owner : "");
 	if (!j || !j->owner) {
 		job_free(j);
-		*refused = "the coordinator has no memory for another job";
+		*refusal = "the coordinator has no memory for another job";
 		return NULL;
 	}
 	j->slot_count = (uint32_t)slots;
 	j->verify_seed = f->config.verify_seed;
-	init(j, e, f->now);
+	init_job(j, e, f->now);
 	return j;
 }
 
@@ -93,7 +93,7 @@ void job_free(struct job *j)
 {
 	if (!j)
 		return;
-	owner_drop(j->owner);
+	owner_release(j->owner);
 	mem_free(j->slots);
 	mem_free(j->proofs);
 	mem_free(j);
@@ -104,20 +104,20 @@ bool job_is_live(const struct job *j)
 	return !job_state_is_end(j->state);
 }
 
-bool job_is_open(const struct job *j)
+bool job_is_schedulable(const struct job *j)
 {
-	return job_is_live(j) && !j->preparing && j->ending == END_NONE && !job_is_held(j);
+	return job_is_live(j) && !j->preparing && j->pending_end == END_NONE && !job_is_held(j);
 }
 
-bool job_is_proven(const struct job *j)
+bool job_has_answers(const struct job *j)
 {
-	return j->bootstrap_merged + j->leases_merged + j->noted > 0;
+	return j->bootstrap_merged + j->leases_merged + j->noted_slots > 0;
 }
 
 bool job_is_held(const struct job *j)
 {
-	for (int i = 0; i < JOB_HOLDS; i++)
-		if (*j->held[i])
+	for (int i = 0; i < JOB_HOLD_COUNT; i++)
+		if (*j->hold_reasons[i])
 			return true;
 	return false;
 }
@@ -132,7 +132,7 @@ struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)
 	return &j->slots[(size_t)group * j->plan.parts + part];
 }
 
-struct slot *job_ready(const struct job *j)
+struct slot *job_find_ready_slot(const struct job *j)
 {
 	for (int i = 0; i < 2; i++)
 		if (!list_is_empty(&j->ready[i]))
@@ -140,37 +140,41 @@ struct slot *job_ready(const struct job *j)
 	return NULL;
 }
 
-void job_place(struct job *j, struct slot *s)
+void job_place_slot(struct job *j, struct slot *s)
 {
 	list_remove(&s->link);
-	if (s->next >= j->limit || s->holders > 1)
+	if (s->next_epoch >= j->round_limit || s->holder_count > 1)
 		return;
-	uint64_t ahead = s->next - j->rounds;
+	uint64_t ahead = s->next_epoch - j->rounds;
 	if (ahead > 1)
 		list_append(&j->blocked, &s->link);
-	else if (s->holders >= proof_copies(j, s))
-		list_append(&j->out[ahead], &s->link);
+	else if (s->holder_count >= proof_max_holders(j, s))
+		list_append(&j->leased[ahead], &s->link);
 	else
-		list_append(proof_waits(j, s) || doubt_waits(s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
+		list_append(proof_is_pending(j, s) || doubt_is_pending(s) ? &j->awaiting_second[ahead]
+									  : &j->ready[ahead],
+			    &s->link);
 }
 
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s)
 {
-	double t = isnan(j->median) ? c->first_timeout : fmax(c->min_timeout, TIMEOUT_MEDIANS * j->median);
-	return ldexp(t, s->timeouts < TIMEOUT_DOUBLINGS ? (int)s->timeouts : TIMEOUT_DOUBLINGS);
+	double t = isnan(j->median_duration) ? c->default_lease_timeout
+					     : fmax(c->min_lease_timeout, TIMEOUT_MEDIANS * j->median_duration);
+	return ldexp(t, s->timeout_count < TIMEOUT_DOUBLINGS ? (int)s->timeout_count : TIMEOUT_DOUBLINGS);
 }
 
-double job_idle_timeout(const struct farm_config *c, const struct slot *s)
+double job_copy_timeout(const struct farm_config *c, const struct slot *s)
 {
-	return ldexp(c->idle_timeout, s->timeouts < TIMEOUT_DOUBLINGS ? (int)s->timeouts : TIMEOUT_DOUBLINGS);
+	return ldexp(c->copy_timeout, s->timeout_count < TIMEOUT_DOUBLINGS ? (int)s->timeout_count : TIMEOUT_DOUBLINGS);
 }
 
-double job_straggles_at(const struct farm_config *c, const struct job *j, const struct slot *s)
+double job_copy_due_time(const struct farm_config *c, const struct job *j, const struct slot *s)
 {
-	return s->since + (isnan(j->median) ? c->first_copy : straggler_medians * j->median);
+	return s->holder_since +
+	       (isnan(j->median_duration) ? c->default_copy_delay : straggler_medians * j->median_duration);
 }
 
-static double job_lease_mutations(const struct job *j)
+static double lease_work(const struct job *j)
 {
 	uint64_t n = j->kind == LEASE_BOOTSTRAP ? j->plan.bootstrap : plan_round_mutations(&j->plan);
 	return (double)n / j->slot_count;
@@ -178,80 +182,81 @@ static double job_lease_mutations(const struct job *j)
 
 static void add_duration(struct job *j, double duration)
 {
-	j->durations[j->duration_count++ % JOB_DURATIONS] = duration;
-	uint32_t n = j->duration_count < JOB_DURATIONS ? j->duration_count : JOB_DURATIONS;
-	double sorted[JOB_DURATIONS] = {0};
+	j->durations[j->duration_count++ % JOB_DURATION_WINDOW] = duration;
+	uint32_t n = j->duration_count < JOB_DURATION_WINDOW ? j->duration_count : JOB_DURATION_WINDOW;
+	double sorted[JOB_DURATION_WINDOW] = {0};
 	for (uint32_t i = 0; i < n; i++) {
 		uint32_t k = i;
 		for (; k > 0 && sorted[k - 1] > j->durations[i]; k--)
 			sorted[k] = sorted[k - 1];
 		sorted[k] = j->durations[i];
 	}
-	j->median = sorted[n / 2];
+	j->median_duration = sorted[n / 2];
 }
 
-void job_place_all(struct job *j)
+void job_place_all_slots(struct job *j)
 {
-	j->done = j->ahead = 0;
-	j->spread = false;
+	j->slots_done = j->slots_ahead = 0;
+	j->has_slots_far_ahead = false;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
-		uint64_t merged = j->slots[i].next - j->rounds;
-		j->done += merged > 0;
-		j->ahead += merged > 1;
-		j->spread = j->spread || merged > 2;
-		job_place(j, &j->slots[i]);
+		uint64_t merged = j->slots[i].next_epoch - j->rounds;
+		j->slots_done += merged > 0;
+		j->slots_ahead += merged > 1;
+		j->has_slots_far_ahead = j->has_slots_far_ahead || merged > 2;
+		job_place_slot(j, &j->slots[i]);
 	}
 }
 
-bool job_merge(struct job *j, struct slot *s, double now, double duration)
+bool job_merge_epoch(struct job *j, struct slot *s, double now, double duration)
 {
-	assert(!s->leases && s->next - j->rounds <= 1);
-	if (s->next++ == j->rounds)
-		j->done++;
+	assert(!s->leases && s->next_epoch - j->rounds <= 1);
+	if (s->next_epoch++ == j->rounds)
+		j->slots_done++;
 	else
-		j->ahead++;
-	s->timeouts = 0;
+		j->slots_ahead++;
+	s->timeout_count = 0;
 	s->failure_quorum.count = 0;
-	s->lost.count = 0;
+	s->lost_holders.count = 0;
 	if (j->kind == LEASE_BOOTSTRAP)
 		j->bootstrap_merged++;
 	else
 		j->leases_merged++;
 	if (!isnan(duration))
 		add_duration(j, duration);
-	rate_add(&j->rate, now, job_lease_mutations(j));
-	bool complete = j->done == j->slot_count;
-	if (complete && j->spread) {
+	rate_add(&j->rate, now, lease_work(j));
+	bool complete = j->slots_done == j->slot_count;
+	if (complete && j->has_slots_far_ahead) {
 		j->rounds++;
-		job_place_all(j);
+		job_place_all_slots(j);
 	} else if (complete) {
 		j->rounds++;
-		j->done = j->ahead;
-		j->ahead = 0;
+		j->slots_done = j->slots_ahead;
+		j->slots_ahead = 0;
 		list_remove(&s->link);
-		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->out[0]) && list_is_empty(&j->second[0]));
+		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->leased[0]) &&
+		       list_is_empty(&j->awaiting_second[0]));
 		list_join(&j->ready[0], &j->ready[1]);
-		list_join(&j->out[0], &j->out[1]);
-		list_join(&j->second[0], &j->second[1]);
+		list_join(&j->leased[0], &j->leased[1]);
+		list_join(&j->awaiting_second[0], &j->awaiting_second[1]);
 		list_join(&j->ready[1], &j->blocked);
 	}
-	job_place(j, s);
+	job_place_slot(j, s);
 	return complete;
 }
 
-void job_raise_limit(struct job *j)
+void job_raise_round_limit(struct job *j)
 {
-	uint64_t before = j->limit;
-	j->limit = j->plan.rounds;
+	uint64_t old_limit = j->round_limit;
+	j->round_limit = j->plan.rounds;
 	for (uint32_t i = 0; i < j->slot_count; i++)
-		if (j->slots[i].next >= before)
-			job_place(j, &j->slots[i]);
+		if (j->slots[i].next_epoch >= old_limit)
+			job_place_slot(j, &j->slots[i]);
 }
 
 void job_open_rounds(struct job *j, double now)
 {
 	j->opened = now;
-	begin_kind(j, LEASE_RENDER, j->plan.rounds, now);
+	begin_lease_kind(j, LEASE_RENDER, j->plan.rounds, now);
 }
 
 void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now)
@@ -265,11 +270,11 @@ void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, doub
 		rounds = next[i] < rounds ? next[i] : rounds;
 	j->rounds = rounds;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
-		assert(next[i] <= j->limit);
-		j->slots[i].next = next[i];
+		assert(next[i] <= j->round_limit);
+		j->slots[i].next_epoch = next[i];
 		merged += next[i];
 	}
-	job_place_all(j);
+	job_place_all_slots(j);
 	if (kind == LEASE_RENDER)
 		j->leases_merged = merged;
 	else
@@ -281,20 +286,20 @@ void job_pin(struct job *j, struct peer_class *c)
 	if (j->class)
 		return;
 	j->class = c;
-	c->uses++;
+	c->reference_count++;
 	memcpy(j->fingerprint, c->fingerprint, sizeof j->fingerprint);
 }
 
 void job_unpin_if_untouched(struct job *j)
 {
-	if (!j->class || j->leases_out || j->noted || j->bootstrap_merged || j->leases_merged)
+	if (!j->class || j->outstanding_leases || j->noted_slots || j->bootstrap_merged || j->leases_merged)
 		return;
-	peer_class_drop(j->class);
+	peer_class_release(j->class);
 	j->class = NULL;
 	j->fingerprint[0] = 0;
 }
 
-bool job_takes(const struct job *j, const struct peer_class *c)
+bool job_accepts_class(const struct job *j, const struct peer_class *c)
 {
 	return j->mixed || !j->class || j->class == c;
 }

@@ -65,7 +65,7 @@ typedef double field_real, field_positive, field_known;
 	/* Estimate of the relative error, even if its interval is unknown. */ \
 	NUMBER(known, rel_error_about, IN_RECORD, BY_JOBS, "relErrorAbout", "errorAbout", AT(error_about)) \
 	/* Why the interval of the error is unknown; "": it is known. */ \
-	TEXT(rel_error_doubt, STATED_ERROR_TEXT, IN_RECORD, BY_JOBS, "relErrorDoubt", "errorDoubt", NOWHERE) \
+	TEXT(rel_error_doubt, STATED_ERROR_TEXT_MAX, IN_RECORD, BY_JOBS, "relErrorDoubt", "errorDoubt", NOWHERE) \
 	NUMBER(positive, target_error, IN_RECORD, BY_JOBS, "targetError", "targetError", AT(target_error)) \
 	NUMBER(real, cpu_seconds, IN_RECORD, BY_JOBS, "cpuSeconds", "cpuSeconds", AT(cpu_seconds)) /* of all leases */ \
 	NUMBER(real, bootstrap_cpu_seconds, IN_RECORD, BY_JOBS, "bootstrapCpuSeconds", "bootstrapCpuSeconds", \
@@ -81,9 +81,9 @@ typedef double field_real, field_positive, field_known;
 	/* Fraction of the leases that two workers compute. */ \
 	NUMBER(real, verify, IN_RECORD, BY_CORE, "verify", "verify", AT(verify)) \
 	TEXT(mixture, PLAN_MUTATIONS_MAX, IN_RECORD, BY_JOBS, "mixture", "mixture", NOWHERE) \
-	TEXT(note, STRATEGY_NOTE, IN_RECORD, BY_JOBS, "note", "note", AT(note)) \
+	TEXT(note, STRATEGY_NOTE_MAX, IN_RECORD, BY_JOBS, "note", "note", AT(note)) \
 	/* Notes about the scene, one per line (text_lines). */ \
-	TEXT(scene_notes, HEADER_SCENE_NOTES, IN_RECORD, BY_JOBS, "sceneNotes", NULL, NOWHERE) \
+	TEXT(scene_notes, HEADER_SCENE_NOTES_MAX, IN_RECORD, BY_JOBS, "sceneNotes", NULL, NOWHERE) \
 	NUMBER(positive, b, IN_RECORD, BY_JOBS, "b", "b", NOWHERE) /* of the last image */ \
 	/* Bootstrap samples or mutations merged per second, over the last half minute. */ \
 	NUMBER(real, rate, IN_VIEW, BY_CORE, NULL, "rate", AT(rate)) \

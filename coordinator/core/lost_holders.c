@@ -7,66 +7,68 @@
 #include "coordinator/core/owner.h"
 #include "coordinator/core/rounds.h"
 
-enum { LOST_TOLD = 2 };
+enum { LOST_HOLDERS_REPORTED = 2 };
 
-static bool is_gone(const struct lost_worker *w)
+static bool has_not_returned(const struct lost_worker *w)
 {
-	return w->who->id != w->id || w->who->calls == w->calls;
+	return w->identity->id != w->id || w->identity->contact_count == w->contact_count;
 }
 
-static uint32_t count_gone(const struct lost_holders *l, uint32_t *certificates)
+static uint32_t count_not_returned(const struct lost_holders *l, uint32_t *certificates)
 {
 	uint32_t n = 0;
 	*certificates = 0;
 	for (uint32_t i = 0; i < l->count; i++) {
-		bool again = false;
-		if (!is_gone(&l->of[i]))
+		bool is_repeated = false;
+		if (!has_not_returned(&l->workers[i]))
 			continue;
 		for (uint32_t k = 0; k < i; k++)
-			again |= is_gone(&l->of[k]) && l->of[k].certificate == l->of[i].certificate;
+			is_repeated |= has_not_returned(&l->workers[k]) &&
+				       l->workers[k].certificate_id == l->workers[i].certificate_id;
 		n++;
-		*certificates += !again;
+		*certificates += !is_repeated;
 	}
 	return n;
 }
 
 /* Adds the worker in the first place that fits: its own entry, a free one, that of a worker that came back, or one of
  * several with the same certificate. */
-static void add_worker(struct lost_holders *l, const struct identity *who)
+static void add_worker(struct lost_holders *l, const struct identity *identity)
 {
-	uint32_t place = l->count;
+	uint32_t position = l->count;
 	for (uint32_t i = l->count; i-- > 0;)
-		if (l->of[i].id == who->id)
-			place = i;
-	for (uint32_t i = 0; place == LOST_FATAL && i < l->count; i++)
-		if (!is_gone(&l->of[i]) || l->of[i].certificate == who->certificate_id)
-			place = i;
-	if (place == LOST_FATAL)
+		if (l->workers[i].id == identity->id)
+			position = i;
+	for (uint32_t i = 0; position == LOST_HOLDERS_FATAL && i < l->count; i++)
+		if (!has_not_returned(&l->workers[i]) || l->workers[i].certificate_id == identity->certificate_id)
+			position = i;
+	if (position == LOST_HOLDERS_FATAL)
 		return;
-	l->count += place == l->count;
-	l->of[place] = (struct lost_worker){who, who->id, who->certificate_id, who->calls};
+	l->count += position == l->count;
+	l->workers[position] =
+		(struct lost_worker){identity, identity->id, identity->certificate_id, identity->contact_count};
 }
 
 /* Returns the worker's index in the list; the list's length if it is not listed. */
-static uint32_t place_of(const struct lost_holders *l, const struct identity *who)
+static uint32_t index_of(const struct lost_holders *l, const struct identity *identity)
 {
 	uint32_t i = 0;
-	while (i < l->count && l->of[i].id != who->id)
+	while (i < l->count && l->workers[i].id != identity->id)
 		i++;
 	return i;
 }
 
-bool lost_holders_have(const struct lost_holders *l, const struct identity *who)
+bool lost_holders_contain(const struct lost_holders *l, const struct identity *identity)
 {
-	return place_of(l, who) < l->count;
+	return index_of(l, identity) < l->count;
 }
 
-bool lost_holders_remove(struct lost_holders *l, const struct identity *who)
+bool lost_holders_remove(struct lost_holders *l, const struct identity *identity)
 {
-	uint32_t place = place_of(l, who);
-	if (place == l->count)
+	uint32_t position = index_of(l, identity);
+	if (position == l->count)
 		return false;
-	l->of[place] = l->of[--l->count];
+	l->workers[position] = l->workers[--l->count];
 	return true;
 }
 
@@ -82,18 +84,18 @@ void lost_holders_add(struct farm *f, struct lease *l)
 	if (!counts)
 		return;
 	j->counts.lost++;
-	add_worker(&s->lost, p->who);
-	p->who->calls += p->returns;
-	n = count_gone(&s->lost, &certificates);
-	if (n < LOST_TOLD)
+	add_worker(&s->lost_holders, p->identity);
+	p->identity->contact_count += p->is_superseded;
+	n = count_not_returned(&s->lost_holders, &certificates);
+	if (n < LOST_HOLDERS_REPORTED)
 		return;
-	text_print(f->text, sizeof f->text,
-		   "%s: %u workers in a row were lost while they held %s " LEASE_WORDS
+	text_print(f->answer_text, sizeof f->answer_text,
+		   "%s: %u workers in a row were lost while they held %s " LEASE_POSITION_FORMAT
 		   " (%d end the job); the last one: %s",
-		   j->name, n, LEASE_VALUES(&k), LOST_FATAL, p->name);
-	text_copy(j->text, sizeof j->text, f->text);
-	if (n < LOST_FATAL || certificates < failure_quorum_certificates(f))
+		   j->name, n, LEASE_VALUES(&k), LOST_HOLDERS_FATAL, p->name);
+	text_copy(j->text, sizeof j->text, f->answer_text);
+	if (n < LOST_HOLDERS_FATAL || certificates < failure_quorum_required_certificates(f))
 		return;
 	owner_limit(j->owner, f->now);
-	rounds_end(f, j, END_FAILED, f->text);
+	rounds_end_job(f, j, END_FAILED, f->answer_text);
 }

@@ -5,59 +5,59 @@
 
 #include <math.h>
 
-enum { PAUSE_DOUBLINGS = 6 };
+enum { BACKOFF_DOUBLINGS_MAX = 6 };
 
 void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
 {
 	if (p->state == PEER_ACTIVE && s != PEER_ACTIVE)
-		p->class->active--;
+		p->class->active_count--;
 	if (p->state != PEER_ACTIVE && s == PEER_ACTIVE)
-		p->class->active++;
+		p->class->active_count++;
 	p->state = s;
 	peer_requeue(f, p);
 }
 
-void peer_heard(struct farm *f, struct peer *p)
+void peer_note_contact(struct farm *f, struct peer *p)
 {
 	p->last_seen = f->now;
-	p->who->calls += p->state == PEER_SILENT;
+	p->identity->contact_count += p->state == PEER_SILENT;
 	if (p->state == PEER_SILENT)
-		peer_set_state(f, p, p->who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE);
+		peer_set_state(f, p, p->identity->quarantined ? PEER_QUARANTINED : PEER_ACTIVE);
 }
 
-bool peer_has_wish(const struct peer *p)
+bool peer_wants_lease(const struct peer *p)
 {
-	return p->state == PEER_ACTIVE && p->held < p->want && p->held < p->who->window &&
-	       p->held + p->delivered < p->lease_limit;
+	return p->state == PEER_ACTIVE && p->held_leases < p->wanted_leases &&
+	       p->held_leases < p->identity->lease_window && p->held_leases + p->delivered_leases < p->lease_capacity;
 }
 
 void peer_requeue(struct farm *f, struct peer *p)
 {
-	if (!list_is_empty(&p->waiting)) {
-		list_remove(&p->waiting);
-		f->waiting--;
+	if (!list_is_empty(&p->waiting_link)) {
+		list_remove(&p->waiting_link);
+		f->waiting_count--;
 	}
-	if (peer_has_wish(p)) {
-		list_append(&p->class->waiting, &p->waiting);
-		p->queued = f->queued++;
-		f->waiting++;
+	if (peer_wants_lease(p)) {
+		list_append(&p->class->waiting_peers, &p->waiting_link);
+		p->queue_position = f->next_queue_position++;
+		f->waiting_count++;
 	}
 }
 
-static struct backoff *avoid_of(const struct peer *p, uint64_t job)
+static struct backoff *find_backoff(const struct peer *p, uint64_t job)
 {
-	for (int i = 0; i < IDENTITY_AVOIDED; i++)
-		if (p->who->avoid[i].job == job)
-			return &p->who->avoid[i];
+	for (int i = 0; i < IDENTITY_BACKOFFS_MAX; i++)
+		if (p->identity->backoffs[i].job == job)
+			return &p->identity->backoffs[i];
 	return NULL;
 }
 
 /* Returns a free entry, that of a job that is over, or the one whose pause ends first. */
-static struct backoff *room_to_avoid(const struct farm *f, struct identity *who)
+static struct backoff *choose_backoff_entry(const struct farm *f, struct identity *identity)
 {
-	struct backoff *first = &who->avoid[0];
-	for (int i = 0; i < IDENTITY_AVOIDED; i++) {
-		struct backoff *a = &who->avoid[i];
+	struct backoff *first = &identity->backoffs[0];
+	for (int i = 0; i < IDENTITY_BACKOFFS_MAX; i++) {
+		struct backoff *a = &identity->backoffs[i];
 		const struct job *j = a->job ? farm_find_job(f, a->job) : NULL;
 		if (!j || !job_is_live(j))
 			return a;
@@ -67,110 +67,115 @@ static struct backoff *room_to_avoid(const struct farm *f, struct identity *who)
 	return first;
 }
 
-static struct backoff *begin_to_avoid(const struct farm *f, struct peer *p, uint64_t job)
+static struct backoff *begin_backoff(const struct farm *f, struct peer *p, uint64_t job)
 {
-	struct backoff *a = room_to_avoid(f, p->who);
+	struct backoff *a = choose_backoff_entry(f, p->identity);
 	*a = (struct backoff){.job = job};
 	return a;
 }
 
-static bool is_holding(const struct peer *p)
+static bool holds_leases(const struct peer *p)
 {
-	return p->held + p->delivered > 0;
+	return p->held_leases + p->delivered_leases > 0;
 }
 
-static bool holds_lease_of(const struct peer *p, uint64_t job)
+static bool holds_lease_of_job(const struct peer *p, uint64_t job)
 {
-	for (uint32_t i = 0; i < p->lease_limit; i++)
-		if (p->leases[i].used && p->leases[i].job->id == job)
+	for (uint32_t i = 0; i < p->lease_capacity; i++)
+		if (p->leases[i].in_use && p->leases[i].job->id == job)
 			return true;
 	return false;
 }
 
-/* This is not a failure, so the pause does not grow. full_until keeps other jobs away for as long: however many wait,
- * the worker is asked once per pause. */
-void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
+/* This is not a failure, so the pause does not grow. memory_full_until keeps other jobs away for as long: however many
+ * wait, the worker is asked once per pause. */
+void peer_note_memory_full(const struct farm *f, struct peer *p, uint64_t job)
 {
-	struct backoff *a = avoid_of(p, job);
-	bool held = is_holding(p);
-	p->who->full_until = f->now + f->config.first_pause;
-	p->who->full_held = held;
-	if (a && a->until > f->now && !a->later)
+	struct backoff *a = find_backoff(p, job);
+	bool holds_any = holds_leases(p);
+	p->identity->memory_full_until = f->now + f->config.initial_backoff;
+	p->identity->held_leases_when_full = holds_any;
+	if (a && a->until > f->now && !a->memory_full)
 		return;
-	a = a ? a : begin_to_avoid(f, p, job);
-	a->own = a->later = true;
+	a = a ? a : begin_backoff(f, p, job);
+	a->worker_at_fault = a->memory_full = true;
 	/* If it holds leases of this job, the job waits for its own scene to leave the memory. */
-	a->held = held && !holds_lease_of(p, job);
-	a->until = f->now + f->config.first_pause;
+	a->held_leases = holds_any && !holds_lease_of_job(p, job);
+	a->until = f->now + f->config.initial_backoff;
 }
 
-void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
+void peer_note_failure(const struct farm *f, struct peer *p, uint64_t job, bool worker_at_fault)
 {
-	struct backoff *a = avoid_of(p, job);
+	struct backoff *a = find_backoff(p, job);
 	p->failures++;
 	if (a && a->until > f->now) {
-		a->own = a->own && own;
-		a->later = false;
+		a->worker_at_fault = a->worker_at_fault && worker_at_fault;
+		a->memory_full = false;
 		return;
 	}
-	a = a ? a : begin_to_avoid(f, p, job);
-	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
+	a = a ? a : begin_backoff(f, p, job);
+	uint32_t doublings = a->failures < BACKOFF_DOUBLINGS_MAX ? a->failures : BACKOFF_DOUBLINGS_MAX;
 	a->failures++;
-	a->own = own;
-	a->later = false;
-	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
+	a->worker_at_fault = worker_at_fault;
+	a->memory_full = false;
+	a->until = f->now + ldexp(f->config.initial_backoff, (int)doublings);
 }
 
 /* The number of leases that a worker may hold grows with the results it returns, so that a worker that takes
  * everything and returns nothing blocks little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
-	struct peer **all = p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still exist */
-	uint32_t count = p->who->uses > 1 ? f->peer_count : 1;
-	p->who->window = window;
+	struct peer **peers = p->identity->reference_count > 1
+				      ? f->peers
+				      : &p; /* an old connection of the same worker may still exist */
+	uint32_t count = p->identity->reference_count > 1 ? f->peer_count : 1;
+	p->identity->lease_window = window;
 	for (uint32_t i = 0; i < count; i++)
-		if (all[i]->who == p->who && peer_has_wish(all[i]) == list_is_empty(&all[i]->waiting))
-			peer_requeue(f, all[i]);
+		if (peers[i]->identity == p->identity &&
+		    peer_wants_lease(peers[i]) == list_is_empty(&peers[i]->waiting_link))
+			peer_requeue(f, peers[i]);
 }
 
-void peer_was_late(struct farm *f, struct peer *p)
+void peer_note_lateness(struct farm *f, struct peer *p)
 {
-	set_window(f, p, p->who->window > 1 ? p->who->window / 2 : 1);
+	set_window(f, p, p->identity->lease_window > 1 ? p->identity->lease_window / 2 : 1);
 }
 
-void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
+void peer_note_success(struct farm *f, struct peer *p, uint64_t job)
 {
-	struct backoff *a = avoid_of(p, job);
+	struct backoff *a = find_backoff(p, job);
 	p->merged++;
-	p->who->faults_in_row = 0;
+	p->identity->consecutive_faults = 0;
 	if (a)
 		*a = (struct backoff){0};
-	if (p->who->window < f->config.max_peer_leases)
-		set_window(f, p, 2 * p->who->window);
+	if (p->identity->lease_window < f->config.max_peer_leases)
+		set_window(f, p, 2 * p->identity->lease_window);
 }
 
-double peer_avoids_until(const struct peer *p, uint64_t job)
+double peer_backoff_end(const struct peer *p, uint64_t job)
 {
-	const struct backoff *a = avoid_of(p, job);
+	const struct backoff *a = find_backoff(p, job);
 	return a ? a->until : -INFINITY;
 }
 
-double peer_pauses_until(const struct peer *p, const struct job *j)
+double peer_pause_end(const struct peer *p, const struct job *j)
 {
-	const struct backoff *a = avoid_of(p, j->id);
-	bool free = !is_holding(p), in = holds_lease_of(p, j->id);
-	double until = a && !(a->later && a->held && (free || in)) ? a->until : -INFINITY, full = p->who->full_until;
-	return full > until && !(free && p->who->full_held) && !in ? full : until;
+	const struct backoff *a = find_backoff(p, j->id);
+	bool is_idle = !holds_leases(p), holds_job_lease = holds_lease_of_job(p, j->id);
+	double until = a && !(a->memory_full && a->held_leases && (is_idle || holds_job_lease)) ? a->until : -INFINITY,
+	       memory_end = p->identity->memory_full_until;
+	return memory_end > until && !(is_idle && p->identity->held_leases_when_full) && !holds_job_lease ? memory_end
+													  : until;
 }
 
-bool peer_lacks(const struct peer *p, uint64_t job)
+bool peer_is_at_fault(const struct peer *p, uint64_t job)
 {
-	const struct backoff *a = avoid_of(p, job);
-	return a && a->own;
+	const struct backoff *a = find_backoff(p, job);
+	return a && a->worker_at_fault;
 }
 
-bool peer_waits_for_room(const struct peer *p, uint64_t job)
+bool peer_waits_for_memory(const struct peer *p, uint64_t job)
 {
-	const struct backoff *a = avoid_of(p, job);
-	return a && a->later;
+	const struct backoff *a = find_backoff(p, job);
+	return a && a->memory_full;
 }

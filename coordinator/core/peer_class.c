@@ -6,12 +6,12 @@
 
 #include <string.h>
 
-struct peer_class *peer_class_use(struct link *classes, const char *fingerprint)
+struct peer_class *peer_class_acquire(struct link *classes, const char *fingerprint)
 {
 	for (struct link *l = classes->next; l != classes; l = l->next) {
 		struct peer_class *c = list_entry(l, struct peer_class, link);
 		if (strcmp(c->fingerprint, fingerprint) == 0) {
-			c->uses++;
+			c->reference_count++;
 			return c;
 		}
 	}
@@ -19,15 +19,15 @@ struct peer_class *peer_class_use(struct link *classes, const char *fingerprint)
 	if (!c)
 		return NULL;
 	text_copy(c->fingerprint, sizeof c->fingerprint, fingerprint);
-	c->uses = 1;
-	list_init(&c->waiting);
+	c->reference_count = 1;
+	list_init(&c->waiting_peers);
 	list_append(classes, &c->link);
 	return c;
 }
 
-void peer_class_drop(struct peer_class *c)
+void peer_class_release(struct peer_class *c)
 {
-	if (--c->uses)
+	if (--c->reference_count)
 		return;
 	list_remove(&c->link);
 	mem_free(c);

@@ -10,15 +10,15 @@
 enum { FINGERPRINT_SIZE = 128 };
 
 struct peer_class {
-	struct link link;    /* in farm.classes */
-	struct link waiting; /* workers that want a lease */
-	uint32_t uses;	     /* references: workers and live jobs */
-	uint32_t active;     /* workers that may get leases */
+	struct link link;	   /* in farm.classes */
+	struct link waiting_peers; /* workers that want a lease */
+	uint32_t reference_count;  /* references: workers and live jobs */
+	uint32_t active_count;	   /* workers that may get leases */
 	char fingerprint[FINGERPRINT_SIZE];
 };
 
 /* The class of this fingerprint, made if necessary; NULL: out of memory. */
-struct peer_class *peer_class_use(struct link *classes, const char *fingerprint);
-void peer_class_drop(struct peer_class *c);
+struct peer_class *peer_class_acquire(struct link *classes, const char *fingerprint);
+void peer_class_release(struct peer_class *c);
 
 #endif

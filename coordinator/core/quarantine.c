@@ -9,62 +9,63 @@
 #include <string.h>
 
 /* Quarantines a worker permanently: it gets no leases, and nothing that it sends counts. */
-static void quarantine_worker(struct farm *f, struct identity *who)
+static void quarantine_worker(struct farm *f, struct identity *identity)
 {
-	if (who->quarantined)
+	if (identity->quarantined)
 		return;
-	worker_registry_quarantine(f, who);
+	worker_registry_quarantine(f, identity);
 	struct action *a = update_add(f, ACTION_QUARANTINE);
-	a->who = who->id;
-	a->text = who->text;
+	a->worker_id = identity->id;
+	a->text = identity->last_fault;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		struct peer *p = f->peers[i];
-		if (p->who != who)
+		if (p->identity != identity)
 			continue;
 		peer_set_state(f, p, PEER_QUARANTINED);
 		connection_drop_leases(f, p, true);
 	}
-	verify_forget_worker(f, who);
+	verify_forget_worker(f, identity);
 }
 
-void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
+void quarantine_note_wrong_result(struct farm *f, struct identity *identity, const char *description,
+				  const struct lease_key *k)
 {
-	snprintf(who->text, sizeof who->text, "%s: j%llu %s " LEASE_WORDS, what, (unsigned long long)k->job,
-		 LEASE_VALUES(k));
-	who->wrong++;
-	struct action *a = update_add(f, ACTION_WRONG);
-	a->who = who->id;
+	snprintf(identity->last_fault, sizeof identity->last_fault, "%s: j%llu %s " LEASE_POSITION_FORMAT, description,
+		 (unsigned long long)k->job, LEASE_VALUES(k));
+	identity->wrong_results++;
+	struct action *a = update_add(f, ACTION_WRONG_RESULT);
+	a->worker_id = identity->id;
 	a->job = k->job;
 	a->key = *k;
-	a->text = who->text;
+	a->text = identity->last_fault;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		struct peer *p = f->peers[i];
-		if (p->who != who)
+		if (p->identity != identity)
 			continue;
 		p->faults++;
-		memcpy(p->text, who->text, sizeof p->text);
+		memcpy(p->last_fault, identity->last_fault, sizeof p->last_fault);
 	}
-	if (who->wrong >= f->config.max_faults)
-		quarantine_worker(f, who);
+	if (identity->wrong_results >= f->config.max_faults)
+		quarantine_worker(f, identity);
 }
 
-void quarantine_fault(struct farm *f, struct peer *p, const char *text)
+void quarantine_note_fault(struct farm *f, struct peer *p, const char *text)
 {
 	p->faults++;
-	p->who->faults_in_row++;
-	text_copy(p->text, sizeof p->text, text);
-	memcpy(p->who->text, p->text, sizeof p->text);
-	if (p->who->faults_in_row >= f->config.max_faults)
-		quarantine_worker(f, p->who);
+	p->identity->consecutive_faults++;
+	text_copy(p->last_fault, sizeof p->last_fault, text);
+	memcpy(p->identity->last_fault, p->last_fault, sizeof p->last_fault);
+	if (p->identity->consecutive_faults >= f->config.max_faults)
+		quarantine_worker(f, p->identity);
 }
 
-void quarantine_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right)
+void quarantine_judge_answers(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *correct)
 {
-	struct proof *p = proof_of(j, s);
-	const struct proof said = *p;
-	const struct lease_key k = slot_key(j, s);
-	verify_forget(f, j, s);
-	for (uint32_t i = 0; i < said.count; i++)
-		if (memcmp(&said.digest[i], right, sizeof *right) != 0)
-			quarantine_wrong(f, said.who[i], "wrong result", &k);
+	struct proof *p = proof_for_slot(j, s);
+	const struct proof answers = *p;
+	const struct lease_key k = slot_lease_key(j, s);
+	verify_forget_slot(f, j, s);
+	for (uint32_t i = 0; i < answers.count; i++)
+		if (memcmp(&answers.digests[i], correct, sizeof *correct) != 0)
+			quarantine_note_wrong_result(f, answers.workers[i], "wrong result", &k);
 }

@@ -12,12 +12,12 @@ struct peer;
 struct slot;
 
 /* Counts a wrong result. what: a few words that begin its description, to which the lease is added. */
-void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
+void quarantine_note_wrong_result(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
 
 /* Counts a fault: the worker sent something that no correct worker sends. */
-void quarantine_fault(struct farm *f, struct peer *p, const char *text);
+void quarantine_note_fault(struct farm *f, struct peer *p, const char *text);
 /* The answer with the digest `right` is correct: workers that gave another one have given a wrong result. Clears the
  * slot's noted answers. */
-void quarantine_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
+void quarantine_judge_answers(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
 
 #endif

@@ -3,46 +3,46 @@
 
 #include <math.h>
 
-static int64_t bucket_at(double now)
+static int64_t period_at(double now)
 {
-	return (int64_t)floor(now / RATE_WIDTH);
+	return (int64_t)floor(now / RATE_BUCKET_SECONDS);
 }
 
-static int slot_of(int64_t index)
+static int bucket_of_period(int64_t index)
 {
 	return (int)((index % RATE_BUCKETS + RATE_BUCKETS) % RATE_BUCKETS);
 }
 
 void rate_init(struct rate *r, double now)
 {
-	r->since = now;
+	r->start = now;
 	for (int i = 0; i < RATE_BUCKETS; i++) {
-		r->index[i] = INT64_MIN;
-		r->sum[i] = 0;
+		r->periods[i] = INT64_MIN;
+		r->sums[i] = 0;
 	}
 }
 
 void rate_add(struct rate *r, double now, double amount)
 {
-	int64_t index = bucket_at(now);
-	int i = slot_of(index);
-	if (r->index[i] != index) {
-		r->index[i] = index;
-		r->sum[i] = 0;
+	int64_t index = period_at(now);
+	int i = bucket_of_period(index);
+	if (r->periods[i] != index) {
+		r->periods[i] = index;
+		r->sums[i] = 0;
 	}
-	r->sum[i] += amount;
+	r->sums[i] += amount;
 }
 
 double rate_value(const struct rate *r, double now)
 {
-	int64_t last = bucket_at(now);
+	int64_t last = period_at(now);
 	double sum = 0;
 	for (int64_t index = last - RATE_BUCKETS + 1; index <= last; index++) {
-		int i = slot_of(index);
-		if (r->index[i] == index)
-			sum += r->sum[i];
+		int i = bucket_of_period(index);
+		if (r->periods[i] == index)
+			sum += r->sums[i];
 	}
-	double begin = (double)(last - RATE_BUCKETS + 1) * RATE_WIDTH;
-	double width = now - fmax(begin, r->since);
-	return width > 0 ? sum / width : 0;
+	double begin = (double)(last - RATE_BUCKETS + 1) * RATE_BUCKET_SECONDS;
+	double seconds = now - fmax(begin, r->start);
+	return seconds > 0 ? sum / seconds : 0;
 }

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A rate per second, averaged over the last RATE_BUCKETS x RATE_WIDTH seconds. Pure; allocates nothing. */
+/* A rate per second, averaged over the last RATE_BUCKETS x RATE_BUCKET_SECONDS seconds. Pure; allocates nothing. */
 #ifndef COORDINATOR_CORE_RATE_H
 #define COORDINATOR_CORE_RATE_H
 
 #include <stdint.h>
 
-enum { RATE_BUCKETS = 15, RATE_WIDTH = 2 };
+enum { RATE_BUCKETS = 15, RATE_BUCKET_SECONDS = 2 };
 
 struct rate {
-	double since;
-	int64_t index[RATE_BUCKETS]; /* number of the period of RATE_WIDTH s that the bucket counts */
-	double sum[RATE_BUCKETS];
+	double start;
+	int64_t periods[RATE_BUCKETS]; /* number of the period of RATE_BUCKET_SECONDS s that the bucket counts */
+	double sums[RATE_BUCKETS];
 };
 
 void rate_init(struct rate *r, double now);

@@ -12,24 +12,24 @@
 
 /* Pins the job to the fingerprint of its merged batches. If out of memory the job stays unpinned, and the first
  * worker that asks pins it. */
-static void pin(struct farm *f, struct job *j, const char *fingerprint)
+static void pin_job(struct farm *f, struct job *j, const char *fingerprint)
 {
-	struct peer_class *c = *fingerprint ? peer_class_use(&f->classes, fingerprint) : NULL;
+	struct peer_class *c = *fingerprint ? peer_class_acquire(&f->classes, fingerprint) : NULL;
 	if (!c)
 		return;
 	job_pin(j, c);
-	peer_class_drop(c);
+	peer_class_release(c);
 }
 
 /* A maker may be a worker that is no longer known, which worker_registry_recall adds. */
-static void take_makers(struct farm *f, struct job *j, const struct event_join *makers)
+static void restore_makers(struct farm *f, struct job *j, const struct event_join *makers)
 {
 	for (uint32_t i = 0; makers && i < j->slot_count; i++)
 		if (makers[i].name)
 			j->slots[i].doubt.maker = worker_registry_recall(f, &makers[i]);
 }
 
-static void take_times(struct farm *f, struct job *j, const struct event_restore *r)
+static void restore_times(struct farm *f, struct job *j, const struct event_restore *r)
 {
 	if (isnan(r->elapsed))
 		return;
@@ -39,7 +39,7 @@ static void take_times(struct farm *f, struct job *j, const struct event_restore
 		j->opened = j->started + (isnan(r->opened) ? r->elapsed : r->opened);
 }
 
-static void take_looks(struct job *j, const struct forecast_history *looks)
+static void restore_looks(struct job *j, const struct forecast_history *looks)
 {
 	j->looks = *looks;
 	if (looks->count == 0)
@@ -47,29 +47,30 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	const struct forecast_look *last = &looks->looks[looks->count - 1];
 	j->rel_error = last->doubtful ? NAN : sqrt(last->rel_mse_upper);
 	j->rel_error_rounds = (uint64_t)(last->work / (double)plan_round_mutations(&j->plan));
-	job_forecast(j);
+	job_update_forecast(j);
 }
 
 /* Makes room for one more live job. max_jobs does not apply unless a client has asked, since nobody could be told
  * that a job of an earlier run is refused. */
-static bool make_room(struct farm *f, bool asked)
+static bool ensure_live_capacity(struct farm *f, bool by_client)
 {
-	uint32_t room = asked ? f->config.max_jobs : f->live_limit;
-	if (asked || f->live_count < room)
-		return f->live_count < room;
-	uint32_t before = f->live_limit, limit = before + f->config.max_jobs, ended = f->config.max_ended + 1;
-	void *live = mem_grow(f->live, before * sizeof *f->live, limit * sizeof *f->live);
+	uint32_t max_live = by_client ? f->config.max_jobs : f->live_job_capacity;
+	if (by_client || f->live_job_count < max_live)
+		return f->live_job_count < max_live;
+	uint32_t before = f->live_job_capacity, capacity = before + f->config.max_jobs,
+		 ended = f->config.max_ended_jobs + 1;
+	void *live = mem_grow(f->live_jobs, before * sizeof *f->live_jobs, capacity * sizeof *f->live_jobs);
 	if (live)
-		f->live = live;
-	void *jobs =
-		live ? mem_grow(f->jobs, (before + ended) * sizeof *f->jobs, (limit + ended) * sizeof *f->jobs) : NULL;
+		f->live_jobs = live;
+	void *jobs = live ? mem_grow(f->jobs, (before + ended) * sizeof *f->jobs, (capacity + ended) * sizeof *f->jobs)
+			  : NULL;
 	if (!jobs)
 		return false;
 	f->jobs = jobs;
-	f->live_limit = limit;
+	f->live_job_capacity = capacity;
 	if (update_reserve(f, 0) == 0)
 		return true;
-	f->live_limit = before;
+	f->live_job_capacity = before;
 	return false;
 }
 
@@ -78,33 +79,33 @@ void restore_job(struct farm *f, const struct event *ev)
 	const struct event_restore *r = &ev->restore;
 	struct job *ended = farm_find_job(f, r->job);
 	assert(!ended || !job_is_live(ended));
-	const char *refused = "the coordinator has as many live jobs as it accepts";
-	struct job *j = make_room(f, ev->tag) ? job_new(f, &r->submit, &refused) : NULL;
+	const char *refusal = "the coordinator has as many live jobs as it accepts";
+	struct job *j = ensure_live_capacity(f, ev->tag) ? job_new(f, &r->submit, &refusal) : NULL;
 	if (!j) {
 		struct action *a = update_add(f, ACTION_REJECTED);
 		a->tag = ev->tag;
 		a->job = r->job;
-		a->text = refused;
+		a->text = refusal;
 		return;
 	}
 	j->id = r->job;
-	if (f->next_job <= j->id)
-		f->next_job = j->id + 1;
+	if (f->next_job_id <= j->id)
+		f->next_job_id = j->id + 1;
 	if (ended)
-		rounds_forget(f, ended);
-	rounds_enlist(f, j);
+		rounds_forget_job(f, ended);
+	rounds_add_job(f, j);
 	j->counts = r->counts;
-	job_restore(j, r->kind, r->next, f->now);
-	take_makers(f, j, r->makers);
-	take_times(f, j, r);
-	take_looks(j, r->looks);
-	pin(f, j, r->fingerprint);
+	job_restore(j, r->kind, r->next_epochs, f->now);
+	restore_makers(f, j, r->makers);
+	restore_times(f, j, r);
+	restore_looks(j, r->looks);
+	pin_job(f, j, r->fingerprint);
 	j->progress_floor = job_progress(j, f->now);
 	if (j->kind != LEASE_RENDER)
 		return;
-	rounds_opened(f, j, r->black);
+	rounds_start_rendering(f, j, r->black);
 	/* A bound that the last complete round met still applies. An estimate of the error that was due is made
 	 * again, with the same result. */
 	if (job_is_live(j) && j->rounds > 0)
-		rounds_settle(f, j, isnan(r->completed) ? r->elapsed : r->completed);
+		rounds_check_bounds(f, j, isnan(r->completed) ? r->elapsed : r->completed);
 }

@@ -3,10 +3,10 @@
  * The life of a job: submission, bootstrap, rounds, a bound, the end.
  *
  * Happy path: rounds_submit puts the job on the list of live jobs, ordered by priority. The first lease starts it
- * (rounds_started). When the bootstrap is merged, the shell prepares seeds and b (ACTION_BOOTSTRAP_DONE) and
- * rounds_prepared opens the first round. After each complete round rounds_settle checks the bounds; if the error has
- * to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_known decides. rounds_end revokes the
- * leases that are out and has the image published.
+ * (rounds_start_job). When the bootstrap is merged, the shell prepares seeds and b (ACTION_BOOTSTRAP_DONE) and
+ * rounds_prepared opens the first round. After each complete round rounds_check_bounds checks the bounds; if the error
+ * has to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_estimated decides. rounds_end_job
+ * revokes the leases that are out and has the image published.
  *
  * Failures: a submission is rejected with a sentence (priority, too many jobs, job_new's reasons). A job fails when
  * its bootstrap cannot be prepared or when another file of the core ends it. A black bootstrap ends the job as done.
@@ -25,7 +25,7 @@
 #include <math.h>
 #include <string.h>
 
-static struct action *about_job(struct farm *f, enum action_kind kind, const struct job *j)
+static struct action *add_job_action(struct farm *f, enum action_kind kind, const struct job *j)
 {
 	struct action *a = update_add(f, kind);
 	a->job = j->id;
@@ -33,15 +33,15 @@ static struct action *about_job(struct farm *f, enum action_kind kind, const str
 	return a;
 }
 
-static void job_changed(struct farm *f, const struct job *j)
+static void add_change_action(struct farm *f, const struct job *j)
 {
-	struct action *a = about_job(f, ACTION_JOB_CHANGED, j);
+	struct action *a = add_job_action(f, ACTION_JOB_CHANGED, j);
 	a->state = j->state;
 	a->end = j->end;
 	a->text = j->text;
 }
 
-void rounds_reject(struct farm *f, const struct event *ev, const char *text)
+void rounds_reject_event(struct farm *f, const struct event *ev, const char *text)
 {
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->tag = ev->tag;
@@ -49,38 +49,38 @@ void rounds_reject(struct farm *f, const struct event *ev, const char *text)
 	a->text = text;
 }
 
-static bool comes_before(const struct job *a, const struct job *b)
+static bool precedes(const struct job *a, const struct job *b)
 {
 	return a->priority > b->priority || (a->priority == b->priority && a->id < b->id);
 }
 
-void rounds_place(struct farm *f, struct job *j)
+void rounds_insert_live(struct farm *f, struct job *j)
 {
-	uint32_t i = f->live_count++;
-	for (; i > 0 && comes_before(j, f->live[i - 1]); i--)
-		f->live[i] = f->live[i - 1];
-	f->live[i] = j;
+	uint32_t i = f->live_job_count++;
+	for (; i > 0 && precedes(j, f->live_jobs[i - 1]); i--)
+		f->live_jobs[i] = f->live_jobs[i - 1];
+	f->live_jobs[i] = j;
 }
 
-void rounds_remove(struct farm *f, const struct job *j)
+void rounds_remove_live(struct farm *f, const struct job *j)
 {
 	uint32_t i = 0;
-	while (f->live[i] != j)
+	while (f->live_jobs[i] != j)
 		i++;
-	f->live_count--;
-	memmove(&f->live[i], &f->live[i + 1], (f->live_count - i) * sizeof *f->live);
+	f->live_job_count--;
+	memmove(&f->live_jobs[i], &f->live_jobs[i + 1], (f->live_job_count - i) * sizeof *f->live_jobs);
 }
 
-void rounds_enlist(struct farm *f, struct job *j)
+void rounds_add_job(struct farm *f, struct job *j)
 {
 	uint32_t i = f->job_count++;
 	for (; i > 0 && f->jobs[i - 1]->id > j->id; i--)
 		f->jobs[i] = f->jobs[i - 1];
 	f->jobs[i] = j;
-	rounds_place(f, j);
+	rounds_insert_live(f, j);
 }
 
-void rounds_forget(struct farm *f, struct job *j)
+void rounds_forget_job(struct farm *f, struct job *j)
 {
 	assert(!job_is_live(j));
 	uint32_t i = 0;
@@ -95,41 +95,41 @@ void rounds_submit(struct farm *f, const struct event *ev)
 {
 	const struct event_submit *e = &ev->submit;
 	if (e->priority < -PRIORITY_MAX || e->priority > PRIORITY_MAX) {
-		rounds_reject(f, ev, "a priority is from -100 to 100");
+		rounds_reject_event(f, ev, "a priority is from -100 to 100");
 		return;
 	}
-	if (f->live_count >= f->config.max_jobs) {
-		rounds_reject(f, ev, "the coordinator has as many live jobs as it accepts");
+	if (f->live_job_count >= f->config.max_jobs) {
+		rounds_reject_event(f, ev, "the coordinator has as many live jobs as it accepts");
 		return;
 	}
-	const char *refused = "";
-	struct job *j = job_new(f, e, &refused);
+	const char *refusal = "";
+	struct job *j = job_new(f, e, &refusal);
 	if (!j) {
-		rounds_reject(f, ev, refused);
+		rounds_reject_event(f, ev, refusal);
 		return;
 	}
-	j->id = f->next_job++;
-	rounds_enlist(f, j);
-	struct action *a = about_job(f, ACTION_SUBMITTED, j);
+	j->id = f->next_job_id++;
+	rounds_add_job(f, j);
+	struct action *a = add_job_action(f, ACTION_SUBMITTED, j);
 	a->tag = ev->tag;
-	job_changed(f, j);
+	add_change_action(f, j);
 }
 
-void rounds_started(struct farm *f, struct job *j)
+void rounds_start_job(struct farm *f, struct job *j)
 {
 	if (isnan(j->started))
 		j->started = f->now;
 	if (j->state == JOB_QUEUED) {
 		j->state = JOB_BOOTSTRAP;
-		job_changed(f, j);
+		add_change_action(f, j);
 	}
 }
 
-/* Forgets the job that ended first if more than max_ended have ended, but never `latest`, which has just ended: the
- * update still refers to it. */
-static void forget_oldest(struct farm *f, const struct job *latest)
+/* Forgets the job that ended first if more than max_ended_jobs have ended, but never `latest`, which has just ended:
+ * the update still refers to it. */
+static void forget_oldest_ended(struct farm *f, const struct job *latest)
 {
-	if (f->job_count - f->live_count <= f->config.max_ended)
+	if (f->job_count - f->live_job_count <= f->config.max_ended_jobs)
 		return;
 	uint32_t oldest = UINT32_MAX;
 	for (uint32_t i = 0; i < f->job_count; i++) {
@@ -139,19 +139,19 @@ static void forget_oldest(struct farm *f, const struct job *latest)
 	}
 	assert(oldest != UINT32_MAX);
 	struct job *j = f->jobs[oldest];
-	about_job(f, ACTION_JOB_FORGOTTEN, j);
-	rounds_forget(f, j);
+	add_job_action(f, ACTION_JOB_FORGOTTEN, j);
+	rounds_forget_job(f, j);
 }
 
-static void revoke_all(struct farm *f, struct job *j)
+static void revoke_job_leases(struct farm *f, struct job *j)
 {
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		lease_revoke_slot(f, &j->slots[i]);
 }
 
-void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text)
+void rounds_end_job(struct farm *f, struct job *j, enum job_end end, const char *text)
 {
-	revoke_all(f, j);
+	revoke_job_leases(f, j);
 	j->progress_floor = job_progress(j, f->now);
 	j->state = end == END_CANCELLED ? JOB_CANCELLED : end == END_FAILED ? JOB_FAILED : JOB_DONE;
 	j->end = end;
@@ -159,80 +159,80 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	text_copy(j->text, sizeof j->text, text);
 	verify_forget_job(f, j);
 	if (j->class)
-		peer_class_drop(j->class);
+		peer_class_release(j->class);
 	j->class = NULL;
 	mem_free(j->slots);
 	mem_free(j->proofs);
 	j->slots = NULL;
 	j->proofs = NULL;
 	j->slot_count = 0;
-	rounds_remove(f, j);
+	rounds_remove_live(f, j);
 	if (j->state == JOB_DONE)
-		about_job(f, ACTION_PUBLISH, j);
-	job_changed(f, j);
-	forget_oldest(f, j);
+		add_job_action(f, ACTION_PUBLISH, j);
+	add_change_action(f, j);
+	forget_oldest_ended(f, j);
 }
 
 void rounds_cancel(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
 	if (!j || !job_is_live(j)) {
-		rounds_reject(f, ev, j ? "the job is over" : "no such job");
+		rounds_reject_event(f, ev, j ? "the job is over" : "no such job");
 		return;
 	}
-	struct action *a = about_job(f, ACTION_CANCELLED, j);
+	struct action *a = add_job_action(f, ACTION_CANCELLED, j);
 	a->tag = ev->tag;
-	rounds_end(f, j, END_CANCELLED, "cancelled");
+	rounds_end_job(f, j, END_CANCELLED, "cancelled");
 }
 
-static void evaluate(struct farm *f, struct job *j)
+static void request_error_estimate(struct farm *f, struct job *j)
 {
 	j->evaluating = true;
-	j->looked_at = f->now;
-	about_job(f, ACTION_EVALUATE_ERROR, j);
+	j->estimate_requested_at = f->now;
+	add_job_action(f, ACTION_EVALUATE_ERROR, j);
 }
 
-enum job_end rounds_bound(const struct job *j, double elapsed)
+enum job_end rounds_met_bound(const struct job *j, double elapsed)
 {
 	if (j->rounds >= j->plan.rounds)
 		return END_MUTATIONS;
 	return j->plan.seconds > 0 && elapsed >= j->plan.seconds ? END_TIME : END_NONE;
 }
 
-void rounds_settle(struct farm *f, struct job *j, double elapsed)
+void rounds_check_bounds(struct farm *f, struct job *j, double elapsed)
 {
-	enum job_end end = rounds_bound(j, elapsed);
+	enum job_end end = rounds_met_bound(j, elapsed);
 	bool wants_error = j->plan.target_error > 0;
 	if (end != END_NONE && !wants_error) {
-		rounds_end(f, j, end, "");
+		rounds_end_job(f, j, end, "");
 	} else if (end != END_NONE) {
-		j->ending = end;
-		revoke_all(f, j);
-		evaluate(f, j);
-	} else if (merge_error_due(&j->plan, j->rounds)) {
-		evaluate(f, j);
+		j->pending_end = end;
+		revoke_job_leases(f, j);
+		request_error_estimate(f, j);
+	} else if (merge_error_is_due(&j->plan, j->rounds)) {
+		request_error_estimate(f, j);
 	}
 }
 
-void rounds_complete(struct farm *f, struct job *j)
+void rounds_round_complete(struct farm *f, struct job *j)
 {
 	if (j->kind == LEASE_RENDER) {
-		about_job(f, ACTION_ROUND_DONE, j);
-		rounds_settle(f, j, job_elapsed(j, f->now));
+		add_job_action(f, ACTION_ROUND_DONE, j);
+		rounds_check_bounds(f, j, job_elapsed(j, f->now));
 		return;
 	}
 	j->preparing = true;
-	about_job(f, ACTION_BOOTSTRAP_DONE, j);
+	add_job_action(f, ACTION_BOOTSTRAP_DONE, j);
 }
 
-void rounds_opened(struct farm *f, struct job *j, bool black)
+void rounds_start_rendering(struct farm *f, struct job *j, bool black)
 {
 	if (black) {
-		rounds_end(f, j, END_BLACK, "no bootstrap sample carried light");
+		rounds_end_job(f, j, END_BLACK, "no bootstrap sample carried light");
 		return;
 	}
 	j->state = JOB_RUNNING;
-	job_changed(f, j);
+	add_change_action(f, j);
 }
 
 void rounds_prepared(struct farm *f, const struct event *ev)
@@ -242,37 +242,37 @@ void rounds_prepared(struct farm *f, const struct event *ev)
 		return;
 	j->preparing = false;
 	if (!ev->prepared.ok) {
-		rounds_end(f, j, END_FAILED, ev->text ? ev->text : "");
+		rounds_end_job(f, j, END_FAILED, ev->text ? ev->text : "");
 		return;
 	}
 	job_open_rounds(j, f->now);
-	rounds_opened(f, j, ev->prepared.black);
+	rounds_start_rendering(f, j, ev->prepared.black);
 }
 
-void rounds_image_known(struct farm *f, const struct event *ev)
+void rounds_image_published(struct farm *f, const struct event *ev)
 {
-	struct job *j = farm_find_job(f, ev->image_known.job);
+	struct job *j = farm_find_job(f, ev->image_published.job);
 	if (j && j->state == JOB_DONE)
-		j->disagrees = ev->image_known.disagrees;
+		j->chains_disagree = ev->image_published.chains_disagree;
 }
 
-void rounds_error_known(struct farm *f, const struct event *ev)
+void rounds_error_estimated(struct farm *f, const struct event *ev)
 {
-	struct job *j = farm_find_job(f, ev->error_known.job);
-	if (!j || !job_is_live(j) || !j->evaluating || ev->error_known.rounds != j->rounds)
+	struct job *j = farm_find_job(f, ev->error_estimated.job);
+	if (!j || !job_is_live(j) || !j->evaluating || ev->error_estimated.rounds != j->rounds)
 		return;
 	j->evaluating = false;
 	j->progress_floor = job_progress(j, f->now);
-	j->rel_error = ev->error_known.doubtful ? NAN : ev->error_known.rel_error;
+	j->rel_error = ev->error_estimated.doubtful ? NAN : ev->error_estimated.rel_error;
 	j->rel_error_rounds = j->rounds;
-	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees,
-		      ev->error_known.doubtful, ev->error_known.cpu_seconds);
+	job_note_look(j, ev->error_estimated.rel_error, ev->error_estimated.rel_mse, ev->error_estimated.degrees,
+		      ev->error_estimated.doubtful, ev->error_estimated.cpu_seconds);
 	/* An estimate that was made because another bound was met does not count if that bound was lifted meanwhile. */
-	bool counts = j->ending != END_NONE || merge_error_due(&j->plan, j->rounds);
+	bool counts = j->pending_end != END_NONE || merge_error_is_due(&j->plan, j->rounds);
 	if (counts && j->rel_error <= j->plan.target_error)
-		rounds_end(f, j, END_ERROR, "");
-	else if (j->ending != END_NONE)
-		rounds_end(f, j, j->ending, "");
-	else if (counts && merge_ends_black(&j->plan, j->rounds, ev->error_known.black))
-		rounds_end(f, j, END_BLACK, "no sample carried light");
+		rounds_end_job(f, j, END_ERROR, "");
+	else if (j->pending_end != END_NONE)
+		rounds_end_job(f, j, j->pending_end, "");
+	else if (counts && merge_ends_black(&j->plan, j->rounds, ev->error_estimated.black))
+		rounds_end_job(f, j, END_BLACK, "no sample carried light");
 }

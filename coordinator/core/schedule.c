@@ -8,9 +8,9 @@
  * past their deadline and for silent workers.
  *
  * Failures: a silent worker first loses its leases, then its connection. Workers that pause with a job, must not
- * answer a lease (proof_bars, doubt_bars), or hold it already are passed over. While the usual duration of a job's
- * leases is not known, give_up_copies expires the older of two copies after a fixed time. call_again keeps the
- * earliest time at which any of this may change.
+ * answer a lease (proof_is_barred, doubt_is_barred), or hold it already are passed over. While the usual duration of a
+ * job's leases is not known, give_up_copies expires the older of two copies after a fixed time. schedule_no_later_than
+ * keeps the earliest time at which any of this may change.
  */
 #include "coordinator/core/schedule.h"
 
@@ -25,45 +25,45 @@
 
 #include <math.h>
 
-static void call_again(struct farm *f, double at)
+static void schedule_no_later_than(struct farm *f, double due_time)
 {
-	if (at < f->schedule_at)
-		f->schedule_at = at;
+	if (due_time < f->schedule_at)
+		f->schedule_at = due_time;
 }
 
 /* Returns the worker of the class that has waited longest and does not hold the slot's lease. If there is none and
- * `again` is set, returns one whose lease of the slot is overdue. */
-static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
-			       bool again)
+ * `allow_overdue` is set, returns one whose lease of the slot is overdue. */
+static struct peer *find_waiting_in_class(struct farm *f, const struct peer_class *c, const struct job *j,
+					  const struct slot *s, bool allow_overdue)
 {
-	struct peer *second = NULL;
-	for (struct link *k = c->waiting.next; k != &c->waiting; k = k->next) {
-		struct peer *p = list_entry(k, struct peer, waiting);
-		if (proof_bars(j, s, p) || doubt_bars(f, j, s, p))
+	struct peer *overdue_holder = NULL;
+	for (struct link *k = c->waiting_peers.next; k != &c->waiting_peers; k = k->next) {
+		struct peer *p = list_entry(k, struct peer, waiting_link);
+		if (proof_is_barred(j, s, p) || doubt_is_barred(f, j, s, p))
 			continue;
-		double until = peer_pauses_until(p, j);
+		double until = peer_pause_end(p, j);
 		if (until > f->now) {
-			call_again(f, until);
+			schedule_no_later_than(f, until);
 			continue;
 		}
-		const struct lease *l = lease_of(s, p);
+		const struct lease *l = lease_find(s, p);
 		if (!l)
 			return p;
-		if (again && l->overdue && !second)
-			second = p;
+		if (allow_overdue && l->overdue && !overdue_holder)
+			overdue_holder = p;
 	}
-	return second;
+	return overdue_holder;
 }
 
-static struct peer *waiting_for(struct farm *f, const struct job *j, const struct slot *s, bool again)
+static struct peer *find_waiting_peer(struct farm *f, const struct job *j, const struct slot *s, bool allow_overdue)
 {
 	if (j->class && !j->mixed)
-		return waiting_in(f, j->class, j, s, again);
+		return find_waiting_in_class(f, j->class, j, s, allow_overdue);
 	struct peer *first = NULL;
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
 		const struct peer_class *c = list_entry(k, struct peer_class, link);
-		struct peer *p = verify_may_begin(f, j, c) ? waiting_in(f, c, j, s, again) : NULL;
-		if (p && (!first || p->queued < first->queued))
+		struct peer *p = verify_can_begin(f, j, c) ? find_waiting_in_class(f, c, j, s, allow_overdue) : NULL;
+		if (p && (!first || p->queue_position < first->queue_position))
 			first = p;
 	}
 	return first;
@@ -74,42 +74,42 @@ static struct peer *waiting_for(struct farm *f, const struct job *j, const struc
 static struct peer *choose_peer(struct farm *f, const struct job *j, struct slot **slot)
 {
 	for (int i = 0; i < 2; i++) {
-		for (struct link *k = j->second[i].next; k != &j->second[i]; k = k->next) {
+		for (struct link *k = j->awaiting_second[i].next; k != &j->awaiting_second[i]; k = k->next) {
 			*slot = list_entry(k, struct slot, link);
-			struct peer *p = waiting_for(f, j, *slot, true);
+			struct peer *p = find_waiting_peer(f, j, *slot, true);
 			if (p)
 				return p;
 		}
 		if (list_is_empty(&j->ready[i]))
 			continue;
 		*slot = list_entry(j->ready[i].next, struct slot, link);
-		struct peer *p = waiting_for(f, j, *slot, true);
+		struct peer *p = find_waiting_peer(f, j, *slot, true);
 		if (p)
 			return p;
 	}
 	return NULL;
 }
 
-static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot *s)
+static void hand_out_lease(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 {
-	rounds_started(f, j);
+	rounds_start_job(f, j);
 	lease_send(f, p, j, s);
 }
 
 /* Whether a, the older of two jobs of the same priority, goes before b. */
-static bool comes_first(const struct job *a, const struct job *b)
+static bool precedes(const struct job *a, const struct job *b)
 {
-	if (a->owner != b->owner && a->owner->leases_out != b->owner->leases_out)
-		return a->owner->leases_out < b->owner->leases_out;
-	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
+	if (a->owner != b->owner && a->owner->outstanding_leases != b->owner->outstanding_leases)
+		return a->owner->outstanding_leases < b->owner->outstanding_leases;
+	return a->owner == b->owner ? a->outstanding_leases <= b->outstanding_leases : true;
 }
 
 /* If a job of the owner crashed workers, all jobs of that owner without a result so far share one lease at a time. */
-static bool must_wait(struct farm *f, const struct job *j)
+static bool must_wait_for_owner(struct farm *f, const struct job *j)
 {
-	bool waits = share_is_limited(f, j) && share_unproven(f, j->owner) > 0;
+	bool waits = share_is_limited(f, j) && share_unanswered_leases(f, j->owner) > 0;
 	if (waits)
-		call_again(f, j->owner->limited_until);
+		schedule_no_later_than(f, j->owner->limited_until);
 	return waits;
 }
 
@@ -120,11 +120,11 @@ static bool hand_out_ready(struct farm *f)
 	struct job *best = NULL;
 	struct slot *slot = NULL;
 	struct peer *peer = NULL;
-	for (uint32_t i = 0; i < f->live_count; i++) {
-		struct job *j = f->live[i];
+	for (uint32_t i = 0; i < f->live_job_count; i++) {
+		struct job *j = f->live_jobs[i];
 		if (best && j->priority < best->priority)
 			break;
-		if (!job_is_open(j) || (best && comes_first(best, j)) || must_wait(f, j))
+		if (!job_is_schedulable(j) || (best && precedes(best, j)) || must_wait_for_owner(f, j))
 			continue;
 		struct slot *s;
 		struct peer *p = choose_peer(f, j, &s);
@@ -135,27 +135,27 @@ static bool hand_out_ready(struct farm *f)
 		}
 	}
 	if (best)
-		hand_out(f, peer, best, slot);
+		hand_out_lease(f, peer, best, slot);
 	return best;
 }
 
 /* Hands out a second copy of a lease that holds up a round. Returns false if there is none, or no worker for it. */
 static bool hand_out_copy(struct farm *f)
 {
-	for (uint32_t i = 0; i < f->live_count; i++) {
-		struct job *j = f->live[i];
-		if (!job_is_open(j) || must_wait(f, j))
+	for (uint32_t i = 0; i < f->live_job_count; i++) {
+		struct job *j = f->live_jobs[i];
+		if (!job_is_schedulable(j) || must_wait_for_owner(f, j))
 			continue;
-		for (struct link *k = j->out[0].next; k != &j->out[0]; k = k->next) {
+		for (struct link *k = j->leased[0].next; k != &j->leased[0]; k = k->next) {
 			struct slot *s = list_entry(k, struct slot, link);
-			double at = job_straggles_at(&f->config, j, s);
-			if (at > f->now) {
-				call_again(f, at);
+			double due_time = job_copy_due_time(&f->config, j, s);
+			if (due_time > f->now) {
+				schedule_no_later_than(f, due_time);
 				break;
 			}
-			struct peer *p = waiting_for(f, j, s, false);
+			struct peer *p = find_waiting_peer(f, j, s, false);
 			if (p) {
-				hand_out(f, p, j, s);
+				hand_out_lease(f, p, j, s);
 				return true;
 			}
 		}
@@ -171,92 +171,92 @@ static struct lease *older_copy(const struct slot *s)
 	for (struct lease *l = s->leases; l; l = l->next) {
 		if (l->delivered)
 			return NULL;
-		if (!l->overdue && (!older || l->sent < older->sent))
+		if (!l->overdue && (!older || l->sent_at < older->sent_at))
 			older = l;
 	}
-	return s->holders > 1 ? older : NULL;
+	return s->holder_count > 1 ? older : NULL;
 }
 
 /* For a job without a median: if two workers have held the same lease for long and another worker is idle, gives up
  * the older copy. Returns true if some lease has two holders. */
 static bool give_up_copies(struct farm *f, struct job *j)
 {
-	bool any = false;
+	bool has_copies = false;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		struct slot *s = &j->slots[i];
-		struct lease *l = s->next == j->rounds ? older_copy(s) : NULL;
+		struct lease *l = s->next_epoch == j->rounds ? older_copy(s) : NULL;
 		if (!l)
 			continue;
-		any = true;
-		if (job_idle_timeout(&f->config, s) + l->sent <= f->now && waiting_for(f, j, s, false)) {
+		has_copies = true;
+		if (job_copy_timeout(&f->config, s) + l->sent_at <= f->now && find_waiting_peer(f, j, s, false)) {
 			lease_expire(f, l);
-			while (f->waiting && hand_out_copy(f))
+			while (f->waiting_count && hand_out_copy(f))
 				;
 		}
 	}
-	return any;
+	return has_copies;
 }
 
 /* Calls give_up_copies for all jobs without a median, at most once in PERIOD seconds. */
-static void look_at_copies(struct farm *f)
+static void check_copies(struct farm *f)
 {
 	enum { PERIOD = 10 };
-	bool any = false;
-	for (uint32_t i = 0; f->waiting && f->now >= f->idle_at && i < f->live_count; i++)
-		if (job_is_open(f->live[i]) && isnan(f->live[i]->median))
-			any = give_up_copies(f, f->live[i]) || any;
-	if (any)
-		f->idle_at = f->now + PERIOD;
-	if (f->waiting && f->idle_at > f->now)
-		call_again(f, f->idle_at);
+	bool has_copies = false;
+	for (uint32_t i = 0; f->waiting_count && f->now >= f->copy_check_at && i < f->live_job_count; i++)
+		if (job_is_schedulable(f->live_jobs[i]) && isnan(f->live_jobs[i]->median_duration))
+			has_copies = give_up_copies(f, f->live_jobs[i]) || has_copies;
+	if (has_copies)
+		f->copy_check_at = f->now + PERIOD;
+	if (f->waiting_count && f->copy_check_at > f->now)
+		schedule_no_later_than(f, f->copy_check_at);
 }
 
-void schedule(struct farm *f)
+void schedule_leases(struct farm *f)
 {
 	f->schedule_at = INFINITY;
-	verify_change_class(f);
-	while (f->waiting && hand_out_ready(f))
+	verify_unpin_stranded_jobs(f);
+	while (f->waiting_count && hand_out_ready(f))
 		;
-	while (f->waiting && hand_out_copy(f))
+	while (f->waiting_count && hand_out_copy(f))
 		;
-	look_at_copies(f);
+	check_copies(f);
 }
 
-static void expire_leases(struct farm *f, struct peer *p, double read)
+static void expire_leases(struct farm *f, struct peer *p, double read_until)
 {
-	for (uint32_t i = 0; i < p->lease_limit; i++) {
+	for (uint32_t i = 0; i < p->lease_capacity; i++) {
 		struct lease *l = &p->leases[i];
-		if (!l->used || l->overdue)
+		if (!l->in_use || l->overdue)
 			continue;
-		if (l->deadline <= read)
+		if (l->deadline <= read_until)
 			lease_expire(f, l);
 		else
-			f->check_at = fmin(f->check_at, l->deadline);
+			f->expiry_check_at = fmin(f->expiry_check_at, l->deadline);
 	}
 }
 
-void schedule_expire(struct farm *f, double read)
+void schedule_expire(struct farm *f, double read_until)
 {
-	if (f->now < f->check_at)
+	if (f->now < f->expiry_check_at)
 		return;
-	f->check_at = INFINITY;
+	f->expiry_check_at = INFINITY;
 	for (uint32_t i = f->peer_count; i-- > 0;) {
 		struct peer *p = f->peers[i];
-		if (p->last_seen + f->config.forget_after <= read) {
+		if (p->last_seen + f->config.disconnect_timeout <= read_until) {
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
 			a->text = "silent for too long";
 			connection_lose(f, p);
 			continue;
 		}
-		if (p->state != PEER_SILENT && p->last_seen + f->config.silent_after <= read) {
+		if (p->state != PEER_SILENT && p->last_seen + f->config.silence_timeout <= read_until) {
 			peer_set_state(f, p, PEER_SILENT);
 			connection_lose_leases(f, p);
 		}
-		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
-		f->check_at = fmin(f->check_at, p->last_seen + patience);
-		expire_leases(f, p, read);
+		double patience = p->state == PEER_SILENT ? f->config.disconnect_timeout : f->config.silence_timeout;
+		f->expiry_check_at = fmin(f->expiry_check_at, p->last_seen + patience);
+		expire_leases(f, p, read_until);
 	}
 	/* Each call scans all workers and leases: at most one a second. */
-	f->check_at = fmax(f->check_at, f->now + 1);
+	f->expiry_check_at = fmax(f->expiry_check_at, f->now + 1);
 }

@@ -6,7 +6,7 @@
 struct farm;
 
 /* Hands out leases while workers wait. Call after every event. */
-void schedule(struct farm *f);
+void schedule_leases(struct farm *f);
 /* Expires leases past their deadline and disconnects silent workers. `read`: everything that arrived before this time
  * has been handled. */
 void schedule_expire(struct farm *f, double read);

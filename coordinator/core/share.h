@@ -24,12 +24,12 @@ struct share {
 	char owners_place[160]; /* like `place`, without the ids of other owners' jobs */
 };
 
-void share_of(const struct farm *f, const struct job *j, struct share *out);
-bool share_competes(const struct job *a, const struct job *b); /* whether both could use the same workers */
+void share_compute(const struct farm *f, const struct job *j, struct share *out);
+bool share_jobs_compete(const struct job *a, const struct job *b); /* whether both could use the same workers */
 
 /* Whether the job's owner is limited (owner.h) and nothing of the job was computed yet. */
 bool share_is_limited(const struct farm *f, const struct job *j);
 /* Returns how many leases of this owner's jobs that have no result yet are with workers. */
-uint32_t share_unproven(const struct farm *f, const struct owner *o);
+uint32_t share_unanswered_leases(const struct farm *f, const struct owner *o);
 
 #endif

@@ -14,64 +14,66 @@ struct slot;
 
 /* A lease held by one worker. Stored in the worker's table and linked to the slot. */
 struct lease {
-	bool used;
+	bool in_use;
 	bool overdue;	/* timed out: no longer counts as held, but an answer still counts */
 	bool delivered; /* its result has arrived but is not judged yet: no longer counts as work to do */
 	struct peer *peer;
 	struct job *job;
 	/* The lease is for the slot's next epoch, so merging that epoch ends all leases of the slot. */
 	struct slot *slot;
-	double sent, deadline;
+	double sent_at, deadline;
 	struct lease *next; /* next lease of the same slot */
 };
 
 /* The workers that failed with a lease or job; see failure_quorum.h. */
-enum { FAILURE_QUORUM_FATAL = 3 };
+enum { FAILURE_QUORUM_SIZE = 3 };
 
 struct failure_quorum {
 	uint32_t count;
 	struct {
-		uint64_t who, certificate; /* numbers in struct identity: id, certificate_id */
-	} of[FAILURE_QUORUM_FATAL];
+		uint64_t identity_id, certificate_id; /* numbers in struct identity: id, certificate_id */
+	} workers[FAILURE_QUORUM_SIZE];
 };
 
 /* Who made and who refused the chain states that the slot's next epoch starts from; see doubt.h. */
 struct doubt {
-	uint64_t maker;	  /* worker that made the states; 0: not known */
-	uint64_t before;  /* worker that made the states one epoch earlier; 0: not known */
-	uint64_t refuser; /* first worker that refused the states; 0: none */
-	uint64_t barred;  /* maker of an epoch that was taken back and is computed again; 0: none */
-	uint64_t reach;	  /* highest `next` from which an epoch was taken back; 0: none, or passed since */
-	uint32_t again;	  /* epochs taken back since the slot last got beyond `reach` */
-	bool anew;	  /* its chains start the next epoch from their seeds */
+	uint64_t maker;		     /* worker that made the states; 0: not known */
+	uint64_t previous_maker;     /* worker that made the states one epoch earlier; 0: not known */
+	uint64_t refuser;	     /* first worker that refused the states; 0: none */
+	uint64_t barred;	     /* maker of an epoch that was taken back and is computed again; 0: none */
+	uint64_t rollback_watermark; /* highest `next_epoch` from which an epoch was taken back; 0: none, or passed
+					since */
+	uint32_t rollback_count;     /* epochs taken back since the slot last got beyond `rollback_watermark` */
+	bool from_seeds;	     /* its chains start the next epoch from their seeds */
 };
 
 /* Workers that were lost while they held the slot's next lease; see lost_holders.h. */
-enum { LOST_FATAL = 8 };
+enum { LOST_HOLDERS_FATAL = 8 };
 
 struct lost_holders {
 	uint32_t count;
 	struct lost_worker {
-		const struct identity *who;	 /* valid only while who->id equals id */
-		uint64_t id, certificate, calls; /* calls: who->calls when the worker was lost */
-	} of[LOST_FATAL];
+		const struct identity *identity; /* valid only while who->id equals id */
+		uint64_t id, certificate_id,
+			contact_count; /* contact_count: who->contact_count when the worker was lost */
+	} workers[LOST_HOLDERS_FATAL];
 };
 
 struct slot {
 	struct link link;     /* in one of the job's lists; in none with two holders or after the last epoch */
 	struct lease *leases; /* all leases for the next epoch, including overdue ones */
-	uint64_t next;	      /* first epoch that is not merged */
-	double since;	      /* when the lease of the remaining holder was sent */
+	uint64_t next_epoch;  /* first epoch that is not merged */
+	double holder_since;  /* when the lease of the remaining holder was sent */
 	struct failure_quorum failure_quorum; /* workers that failed with the next epoch */
-	struct lost_holders lost;	      /* workers that were lost while they held the next epoch */
+	struct lost_holders lost_holders;     /* workers that were lost while they held the next epoch */
 	struct doubt doubt;		      /* about the states that the next epoch starts from */
-	uint32_t holders, timeouts;
+	uint32_t holder_count, timeout_count;
 };
 
 /* Whether a worker has refused the states and another one is asked about them. */
-static inline bool doubt_waits(const struct slot *s)
+static inline bool doubt_is_pending(const struct slot *s)
 {
-	return s->doubt.refuser && !s->doubt.anew;
+	return s->doubt.refuser && !s->doubt.from_seeds;
 }
 
 #endif

@@ -2,8 +2,8 @@
 /*
  * Answers questions about the farm without changing it: jobs, workers, leases, and why a job is waiting.
  *
- * farm_job fills all figures of a job. why_waiting finds the first reason why nothing is being done for it, in this
- * order: held, being evaluated, no worker, no worker of its fingerprint, verification, doubted states, a limited
+ * farm_job_status fills all figures of a job. describe_wait finds the first reason why nothing is being done for it, in
+ * this order: held, being evaluated, no worker, no worker of its fingerprint, verification, doubted states, a limited
  * owner, workers that failed, and last other jobs. Sentences for a job's owner do not name other owners' jobs.
  *
  * An unknown id makes a function return false, 0 or NAN. Pointers in the results are valid until the farm's next step.
@@ -53,7 +53,7 @@ int job_exit_code(const struct job_status *s)
 {
 	if (s->state != JOB_DONE)
 		return 3;
-	if (s->disagrees)
+	if (s->chains_disagree)
 		return 5;
 	bool missed = s->plan->target_error > 0 && s->end != END_ERROR && s->end != END_BLACK;
 	return missed ? 4 : 0;
@@ -61,51 +61,51 @@ int job_exit_code(const struct job_status *s)
 
 /* Returns the job that keeps workers busy that j could use: the first of higher priority, otherwise the one with the
  * most leases out. NULL: none. */
-static const struct job *busy_with(const struct farm *f, const struct job *j)
+static const struct job *find_blocking_job(const struct farm *f, const struct job *j)
 {
-	const struct job *most = NULL;
-	for (uint32_t i = 0; i < f->live_count; i++) {
-		const struct job *o = f->live[i];
-		if (o == j || !o->leases_out || !share_competes(o, j))
+	const struct job *busiest = NULL;
+	for (uint32_t i = 0; i < f->live_job_count; i++) {
+		const struct job *o = f->live_jobs[i];
+		if (o == j || !o->outstanding_leases || !share_jobs_compete(o, j))
 			continue;
 		if (o->priority > j->priority)
 			return o;
-		if (!most || o->leases_out > most->leases_out)
-			most = o;
+		if (!busiest || o->outstanding_leases > busiest->outstanding_leases)
+			busiest = o;
 	}
-	return most;
+	return busiest;
 }
 
-static uint32_t active_workers(const struct farm *f)
+static uint32_t count_active_workers(const struct farm *f)
 {
 	uint32_t n = 0;
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next)
-		n += list_entry(k, struct peer_class, link)->active;
+		n += list_entry(k, struct peer_class, link)->active_count;
 	return n;
 }
 
-static bool someone_avoids(const struct farm *f, const struct job *j)
+static bool has_paused_worker(const struct farm *f, const struct job *j)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (job_takes(j, f->peers[i]->class) && peer_avoids_until(f->peers[i], j->id) > f->now &&
-		    !peer_waits_for_room(f->peers[i], j->id))
+		if (job_accepts_class(j, f->peers[i]->class) && peer_backoff_end(f->peers[i], j->id) > f->now &&
+		    !peer_waits_for_memory(f->peers[i], j->id))
 			return true;
 	return false;
 }
 
-static bool room_why(const struct farm *f, const struct job *j, char *text, size_t size)
+static bool put_memory_wait(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state != PEER_ACTIVE || !job_takes(j, p->class) || !peer_waits_for_room(p, j->id))
+		if (p->state != PEER_ACTIVE || !job_accepts_class(j, p->class) || !peer_waits_for_memory(p, j->id))
 			continue;
-		text_print(text, size, "worker %s has no room for its scene now: %s", p->name, p->text);
+		text_print(text, size, "worker %s has no room for its scene now: %s", p->name, p->last_fault);
 		return true;
 	}
 	return false;
 }
 
-/* j->text has the form "worker: why". */
+/* j->last_fault has the form "worker: why". */
 static void put_last_failure(const struct job *j, char *text, size_t size)
 {
 	const char *colon = strstr(j->text, ": ");
@@ -117,14 +117,14 @@ static void put_last_failure(const struct job *j, char *text, size_t size)
 }
 
 /* Names the workers whose own machines are at fault, because somebody has to repair those machines. */
-static void put_failing(const struct farm *f, const struct job *j, char *text, size_t size)
+static void put_failing_workers(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	char names[100] = "";
 	struct text t = {names, sizeof names};
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]->class) &&
-		    peer_lacks(f->peers[i], j->id))
-			text_put(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
+		if (f->peers[i]->state == PEER_ACTIVE && job_accepts_class(j, f->peers[i]->class) &&
+		    peer_is_at_fault(f->peers[i], j->id))
+			text_appendf(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
 	if (*names)
 		text_print(text, size,
 			   "no worker can compute it, because of a problem on the machines of %s; the last one: %s",
@@ -133,11 +133,11 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 		put_last_failure(j, text, size);
 }
 
-/* all: other owners' jobs may be named. */
-static void put_busy(char *text, size_t size, const struct job *j, const struct job *other, bool all)
+/* name_all: other owners' jobs may be named. */
+static void put_blocking_job(char *text, size_t size, const struct job *j, const struct job *other, bool name_all)
 {
 	bool higher = other->priority > j->priority;
-	if (!all && other->owner != j->owner)
+	if (!name_all && other->owner != j->owner)
 		text_copy(text, size,
 			  higher ? "waits for a job of higher priority of another owner"
 				 : "workers busy with a job of another owner");
@@ -147,20 +147,20 @@ static void put_busy(char *text, size_t size, const struct job *j, const struct 
 			   (unsigned long long)other->id, other->priority);
 }
 
-static void why_held(const struct job *j, char *text, size_t size)
+static void put_hold_reasons(const struct job *j, char *text, size_t size)
 {
 	struct text t = {text, size};
 	const char *between = "";
-	for (int i = JOB_HOLDS; i-- > 0;)
-		if (*j->held[i]) {
-			text_put(&t, "%s%s", between, j->held[i]);
+	for (int i = JOB_HOLD_COUNT; i-- > 0;)
+		if (*j->hold_reasons[i]) {
+			text_appendf(&t, "%s%s", between, j->hold_reasons[i]);
 			between = "; ";
 		}
 }
 
 /* If all leases that are out are late and none of them has been answered, writes which worker holds the oldest lease.
  * Returns false if no lease is out or one of them is not late. */
-static bool put_late(const struct farm *f, const struct job *j, char *text, size_t size)
+static bool put_late_leases(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	const struct lease *oldest = NULL;
 	uint32_t count = 0;
@@ -169,56 +169,57 @@ static bool put_late(const struct farm *f, const struct job *j, char *text, size
 		for (const struct lease *l = s->leases; l; l = l->next) {
 			if (l->overdue)
 				continue;
-			if (l->delivered || job_straggles_at(&f->config, j, s) > f->now)
+			if (l->delivered || job_copy_due_time(&f->config, j, s) > f->now)
 				return false;
 			count++;
-			if (!oldest || l->sent < oldest->sent)
+			if (!oldest || l->sent_at < oldest->sent_at)
 				oldest = l;
 		}
 	}
 	if (oldest)
 		text_print(text, size, "no answer to its leases (%u are out): %s has had the oldest one for %.0f s",
-			   count, oldest->peer->name, f->now - oldest->sent);
+			   count, oldest->peer->name, f->now - oldest->sent_at);
 	return oldest != NULL;
 }
 
 /* Writes the first reason why no worker computes the job; "" if one does. Returns the job that the text names if
  * another job keeps the workers busy, otherwise NULL. */
-static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
+static const struct job *describe_wait(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
-	if (!job_is_live(j) || (j->leases_out && !job_is_held(j) && !put_late(f, j, text, size)) || *text)
+	if (!job_is_live(j) || (j->outstanding_leases && !job_is_held(j) && !put_late_leases(f, j, text, size)) ||
+	    *text)
 		return NULL;
-	uint32_t active = active_workers(f);
-	const struct job *other = busy_with(f, j);
+	uint32_t active = count_active_workers(f);
+	const struct job *other = find_blocking_job(f, j);
 	if (job_is_held(j))
-		why_held(j, text, size);
+		put_hold_reasons(j, text, size);
 	else if (j->preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
-	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
+	else if (j->evaluating && (j->pending_end != END_NONE || !job_find_ready_slot(j)))
 		snprintf(text, size, "its error is being estimated");
 	else if (f->peer_count == 0)
 		snprintf(text, size, "no worker is connected");
 	else if (active == 0)
 		snprintf(text, size, "no worker responds and is not quarantined (%u connected)", f->peer_count);
-	else if (j->class && !j->mixed && j->class->active == 0)
+	else if (j->class && !j->mixed && j->class->active_count == 0)
 		snprintf(text, size, "no connected worker has fingerprint %s (%u have others)", j->fingerprint, active);
-	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
+	else if (verify_describe_wait(f, j, text, size) || doubt_describe_wait(f, j, text, size))
 		return NULL;
-	else if (share_is_limited(f, j) && share_unproven(f, j->owner))
+	else if (share_is_limited(f, j) && share_unanswered_leases(f, j->owner))
 		snprintf(text, size,
 			 "a job of its owner crashed workers: one lease at a time until a result arrives (for %.0f s)",
 			 j->owner->limited_until - f->now);
-	else if (answer_all_failed(f, j))
-		put_failing(f, j, text, size);
-	else if (room_why(f, j, text, size))
+	else if (answer_all_workers_failed(f, j))
+		put_failing_workers(f, j, text, size);
+	else if (put_memory_wait(f, j, text, size))
 		return NULL;
-	else if (someone_avoids(f, j))
+	else if (has_paused_worker(f, j))
 		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
 	else if (!other)
 		snprintf(text, size, "no worker asks for work");
 	else {
-		put_busy(text, size, j, other, true);
+		put_blocking_job(text, size, j, other, true);
 		return other;
 	}
 	return NULL;
@@ -226,10 +227,10 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 
 static void fill_waiting(const struct farm *f, const struct job *j, struct job_status *s)
 {
-	const struct job *other = why_waiting(f, j, s->waiting, sizeof s->waiting);
+	const struct job *other = describe_wait(f, j, s->waiting, sizeof s->waiting);
 	memcpy(s->owners_waiting, s->waiting, sizeof s->waiting);
 	if (other)
-		put_busy(s->owners_waiting, sizeof s->owners_waiting, j, other, false);
+		put_blocking_job(s->owners_waiting, sizeof s->owners_waiting, j, other, false);
 }
 
 /* Needs the result of fill_waiting. */
@@ -249,14 +250,14 @@ static void fill_counts(const struct job *j, struct job_status *s)
 	s->leases_merged = j->leases_merged;
 	double slots = (double)j->plan.groups * j->plan.parts;
 	s->mutations = (uint64_t)((double)j->leases_merged * ((double)plan_round_mutations(&j->plan) / slots));
-	s->leases = j->leases_out;
+	s->leases = j->outstanding_leases;
 	s->counts = j->counts;
 }
 
 static void fill_share(const struct farm *f, const struct job *j, struct job_status *s)
 {
 	struct share share;
-	share_of(f, j, &share);
+	share_compute(f, j, &share);
 	s->workers = share.workers;
 	s->machines = share.machines;
 	s->share = share.machines_due;
@@ -264,7 +265,7 @@ static void fill_share(const struct farm *f, const struct job *j, struct job_sta
 	memcpy(s->owners_place, share.owners_place, sizeof s->owners_place);
 }
 
-bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s)
+bool farm_job_status(const struct farm *f, uint64_t id, double now, struct job_status *s)
 {
 	const struct job *j = farm_find_job(f, id);
 	if (!j)
@@ -273,7 +274,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.id = j->id,
 		.owner = j->owner->name,
 		.priority = j->priority,
-		.verify = j->verify,
+		.verify = j->verify_fraction,
 		.plan = &j->plan,
 		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
@@ -283,11 +284,11 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.ended = j->ended,
 		.progress = job_progress(j, now),
 		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
-		.disagrees = j->disagrees,
+		.chains_disagree = j->chains_disagree,
 		.rel_error = j->rel_error,
 		.bootstrap_seconds = j->opened - j->started,
 		.looks = &j->looks,
-		.halving_cpu = j->halving.cpu_seconds,
+		.halving_cpu = j->halving_cost.cpu_seconds,
 		.halving_seconds = job_halving_seconds(j, now),
 	};
 	fill_counts(j, s);
@@ -298,7 +299,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	return true;
 }
 
-bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c)
+bool farm_job_counts(const struct farm *f, uint64_t id, struct job_counts *c)
 {
 	const struct job *j = farm_find_job(f, id);
 	if (!j)
@@ -307,36 +308,36 @@ bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c)
 	return true;
 }
 
-double farm_elapsed(const struct farm *f, uint64_t id, double now)
+double farm_job_elapsed(const struct farm *f, uint64_t id, double now)
 {
 	const struct job *j = farm_find_job(f, id);
 	return j ? job_elapsed(j, now) : NAN;
 }
 
-bool farm_expects_results(const struct farm *f, uint64_t id, int *priority)
+bool farm_job_expects_results(const struct farm *f, uint64_t id, int *priority)
 {
 	const struct job *j = farm_find_job(f, id);
 	*priority = j ? j->priority : 0;
-	return j && job_is_live(j) && !*j->held[HOLD_FILES] && !*j->held[HOLD_ORDERED] &&
-	       (j->leases_out || *j->held[HOLD_STORAGE]);
+	return j && job_is_live(j) && !*j->hold_reasons[HOLD_FILES] && !*j->hold_reasons[HOLD_BY_USER] &&
+	       (j->outstanding_leases || *j->hold_reasons[HOLD_STORAGE]);
 }
 
-bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
+bool farm_peer_status(const struct farm *f, uint64_t id, struct peer_status *s)
 {
 	const struct peer *p = farm_find_peer(f, id);
 	if (!p)
 		return false;
 	*s = (struct peer_status){
 		.id = p->id,
-		.who = p->who->id,
+		.worker_id = p->identity->id,
 		.restarts = p->restarts,
 		.name = p->name,
 		.fingerprint = p->class->fingerprint,
 		.threads = p->threads,
-		.want = p->want,
-		.leases = p->held,
+		.wanted_leases = p->wanted_leases,
+		.held_leases = p->held_leases,
 		.state = p->state,
-		.joined = p->joined,
+		.joined_at = p->joined_at,
 		.last_seen = p->last_seen,
 		.merged = p->merged,
 		.repeats = p->repeats,
@@ -344,53 +345,53 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 		.faults = p->faults,
 		.failures = p->failures,
 	};
-	memcpy(s->text, p->text, sizeof s->text);
+	memcpy(s->last_fault, p->last_fault, sizeof s->last_fault);
 	return true;
 }
 
-bool farm_verifies(const struct farm *f, const struct lease_key *k)
+bool farm_lease_is_verified(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
-	return j && proof_chosen(j, k);
+	return j && proof_is_required(j, k);
 }
 
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
 {
 	uint64_t next = 0;
-	for (uint32_t i = 0; i < f->known_count; i++) {
-		const struct identity *k = f->known[i];
+	for (uint32_t i = 0; i < f->registry_count; i++) {
+		const struct identity *k = f->registry[i];
 		if (k->quarantined && k->id > after && (next == 0 || k->id < next))
 			next = k->id;
 	}
 	return next;
 }
 
-bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s)
+bool farm_worker_status(const struct farm *f, uint64_t worker_id, struct worker_status *s)
 {
-	const struct identity *k = identity_index_id(&f->index, who);
+	const struct identity *k = identity_index_find_by_id(&f->identity_index, worker_id);
 	if (!k)
 		return false;
-	*s = (struct worker_status){.who = k->id,
+	*s = (struct worker_status){.worker_id = k->id,
 				    .restarts = k->restarts,
 				    .certificate = k->certificate,
 				    .name = k->name,
 				    .home = k->home,
-				    .text = k->text,
-				    .wrong = k->wrong,
+				    .last_fault = k->last_fault,
+				    .wrong_results = k->wrong_results,
 				    .quarantined = k->quarantined};
 	return true;
 }
 
-bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s)
+bool farm_lease_status(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s)
 {
 	const struct peer *p = farm_find_peer(f, peer);
-	for (uint32_t k = 0; p && k < p->lease_limit; k++) {
+	for (uint32_t k = 0; p && k < p->lease_capacity; k++) {
 		const struct lease *l = &p->leases[k];
-		if (!l->used || i-- > 0)
+		if (!l->in_use || i-- > 0)
 			continue;
 		*s = (struct lease_status){
 			.key = lease_key(l),
-			.sent = l->sent,
+			.sent_at = l->sent_at,
 			.overdue = l->overdue,
 		};
 		return true;
@@ -400,6 +401,6 @@ bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_st
 
 uint64_t farm_next_peer(const struct farm *f, uint64_t after)
 {
-	uint32_t i = after == UINT64_MAX ? f->peer_count : farm_peer_place(f, after + 1);
+	uint32_t i = after == UINT64_MAX ? f->peer_count : farm_peer_lower_bound(f, after + 1);
 	return i < f->peer_count ? f->peers[i]->id : 0;
 }

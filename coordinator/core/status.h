@@ -18,7 +18,7 @@ struct job_status {
 	enum job_end end;
 	const char *fingerprint;	      /* "": not pinned */
 	double submitted, started, ended;     /* s; started: when the first lease was sent. NAN: not yet */
-	bool disagrees;			      /* the chains of its final image disagree */
+	bool chains_disagree;		      /* the chains of its final image disagree */
 	double rel_error;		      /* as last estimated; NAN: no estimate */
 	const struct forecast_history *looks; /* estimates of the error, oldest first */
 	/* Cost of halving the error: CPU seconds and seconds; valid if there are estimates. */
@@ -40,46 +40,46 @@ struct job_status {
 
 struct peer_status {
 	uint64_t id;
-	uint64_t who; /* the worker's identity: equal for all of its connections */
+	uint64_t worker_id; /* the worker's identity: equal for all of its connections */
 	uint64_t restarts;
 	const char *name, *fingerprint;
-	uint32_t threads, want, leases;
+	uint32_t threads, wanted_leases, held_leases;
 	enum peer_state state;
-	double joined, last_seen;
+	double joined_at, last_seen;
 	uint64_t merged, repeats, refused, faults, failures;
-	char text[256]; /* the worker's last fault or failure */
+	char last_fault[256]; /* the worker's last fault or failure */
 };
 
 struct lease_status {
 	struct lease_key key;
-	double sent;
+	double sent_at;
 	bool overdue; /* handed out again; this worker's answer still counts if it is the first */
 };
 
 /* Returns the smallest id of a connected worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 /* Whether a result of this lease must come with its digest, because the lease is verified. */
-bool farm_verifies(const struct farm *f, const struct lease_key *k);
+bool farm_lease_is_verified(const struct farm *f, const struct lease_key *k);
 /* State of a worker, connected or not. */
 struct worker_status {
-	uint64_t who, restarts;
-	const char *certificate, *name, *home, *text;
-	uint32_t wrong; /* number of wrong results */
+	uint64_t worker_id, restarts;
+	const char *certificate, *name, *home, *last_fault;
+	uint32_t wrong_results; /* number of wrong results */
 	bool quarantined;
 };
 /* Returns the smallest id of a quarantined worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
-bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s);	    /* false: unknown id */
-bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown id */
-bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c);	    /* false: unknown id */
+bool farm_worker_status(const struct farm *f, uint64_t who, struct worker_status *s);	   /* false: unknown id */
+bool farm_job_status(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown id */
+bool farm_job_counts(const struct farm *f, uint64_t id, struct job_counts *c);		   /* false: unknown id */
 /* Seconds since the job's first lease, not counting the time it was held; NAN: no lease was sent yet, or unknown id. */
-double farm_elapsed(const struct farm *f, uint64_t id, double now);
+double farm_job_elapsed(const struct farm *f, uint64_t id, double now);
 /* Whether results of this job may arrive: it is neither held by a user nor for its files, and has leases out or is
  * held only because results cannot be stored. Also returns its priority. */
-bool farm_expects_results(const struct farm *f, uint64_t id, int *priority);
-bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
+bool farm_job_expects_results(const struct farm *f, uint64_t id, int *priority);
+bool farm_peer_status(const struct farm *f, uint64_t id, struct peer_status *s);
 /* i-th lease of a worker; false: no more */
-bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s);
+bool farm_lease_status(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s);
 
 const char *job_state_name(enum job_state s);	/* name in the status: "queued" ... */
 const char *peer_state_name(enum peer_state s); /* "active", "silent", "quarantined" */

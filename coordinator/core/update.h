@@ -33,7 +33,7 @@ enum job_end {
 	END_FAILED,
 };
 
-/* What becomes of a result that cannot be judged yet; see answer_awaits (answer.h). */
+/* What becomes of a result that cannot be judged yet; see answer_delivery (answer.h). */
 enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_USELESS };
 
 enum action_kind {
@@ -54,8 +54,8 @@ enum action_kind {
 	 * later. */
 	ACTION_BOOTSTRAP_DONE,
 	ACTION_ROUND_DONE, /* job, rounds: number of complete rounds, including this event's batch */
-	/* job, rounds: estimate the error of exactly this prefix and answer with EVENT_ERROR_KNOWN. Later batches of
-	 * the job should wait for the answer; a batch that would complete the next round before the answer is
+	/* job, rounds: estimate the error of exactly this prefix and answer with EVENT_ERROR_ESTIMATED. Later batches
+	 * of the job should wait for the answer; a batch that would complete the next round before the answer is
 	 * refused, so the prefix does not change. */
 	ACTION_EVALUATE_ERROR,
 	ACTION_PUBLISH,	      /* job, rounds: write the image of these rounds; the job is done */
@@ -63,12 +63,12 @@ enum action_kind {
 	ACTION_JOB_FORGOTTEN, /* job: too many jobs have ended; the core no longer knows this one */
 	/* who, job, key, text: take the batch of this lease, the last of its (group, part), out of the films. The
 	 * earlier states are current again, and the lease goes out once more. Occurs only if the event had
-	 * can_take_back set. */
-	ACTION_TAKE_BACK,
-	ACTION_CHAINS_ANEW, /* job, key, text: the chains of this lease start from their seeds (doubt.h) */
+	 * can_roll_back set. */
+	ACTION_ROLL_BACK,
+	ACTION_RESTART_CHAINS, /* job, key, text: the chains of this lease start from their seeds (doubt.h) */
 	/* who, job, key, text: a worker has given a wrong result: its noted answer differs from one that two others
 	 * agree on, or it made wrong chain states or refused good ones (doubt.h). */
-	ACTION_WRONG,
+	ACTION_WRONG_RESULT,
 	ACTION_QUARANTINE, /* who, text: a worker is quarantined permanently */
 	ACTION_CLOSE_PEER, /* peer, text: disconnect; the core has already forgotten the peer */
 };
@@ -80,12 +80,12 @@ struct action {
 	enum ack ack;
 	enum job_state state;
 	enum job_end end;
-	bool verified; /* MERGE: two workers have sent equal results, or a journal contained it */
-	bool anew;     /* SEND_LEASE: send seeds, whatever the epoch */
+	bool verified;	 /* MERGE: two workers have sent equal results, or a journal contained it */
+	bool from_seeds; /* SEND_LEASE: send seeds, whatever the epoch */
 	uint64_t tag, peer;
 	/* MERGE, TAKE_BACK (0: not known), WRONG, QUARANTINE: the identity of the worker, whatever its connection
 	 * (see struct peer_status). */
-	uint64_t who;
+	uint64_t worker_id;
 	uint64_t job; /* also set if the action has a key */
 	uint64_t rounds;
 	struct lease_key key;
@@ -95,7 +95,7 @@ struct action {
 struct update {
 	const struct action *actions;
 	size_t count;
-	double wake; /* send EVENT_TICK at this time unless another event comes first; INFINITY: not needed */
+	double wake_time; /* send EVENT_TICK at this time unless another event comes first; INFINITY: not needed */
 };
 
 #endif

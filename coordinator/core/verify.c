@@ -7,108 +7,109 @@
 
 #include <stdio.h>
 
-void verify_forget(struct farm *f, struct job *j, const struct slot *s)
+void verify_forget_slot(struct farm *f, struct job *j, const struct slot *s)
 {
-	struct proof *p = proof_of(j, s);
-	j->noted -= p->count > 0;
+	struct proof *p = proof_for_slot(j, s);
+	j->noted_slots -= p->count > 0;
 	for (uint32_t i = 0; i < p->count; i++)
-		worker_registry_drop(f, p->who[i]);
+		worker_registry_release(f, p->workers[i]);
 	p->count = 0;
 }
 
 void verify_forget_job(struct farm *f, struct job *j)
 {
 	for (uint32_t i = 0; j->proofs && i < j->slot_count; i++)
-		verify_forget(f, j, &j->slots[i]);
+		verify_forget_slot(f, j, &j->slots[i]);
 }
 
-static void forget_answers(struct farm *f, struct job *j, const struct identity *who)
+static void forget_answers(struct farm *f, struct job *j, const struct identity *identity)
 {
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		struct proof *p = &j->proofs[i];
 		for (uint32_t k = 0; k < p->count; k++) {
-			if (p->who[k] != who)
+			if (p->workers[k] != identity)
 				continue;
-			worker_registry_drop(f, p->who[k]);
+			worker_registry_release(f, p->workers[k]);
 			p->count--;
-			p->who[k] = p->who[p->count];
-			p->digest[k] = p->digest[p->count];
-			j->noted -= p->count == 0;
-			job_place(j, &j->slots[i]);
+			p->workers[k] = p->workers[p->count];
+			p->digests[k] = p->digests[p->count];
+			j->noted_slots -= p->count == 0;
+			job_place_slot(j, &j->slots[i]);
 			break;
 		}
 	}
 }
 
-void verify_forget_worker(struct farm *f, const struct identity *who)
+void verify_forget_worker(struct farm *f, const struct identity *identity)
 {
-	for (uint32_t i = 0; i < f->live_count; i++)
-		if (f->live[i]->noted)
-			forget_answers(f, f->live[i], who);
+	for (uint32_t i = 0; i < f->live_job_count; i++)
+		if (f->live_jobs[i]->noted_slots)
+			forget_answers(f, f->live_jobs[i], identity);
 }
 
-/* Whether a class other than `than` has more than this many active workers. */
-static bool more_elsewhere(const struct farm *f, const struct peer_class *than, uint32_t workers)
+/* Whether a class other than `excluded` has more than this many active workers. */
+static bool has_larger_class(const struct farm *f, const struct peer_class *excluded, uint32_t active_count)
 {
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
 		const struct peer_class *c = list_entry(k, struct peer_class, link);
-		if (c != than && c->active > workers)
+		if (c != excluded && c->active_count > active_count)
 			return true;
 	}
 	return false;
 }
 
-void verify_change_class(struct farm *f)
+void verify_unpin_stranded_jobs(struct farm *f)
 {
-	for (uint32_t i = 0; i < f->live_count; i++) {
-		struct job *j = f->live[i];
-		if (!j->noted || j->leases_out || j->bootstrap_merged || j->leases_merged || !j->class)
+	for (uint32_t i = 0; i < f->live_job_count; i++) {
+		struct job *j = f->live_jobs[i];
+		if (!j->noted_slots || j->outstanding_leases || j->bootstrap_merged || j->leases_merged || !j->class)
 			continue;
-		if (j->class->active > 1 || !more_elsewhere(f, j->class, j->class->active))
+		if (j->class->active_count > 1 || !has_larger_class(f, j->class, j->class->active_count))
 			continue;
 		verify_forget_job(f, j);
 		for (uint32_t s = 0; s < j->slot_count; s++)
-			job_place(j, &j->slots[s]);
+			job_place_slot(j, &j->slots[s]);
 		job_unpin_if_untouched(j);
 	}
 }
 
-bool verify_may_begin(const struct farm *f, const struct job *j, const struct peer_class *c)
+bool verify_can_begin(const struct farm *f, const struct job *j, const struct peer_class *c)
 {
-	return !j->proofs || c->active > 1 || !more_elsewhere(f, c, 1);
+	return !j->proofs || c->active_count > 1 || !has_larger_class(f, c, 1);
 }
 
 /* Returns the first slot in need of another worker whose lease no connected worker may get; NULL: none. */
 static const struct slot *find_stranded_slot(const struct farm *f, const struct job *j)
 {
 	for (int i = 0; i < 2; i++) {
-		for (struct link *k = j->second[i].next; k != &j->second[i]; k = k->next) {
+		for (struct link *k = j->awaiting_second[i].next; k != &j->awaiting_second[i]; k = k->next) {
 			const struct slot *s = list_entry(k, struct slot, link);
-			bool somebody = false;
-			for (uint32_t n = 0; n < f->peer_count && !somebody; n++) {
+			bool has_candidate = false;
+			for (uint32_t n = 0; n < f->peer_count && !has_candidate; n++) {
 				const struct peer *p = f->peers[n];
-				somebody = p->state == PEER_ACTIVE && job_takes(j, p->class) && !lease_of(s, p) &&
-					   !proof_bars(j, s, p);
+				has_candidate = p->state == PEER_ACTIVE && job_accepts_class(j, p->class) &&
+						!lease_find(s, p) && !proof_is_barred(j, s, p);
 			}
-			if (!somebody)
+			if (!has_candidate)
 				return s;
 		}
 	}
 	return NULL;
 }
 
-bool verify_why(const struct farm *f, const struct job *j, char *text, size_t size)
+bool verify_describe_wait(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	const struct slot *s = j->proofs ? find_stranded_slot(f, j) : NULL;
 	if (!s)
 		return false;
-	const struct lease_key k = slot_key(j, s);
+	const struct lease_key k = slot_lease_key(j, s);
 	char names[160];
-	proof_names(j, s, names, sizeof names);
-	if (proof_of(j, s)->count < 2)
-		snprintf(text, size, "verification waits for a second worker (%u leases have one answer)", j->noted);
+	proof_format_names(j, s, names, sizeof names);
+	if (proof_for_slot(j, s)->count < 2)
+		snprintf(text, size, "verification waits for a second worker (%u leases have one answer)",
+			 j->noted_slots);
 	else
-		text_print(text, size, "verification waits for another worker: %s differ on " LEASE_WORDS, names,
-			   LEASE_PLACE(&k));
+		text_print(text, size, "verification waits for another worker: %s differ on " LEASE_POSITION_FORMAT,
+			   names, LEASE_POSITION_VALUES(&k));
 	return true;
 }

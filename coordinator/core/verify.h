@@ -15,16 +15,17 @@
 struct job;
 struct peer_class;
 
-void verify_forget(struct farm *f, struct job *j, const struct slot *s); /* forgets the answers noted for the slot */
+void verify_forget_slot(struct farm *f, struct job *j,
+			const struct slot *s); /* forgets the answers noted for the slot */
 void verify_forget_job(struct farm *f, struct job *j);
 void verify_forget_worker(struct farm *f, const struct identity *who);
 /* Unpins each job of which nothing is merged yet if its class has at most one active worker and another class has
  * more: workers of that other class can then start it again. */
-void verify_change_class(struct farm *f);
+void verify_unpin_stranded_jobs(struct farm *f);
 /* Whether workers of this class may begin a job that must be verified: the class has at least two active workers, or
  * no other class has. */
-bool verify_may_begin(const struct farm *f, const struct job *j, const struct peer_class *c);
+bool verify_can_begin(const struct farm *f, const struct job *j, const struct peer_class *c);
 /* Writes why the job waits for another worker to verify a lease. Returns false if it does not wait for that. */
-bool verify_why(const struct farm *f, const struct job *j, char *text, size_t size);
+bool verify_describe_wait(const struct farm *f, const struct job *j, char *text, size_t size);
 
 #endif

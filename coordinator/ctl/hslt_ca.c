@@ -9,19 +9,20 @@
 #include <string.h>
 
 struct arguments {
-	const char *ca, *verb, *what, *name;
+	const char *ca, *verb, *name_or_serial, *authority_name;
 	double seconds; /* validity in s; 0: not given */
 	bool renew;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"ca", 0, "DIR", "The authority's folder, if not ~/.hslt-ca", OPTION_TEXT(struct arguments, ca),
 	 .environment = "HSLT_CA"},
 	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650), or a time such as 36h",
-	 OPTION_TIME(struct arguments, seconds, 0, 36500, 86400), .above = true},
+	 OPTION_TIME(struct arguments, seconds, 0, 36500, 86400), .min_excluded = true},
 	{"renew", 0, NULL, "Replace an existing certificate and key of the same name and role",
 	 OPTION_FLAG(struct arguments, renew)},
-	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, name), .standard = "hslt-farm"},
+	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, authority_name),
+	 .default_value = "hslt-farm"},
 	{0},
 };
 
@@ -32,35 +33,35 @@ static const char *verb_at(size_t i)
 	return verbs[i];
 }
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int parse_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
 		return error_set(e, EINVAL, "unexpected argument '%s'", word);
-	*(index == 0 ? &a->verb : &a->what) = word;
+	*(index == 0 ? &a->verb : &a->name_or_serial) = word;
 	return 0;
 }
 
-static int check(void *target, struct error *e)
+static int check_arguments(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	bool bare = strcmp(a->verb, "init") == 0 || strcmp(a->verb, "list") == 0;
-	if (bare && a->what)
+	bool takes_no_name = strcmp(a->verb, "init") == 0 || strcmp(a->verb, "list") == 0;
+	if (takes_no_name && a->name_or_serial)
 		return error_set(e, EINVAL, "%s takes no name", a->verb);
-	if (!bare && !a->what)
+	if (!takes_no_name && !a->name_or_serial)
 		return error_set(e, EINVAL, "%s needs a name", a->verb);
 	/* Certificates count whole seconds. */
 	if (a->seconds > 0 && a->seconds < 1)
 		return error_set(e, EINVAL, "--days: %g s is less than a second: it would have expired when it is made",
 				 a->seconds);
-	if (!tls_name_ok(a->name))
+	if (!tls_name_is_valid(a->authority_name))
 		return error_set(e, EINVAL, "--name takes up to %d letters, digits and ._@-", TLS_NAME_MAX);
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-ca",
-	.words = "init|coordinator|worker|client|operator|revoke|list [NAME]",
+	.synopsis = "init|coordinator|worker|client|operator|revoke|list [NAME]",
 	.summary = "A farm's own certificate authority: certificates for coordinators, workers, clients and operators.",
 	.examples =
 		"hslt-ca init                      the authority, and DIR/coordinator for hslt-coordinator --tls\n"
@@ -74,63 +75,63 @@ static const struct program program = {
 	.details =
 		"DIR is --ca, $HSLT_CA or ~/.hslt-ca. DIR/ca.key signs everything: keep it away from the farm. A "
 		"machine needs only its own folder (copy it with its file modes). Running programs notice new files by themselves.",
-	.exits = "0 done, 1 failed, 2 usage",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.exit_codes = "0 done, 1 failed, 2 usage",
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_arguments},
 	.verbs = verb_at,
-	.word = take_word,
+	.parse_word = parse_word,
 };
 
-static const double own_days = 3650, other_days = 825;
+static const double authority_days = 3650, certificate_days = 825;
 
-static double days_of(const struct arguments *a, double standard)
+static double validity_days(const struct arguments *a, double default_days)
 {
-	return a->seconds > 0 ? a->seconds / 86400 : standard;
+	return a->seconds > 0 ? a->seconds / 86400 : default_days;
 }
 
 /* "30m" may mean months. */
-static void note_short(const struct arguments *a)
+static void warn_short_validity(const struct arguments *a)
 {
 	char text[32];
 	if (!(a->seconds > 0 && a->seconds < 86400))
 		return;
-	progress_duration(a->seconds, text, sizeof text);
+	progress_format_duration(a->seconds, text, sizeof text);
 	fprintf(stderr, "hslt-ca: note: it is valid for %s only\n", text);
 }
 
-static int issue(const struct arguments *a, enum tls_role role, const char *name, struct error *e)
+static int issue_certificate(const struct arguments *a, enum tls_role role, const char *name, struct error *e)
 {
-	int rc = authority_issue(a->ca, name, role, days_of(a, other_days), a->renew, e);
+	int rc = authority_issue(a->ca, name, role, validity_days(a, certificate_days), a->renew, e);
 	if (!rc) {
 		printf("%s/%s\n", a->ca, name);
-		note_short(a);
+		warn_short_validity(a);
 	}
 	return rc;
 }
 
-static int init(const struct arguments *a, struct error *e)
+static int init_authority(const struct arguments *a, struct error *e)
 {
-	struct arguments rest = *a;
-	int rc = authority_init(a->ca, a->name, days_of(a, own_days), e);
+	struct arguments issue_arguments = *a;
+	int rc = authority_create(a->ca, a->authority_name, validity_days(a, authority_days), e);
 	if (!rc)
-		note_short(a);
-	rest.seconds = 0;
-	return rc ? rc : issue(&rest, TLS_COORDINATOR, "coordinator", e);
+		warn_short_validity(a);
+	issue_arguments.seconds = 0;
+	return rc ? rc : issue_certificate(&issue_arguments, TLS_COORDINATOR, "coordinator", e);
 }
 
-static int revoke(const struct arguments *a, struct error *e)
+static int revoke_certificates(const struct arguments *a, struct error *e)
 {
 	unsigned count = 0;
-	int rc = authority_revoke(a->ca, a->what, &count, e);
+	int rc = authority_revoke(a->ca, a->name_or_serial, &count, e);
 	if (count)
 		printf("revoked %u; ", count);
 	else if (!rc)
-		printf("'%s' was revoked before; ", a->what);
+		printf("'%s' was revoked before; ", a->name_or_serial);
 	if (!rc || count)
 		printf("%s/crl.pem must reach every coordinator\n", a->ca);
 	return rc;
 }
 
-static int list(const struct arguments *a, struct error *e)
+static int list_certificates(const struct arguments *a, struct error *e)
 {
 	struct authority_entry *entries;
 	size_t count;
@@ -142,12 +143,12 @@ static int list(const struct arguments *a, struct error *e)
 		const struct authority_entry *x = &entries[i];
 		char until[32];
 		struct tm tm;
-		strftime(until, sizeof until, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&x->until, &tm));
-		printf("%-24s %-12s %-8s %-20s %s\n", x->who.name, tls_role_name(x->who.role),
-		       x->revoked	? "revoked"
-		       : x->until < now ? "expired"
-					: "valid",
-		       until, x->who.serial);
+		strftime(until, sizeof until, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&x->valid_until, &tm));
+		printf("%-24s %-12s %-8s %-20s %s\n", x->subject.name, tls_role_name(x->subject.role),
+		       x->is_revoked	      ? "revoked"
+		       : x->valid_until < now ? "expired"
+					      : "valid",
+		       until, x->subject.serial);
 	}
 	mem_free(entries);
 	return rc;
@@ -156,14 +157,14 @@ static int list(const struct arguments *a, struct error *e)
 static int run_command(const struct arguments *a, struct error *e)
 {
 	if (strcmp(a->verb, "init") == 0)
-		return init(a, e);
+		return init_authority(a, e);
 	if (strcmp(a->verb, "list") == 0)
-		return list(a, e);
+		return list_certificates(a, e);
 	if (strcmp(a->verb, "revoke") == 0)
-		return revoke(a, e);
+		return revoke_certificates(a, e);
 	for (int r = TLS_COORDINATOR; r < TLS_ROLES; r++)
 		if (strcmp(a->verb, tls_role_name((enum tls_role)r)) == 0)
-			return issue(a, (enum tls_role)r, a->what, e);
+			return issue_certificate(a, (enum tls_role)r, a->name_or_serial, e);
 	return -EINVAL;
 }
 
@@ -172,15 +173,15 @@ int main(int argc, char **argv)
 	struct arguments a = {0};
 	struct error e = {""};
 	char home[4000];
-	program_options(&program, argc, argv, &a);
+	program_parse_options(&program, argc, argv, &a);
 	if (!a.ca || !*a.ca) {
-		const char *where = getenv("HOME");
-		if (!where || !*where) {
+		const char *home_folder = getenv("HOME");
+		if (!home_folder || !*home_folder) {
 			fprintf(stderr,
 				"hslt-ca: there is no $HOME for the authority: --ca DIR (or $HSLT_CA) is needed\n");
 			return 2;
 		}
-		snprintf(home, sizeof home, "%s/.hslt-ca", where);
+		snprintf(home, sizeof home, "%s/.hslt-ca", home_folder);
 		a.ca = home;
 	}
 	int rc = run_command(&a, &e);

@@ -17,9 +17,9 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { EXIT_DISAGREE = 5 };
+enum { EXIT_CHAINS_DISAGREE = 5 };
 
-static void put_error(const Farm__JobStatus *s, char *text, size_t size)
+static void format_error(const Farm__JobStatus *s, char *text, size_t size)
 {
 	snprintf(text, size, "-");
 	if (s->error >= 0)
@@ -30,33 +30,33 @@ static void put_error(const Farm__JobStatus *s, char *text, size_t size)
 
 /* Splits a job's place, such as "3 of 8 machines; j4 comes first": writes the numbers for the column, and returns the
  * rest as a remark. */
-static const char *put_machines(const Farm__JobStatus *s, char *text, size_t size)
+static const char *format_machines(const Farm__JobStatus *s, char *text, size_t size)
 {
 	const char *end = s->ended ? NULL : strstr(s->place, " machine"), *more = end ? strstr(end, "; ") : NULL;
 	snprintf(text, size, "%.*s", end ? (int)(end - s->place) : 1, end ? s->place : "-");
 	return more ? more + 2 : "";
 }
 
-static const char *remark_on(const Farm__JobStatus *s, const char *place)
+static const char *job_remark(const Farm__JobStatus *s, const char *place)
 {
 	if (*s->why && strcmp(s->why, s->state) != 0)
 		return s->why;
 	if (s->ended)
-		return s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
+		return s->exit_code == EXIT_CHAINS_DISAGREE ? "its chains disagree" : "";
 	return place;
 }
 
-static void print_row(const Farm__JobStatus *s, bool owners)
+static void print_job_row(const Farm__JobStatus *s, bool show_owners)
 {
 	char eta[32] = "-", machines[48], error[32], id[32];
 	if (!s->ended && s->eta >= 0)
-		progress_time(s->eta, eta, sizeof eta);
+		progress_format_time(s->eta, eta, sizeof eta);
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
-	const char *remark = remark_on(s, put_machines(s, machines, sizeof machines));
-	put_error(s, error, sizeof error);
+	const char *remark = job_remark(s, format_machines(s, machines, sizeof machines));
+	format_error(s, error, sizeof error);
 	printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %8s ", id, s->state, s->priority, 100 * s->progress, eta, machines,
 	       error);
-	if (owners)
+	if (show_owners)
 		printf("%-12s ", *s->owner ? s->owner : "-");
 	printf("%s", s->name);
 	if (*remark)
@@ -68,25 +68,25 @@ static void print_row(const Farm__JobStatus *s, bool owners)
 	printf("\n");
 }
 
-static bool is_wanted(const struct job_options *o, const Farm__JobStatus *s)
+static bool matches_state(const struct job_options *o, const Farm__JobStatus *s)
 {
-	return !o->state || strcmp(s->state, o->state) == 0;
+	return !o->state_filter || strcmp(s->state, o->state_filter) == 0;
 }
 
 /* Prints a column of owners if any job has one; owners are known only with certificates. */
 static void print_table(const Farm__JobListAnswer *a, const struct job_options *o)
 {
-	bool owners = false;
+	bool show_owners = false;
 	for (size_t i = 0; i < a->n_jobs; i++)
-		owners = owners || *a->jobs[i]->owner;
+		show_owners = show_owners || *a->jobs[i]->owner;
 	printf("%-6s %-10s %4s %7s %-9s %-8s %8s %s%s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "ERROR",
-	       owners ? "OWNER        " : "", "NAME");
+	       show_owners ? "OWNER        " : "", "NAME");
 	for (size_t i = 0; i < a->n_jobs; i++)
-		if (is_wanted(o, a->jobs[i]))
-			print_row(a->jobs[i], owners);
+		if (matches_state(o, a->jobs[i]))
+			print_job_row(a->jobs[i], show_owners);
 }
 
-static void print_list(const json_t *list)
+static void print_json_list(const json_t *list)
 {
 	json_dumpf(list, stdout, JSON_INDENT(2));
 	putchar('\n');
@@ -98,7 +98,7 @@ static void print_json(const Farm__JobListAnswer *a, const struct job_options *o
 	for (size_t i = 0; i < a->n_jobs; i++) {
 		const Farm__JobStatus *s = a->jobs[i];
 		char id[32];
-		if (!is_wanted(o, s))
+		if (!matches_state(o, s))
 			continue;
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
 		json_array_append_new(list,
@@ -109,11 +109,11 @@ static void print_json(const Farm__JobListAnswer *a, const struct job_options *o
 						(int)s->exit_code, "note", s->note, "owner", s->owner, "workers",
 						(int)s->workers, "share", s->share, "place", s->place));
 	}
-	print_list(list);
+	print_json_list(list);
 	json_decref(list);
 }
 
-static int list(struct client *cl, const struct job_options *o, struct error *e)
+static int list_jobs(struct client *cl, const struct job_options *o, struct error *e)
 {
 	struct client_message answer;
 	int rc = client_call(cl, ENVELOPE(JOB_LIST, job_list), FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
@@ -124,7 +124,7 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 	return 0;
 }
 
-static json_t *worker_json(const Farm__WorkerStatus *w)
+static json_t *worker_to_json(const Farm__WorkerStatus *w)
 {
 	return json_pack("{s:i s:s s:s s:I s:i s:i s:I s:s}", "schema", 1, "name", w->name, "state", w->state,
 			 "restarts", (json_int_t)w->restarts, "threads", (int)w->threads, "leases", (int)w->leases,
@@ -136,7 +136,7 @@ static void print_workers(const Farm__WorkerListAnswer *a)
 	if (a->n_workers == 0)
 		printf("no workers are connected\n");
 	else
-		worker_table_head();
+		worker_table_print_head();
 	for (size_t i = 0; i < a->n_workers; i++) {
 		const Farm__WorkerStatus *w = a->workers[i];
 		worker_table_print(&(struct worker_row){w->name, w->state, w->text, w->restarts, w->threads, w->leases,
@@ -144,7 +144,7 @@ static void print_workers(const Farm__WorkerListAnswer *a)
 	}
 }
 
-static int workers(struct client *cl, const struct job_options *o, struct error *e)
+static int list_workers(struct client *cl, const struct job_options *o, struct error *e)
 {
 	struct client_message answer;
 	int rc = client_call(cl, ENVELOPE(WORKER_LIST, worker_list), FARM__ENVELOPE__BODY_WORKER_LIST_ANSWER, &answer,
@@ -154,9 +154,9 @@ static int workers(struct client *cl, const struct job_options *o, struct error 
 	const Farm__WorkerListAnswer *a = answer.envelope.message->worker_list_answer;
 	json_t *list = json_array();
 	for (size_t i = 0; o->json && i < a->n_workers; i++)
-		json_array_append_new(list, worker_json(a->workers[i]));
+		json_array_append_new(list, worker_to_json(a->workers[i]));
 	if (o->json)
-		print_list(list);
+		print_json_list(list);
 	else
 		print_workers(a);
 	json_decref(list);
@@ -165,17 +165,18 @@ static int workers(struct client *cl, const struct job_options *o, struct error 
 }
 
 /* Prints what was done, if the coordinator's answer does not say it. */
-static void print_done(const struct job_options *o)
+static void print_default_reply(const struct job_options *o)
 {
-	static const char *const became[] = {
+	static const char *const outcomes[] = {
 		[JOB_CANCEL] = "cancelled", [JOB_HOLD] = "on hold", [JOB_RELEASE] = "no longer on hold"};
 	if (o->verb == JOB_PRIORITY)
 		printf("j%llu has priority %d\n", (unsigned long long)o->job, o->priority);
-	else if (o->verb < sizeof became / sizeof *became && became[o->verb])
-		printf("j%llu is %s\n", (unsigned long long)o->job, became[o->verb]);
+	else if (o->verb < sizeof outcomes / sizeof *outcomes && outcomes[o->verb])
+		printf("j%llu is %s\n", (unsigned long long)o->job, outcomes[o->verb]);
 }
 
-static int take_done(struct client *cl, const Farm__Envelope *m, const struct job_options *o, struct error *e)
+static int call_and_print_reply(struct client *cl, const Farm__Envelope *m, const struct job_options *o,
+				struct error *e)
 {
 	struct client_message answer;
 	int rc = client_call(cl, m, FARM__ENVELOPE__BODY_DONE, &answer, e);
@@ -189,14 +190,14 @@ static int take_done(struct client *cl, const Farm__Envelope *m, const struct jo
 	else if (*done->text)
 		printf("%s\n", done->text);
 	else
-		print_done(o);
+		print_default_reply(o);
 	client_message_fini(&answer);
 	return rc;
 }
 
-static int cancel(struct client *cl, const struct job_options *o, struct error *e)
+static int cancel_job(struct client *cl, const struct job_options *o, struct error *e)
 {
-	return take_done(cl, ENVELOPE(CANCEL, cancel, .job = o->job), o, e);
+	return call_and_print_reply(cl, ENVELOPE(CANCEL, cancel, .job = o->job), o, e);
 }
 
 static int send_control(struct client *cl, const struct job_options *o, struct error *e)
@@ -205,11 +206,12 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
 					   [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
 					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY,
 					   [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
-	return take_done(cl,
-			 ENVELOPE(CONTROL, control, .job = o->job, .verb = verbs[o->verb], .priority = o->priority,
-				  .more_spp = o->more_spp, .more_mutations = o->more_mutations,
-				  .more_seconds = o->more_seconds, .target_error = o->target_error),
-			 o, e);
+	return call_and_print_reply(cl,
+				    ENVELOPE(CONTROL, control, .job = o->job, .verb = verbs[o->verb],
+					     .priority = o->priority, .more_spp = o->more_spp,
+					     .more_mutations = o->more_mutations, .more_seconds = o->more_seconds,
+					     .target_error = o->target_error),
+				    o, e);
 }
 
 /* Fetches a preview into -o. That may be the name of the final image, which a preview never replaces; then it goes to
@@ -217,43 +219,44 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
  * no image. */
 static int fetch_preview(struct client *cl, const struct job_options *o, struct error *e)
 {
-	char other[TARGET_PATH];
+	char preview_path[TARGET_PATH_MAX];
 	struct target t;
-	bool kept = false;
-	int rc = client_local(client_preview_name(o->output, other, sizeof other, e));
-	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}}, others = {{{"-o", other, OUTPUT_EXR}}};
+	bool is_renamed = false;
+	int rc = client_local_error(client_preview_name(o->output, preview_path, sizeof preview_path, e));
+	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}},
+				  preview_outputs = {{{"-o", preview_path, OUTPUT_EXR}}};
 	if (!rc)
-		rc = client_local(output_files_check(&outputs, NULL, 0, e));
+		rc = client_local_error(output_files_check(&outputs, NULL, 0, e));
 	if (!rc)
-		rc = client_local(target_find(&t, o->output, e));
-	if (!rc && !t.through)
-		rc = client_local(output_files_check(&others, NULL, 0, e));
+		rc = client_local_error(target_resolve(&t, o->output, e));
+	if (!rc && !t.write_directly)
+		rc = client_local_error(output_files_check(&preview_outputs, NULL, 0, e));
 	if (!rc)
-		rc = client_fetch_preview(cl, o->job, o->output, &kept, e);
-	if (!rc && kept)
+		rc = client_fetch_preview(cl, o->job, o->output, &is_renamed, e);
+	if (!rc && is_renamed)
 		fprintf(stderr, "j%llu: preview, the image so far, in %s; %s is for the final image\n",
-			(unsigned long long)o->job, other, o->output);
+			(unsigned long long)o->job, preview_path, o->output);
 	else if (!rc)
 		fprintf(stderr, "j%llu: preview, the image so far, in %s\n", (unsigned long long)o->job,
-			target_shown(o->output));
+			target_display_name(o->output));
 	return rc;
 }
 
-static int fetch(struct client *cl, const struct job_options *o, struct error *e)
+static int fetch_image(struct client *cl, const struct job_options *o, struct error *e)
 {
 	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
 	char name[CLIENT_NAME_BYTES];
 	if (o->preview && o->output)
 		return fetch_preview(cl, o, e);
 	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}};
-	int rc = client_local(output_files_check(&outputs, NULL, 0, e));
+	int rc = client_local_error(output_files_check(&outputs, NULL, 0, e));
 	if (!rc)
 		rc = o->output ? client_fetch(cl, o->job, what, o->output, e)
-			       : client_fetch_here(cl, o->job, what, name, e);
+			       : client_fetch_to_current_folder(cl, o->job, what, name, e);
 	if (!rc)
 		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
 			o->preview ? "preview, the image so far," : "image",
-			o->output ? target_shown(o->output) : name);
+			o->output ? target_display_name(o->output) : name);
 	return rc;
 }
 
@@ -266,15 +269,9 @@ static int print_log(struct client *cl, const struct job_options *o, struct erro
 static int run_verb(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
-		[JOB_LIST] = list,
-		[JOB_WORKERS] = workers,
-		[JOB_CANCEL] = cancel,
-		[JOB_FETCH] = fetch,
-		[JOB_LOG] = print_log,
-		[JOB_HOLD] = send_control,
-		[JOB_RELEASE] = send_control,
-		[JOB_PRIORITY] = send_control,
-		[JOB_EXTEND] = send_control,
+		[JOB_LIST] = list_jobs,	      [JOB_WORKERS] = list_workers,  [JOB_CANCEL] = cancel_job,
+		[JOB_FETCH] = fetch_image,    [JOB_LOG] = print_log,	     [JOB_HOLD] = send_control,
+		[JOB_RELEASE] = send_control, [JOB_PRIORITY] = send_control, [JOB_EXTEND] = send_control,
 	};
 	return verbs[o->verb](cl, o, e);
 }

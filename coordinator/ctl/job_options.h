@@ -21,8 +21,8 @@ enum job_verb {
 
 struct job_options {
 	const char *coordinator, *tls, *output;
-	const char *state;  /* list: only jobs in this state; NULL: all */
-	enum job_verb verb; /* JOB_VERBS: none given */
+	const char *state_filter; /* list: only jobs in this state; NULL: all */
+	enum job_verb verb;	  /* JOB_VERBS: none given */
 	uint64_t job;
 	int priority;
 	uint64_t more_spp, more_mutations; /* for extend only */

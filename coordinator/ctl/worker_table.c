@@ -4,7 +4,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-void worker_table_head(void)
+void worker_table_print_head(void)
 {
 	printf("%-24s %-11s %6s %7s %6s %8s %s\n", "WORKER", "STATE", "STARTS", "THREADS", "LEASES", "MERGED",
 	       "LAST FAULT");
@@ -13,5 +13,5 @@ void worker_table_head(void)
 void worker_table_print(const struct worker_row *row)
 {
 	printf("%-24s %-11s %6" PRIu64 " %7" PRIu64 " %6" PRIu64 " %8" PRIu64 " %s\n", row->name, row->state,
-	       row->restarts, row->threads, row->leases, row->merged, row->text);
+	       row->restart_count, row->threads, row->lease_count, row->merged_count, row->last_fault);
 }

@@ -6,11 +6,11 @@
 #include <stdint.h>
 
 struct worker_row {
-	const char *name, *state, *text; /* text: the last fault, or "" */
-	uint64_t restarts, threads, leases, merged;
+	const char *name, *state, *last_fault; /* last_fault: the last fault, or "" */
+	uint64_t restart_count, threads, lease_count, merged_count;
 };
 
-void worker_table_head(void);
+void worker_table_print_head(void);
 void worker_table_print(const struct worker_row *row);
 
 #endif

@@ -13,6 +13,6 @@
 #include "coordinator/live_job/jobs.h"
 
 /* Starts a checkpoint for the first job that needs one. Does nothing while an update is being carried out. */
-void checkpoint_where_due(struct jobs *jobs);
+void checkpoint_start_due(struct jobs *jobs);
 
 #endif

@@ -3,7 +3,7 @@
  * Carries out the core's answer to an event, action by action: sends leases, revocations and acknowledgements, merges
  * results, prepares jobs after their bootstrap, starts publishing, records changes of state.
  *
- * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its
+ * A result that the core wants merged is first appended to the job's journal (durable_append_result), then added to its
  * films; its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished later
  * (finish.c).
  *
@@ -31,48 +31,50 @@
 #include <unistd.h>
 
 /* Stores a new job: id, folder, live job, row. After an error nothing is left, and the submission still belongs to
- * `from`. */
-static int store_submission(struct jobs *jobs, uint64_t id, const struct submission *from, struct live_job **job,
+ * `submission`. */
+static int store_submission(struct jobs *jobs, uint64_t id, const struct submission *submission, struct live_job **job,
 			    struct error *e)
 {
 	int rc = ledger_skip_ids(jobs->ledger, id, e); /* before there is a folder (see reconcile.c) */
 	if (!rc)
-		rc = spool_make_job(jobs->spool, id, e);
+		rc = spool_create_job_folder(jobs->spool, id, e);
 	if (!rc)
-		rc = live_job_new(job, id, from->submit, from->plan, from->owner, 0, jobs->spool, e);
-	if (!rc && (rc = durable_begin(jobs, *job, e))) {
-		*from->submit = (*job)->submit;
-		memset(&(*job)->submit, 0, sizeof(*job)->submit);
+		rc = live_job_new(job, id, submission->envelope, submission->plan, submission->owner, 0, jobs->spool,
+				  e);
+	if (!rc && (rc = durable_add_job(jobs, *job, e))) {
+		*submission->envelope = (*job)->submission;
+		memset(&(*job)->submission, 0, sizeof(*job)->submission);
 		live_job_free(*job);
 	}
 	if (rc) /* files that are left behind belong to no row, and are deleted at the next start */
-		spool_drop_job(jobs->spool, id, NULL);
+		spool_delete_job(jobs->spool, id, NULL);
 	return rc;
 }
 
-static void submitted(struct jobs *jobs, const struct action *a, const struct incoming *in)
+static void add_submitted_job(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
-	struct submission *from = in->submission;
+	struct submission *submission = in->submission;
 	struct live_job *job;
 	struct error e;
-	const Farm__Submit *m = from->submit->message->submit;
+	const Farm__Submit *m = submission->envelope->message->submit;
 	int rc;
-	from->job = a->job;
+	submission->job_id = a->job;
 	do
-		rc = store_submission(jobs, a->job, from, &job, &e);
-	while (disk_is_full(rc) && room_make(jobs));
+		rc = store_submission(jobs, a->job, submission, &job, &e);
+	while (disk_is_full(rc) && room_evict(jobs));
 	if (rc) {
 		*in->refusal = e;
-		jobs_break(jobs, a->job, e.text);
+		jobs_defer_failure(jobs, a->job, e.text);
 		return;
 	}
-	job->next = jobs->live;
-	jobs->live = job;
-	char plan[PLAN_TEXT];
+	job->next = jobs->live_jobs;
+	jobs->live_jobs = job;
+	char plan[PLAN_TEXT_MAX];
 	plan_describe(&job->plan, plan, sizeof plan);
 	live_job_log(job, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s",
-		     log_quote(job->record.name).text, from->address, *from->owner ? from->owner : "-",
-		     log_quote(plan).text, log_quote(from->rule).text);
+		     log_quote(job->record.name).text, submission->address,
+		     *submission->owner ? submission->owner : "-", log_quote(plan).text,
+		     log_quote(submission->epoch_rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
 		live_job_log(job, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)
@@ -80,15 +82,15 @@ static void submitted(struct jobs *jobs, const struct action *a, const struct in
 			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
-static void rejected(const struct action *a, const struct incoming *in)
+static void report_rejection(const struct action *a, const struct incoming *in)
 {
 	if (in->refusal)
 		error_set(in->refusal, EPERM, "%s", *a->text ? a->text : "refused");
 }
 
-static void job_changed(struct jobs *jobs, const struct action *a)
+static void note_job_change(struct jobs *jobs, const struct action *a)
 {
-	struct live_job *job = jobs_find(jobs, a->job);
+	struct live_job *job = jobs_find_live(jobs, a->job);
 	if (!job)
 		return;
 	live_job_log(job,
@@ -105,31 +107,32 @@ void dispatch_prepare(struct jobs *jobs, struct live_job *job)
 	struct error e = {""};
 	int rc = live_job_prepare(job, jobs_film_folder(jobs, &job->plan), &e);
 	if (rc && rc != -ENOMEM) {
-		if (!job->unprepared)
+		if (!job->prepare_pending)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
 				     log_quote(e.text).text);
-		job->unprepared = true;
-		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
+		job->prepare_pending = true;
+		job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
-	job->unprepared = false;
+	job->prepare_pending = false;
 	if (!rc)
-		live_job_log(job, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", job->lit.b_pooled,
-			     job->lit.beyond_share, (int)job->lit.black);
+		live_job_log(job, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d",
+			     job->bootstrap_result.b_pooled, job->bootstrap_result.beyond_share,
+			     (int)job->bootstrap_result.black);
 	struct event ev = {.kind = EVENT_PREPARED,
 			   .job = job->id,
 			   .text = e.text,
-			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->lit.black}};
-	jobs_defer(jobs, &ev);
+			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->bootstrap_result.black}};
+	jobs_defer_event(jobs, &ev);
 }
 
-static void keep_partials(const struct jobs *jobs, const struct lease_key *k, const struct incoming *in)
+static void write_partials(const struct jobs *jobs, const struct lease_key *k, const struct incoming *in)
 {
 	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
 		char path[SPOOL_PATH_MAX];
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
-		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", jobs->config.keep_partials,
+		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", jobs->config.partials_folder,
 			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
 			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -142,20 +145,20 @@ static void keep_partials(const struct jobs *jobs, const struct lease_key *k, co
 	}
 }
 
-static void merge(struct jobs *jobs, const struct action *a, const struct incoming *in)
+static void merge_result(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
-	struct live_job *job = jobs_find(jobs, a->job);
+	struct live_job *job = jobs_find_live(jobs, a->job);
 	struct error e;
 	assert(job && in->batch && !job->busy);
-	if (jobs->config.keep_partials)
-		keep_partials(jobs, &a->key, in);
-	uint64_t rounds = live_job_rounds(job);
-	uint64_t at = in->stored_at;
-	int rc = in->stored ? 0 : durable_merged(jobs, job, in, &at, &e);
+	if (jobs->config.partials_folder)
+		write_partials(jobs, &a->key, in);
+	uint64_t rounds = live_job_complete_rounds(job);
+	uint64_t offset = in->stored_offset;
+	int rc = in->is_stored ? 0 : durable_append_result(jobs, job, in, &offset, &e);
 	if (!rc)
 		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
-		rollback_note(job, &a->key, at, in->result->maker);
+		rollback_note_batch(job, &a->key, offset, in->result->maker);
 	if (rc == -ENOMEM) { /* merged by half, and not acknowledged */
 		log_event(
 			LOG_STOP,
@@ -164,31 +167,31 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 	}
 	job->overflowed = job->overflowed || rc == -ERANGE;
 	if (rc)
-		jobs_break(jobs, a->job, e.text);
-	trust_merged(job, a);
-	live_job_note_times(job, farm_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
+		jobs_defer_failure(jobs, a->job, e.text);
+	trust_count_merged(job, a);
+	live_job_note_times(job, farm_job_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_u64(a->job), log_u64(a->peer),
-		  LEASE_VALUES(&a->key), in->stored ? " late=1" : "");
+		  LEASE_VALUES(&a->key), in->is_stored ? " late=1" : "");
 }
 
-static void take_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
+static void roll_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
-	struct live_job *job = jobs_find(jobs, a->job);
-	assert(job && !job->busy && in->back);
-	rollback_take(job, in->back);
-	trust_taken_back(job, a->who);
+	struct live_job *job = jobs_find_live(jobs, a->job);
+	assert(job && !job->busy && in->rollback);
+	rollback_apply(job, in->rollback);
+	trust_discount_result(job, a->worker_id);
 	live_job_log(job, LOG_BATCH_TAKEN_BACK, LEASE_FORMAT " text=%s", LEASE_VALUES(&a->key),
 		     log_quote(a->text).text);
 }
 
-static void acknowledge(struct jobs *jobs, const struct action *a)
+static void acknowledge_result(struct jobs *jobs, const struct action *a)
 {
-	const struct live_job *job = jobs_find(jobs, a->job);
-	const char *name = jobs->peers.name(jobs->peers.user, a->peer);
+	const struct live_job *job = jobs_find_live(jobs, a->job);
+	const char *name = jobs->peers.peer_name(jobs->peers.user, a->peer);
 	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* the original result may not be on disk yet */
 		durable_ack(jobs, job, a->peer, &a->key, a->ack);
 	else
-		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
+		jobs->peers.acknowledge_result(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
 		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
@@ -199,26 +202,26 @@ static void acknowledge(struct jobs *jobs, const struct action *a)
 
 static void send_lease(struct jobs *jobs, const struct action *a)
 {
-	struct live_job *job = jobs_find(jobs, a->job);
-	if (!jobs->peers.name(jobs->peers.user, a->peer) || !job || late_withholds(job, &a->key, a->peer))
+	struct live_job *job = jobs_find_live(jobs, a->job);
+	if (!jobs->peers.peer_name(jobs->peers.user, a->peer) || !job || late_claim_lease(job, &a->key, a->peer))
 		return;
 	live_job_count_worker(job, a->peer);
-	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->anew);
+	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->from_seeds);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
 		  LEASE_VALUES(&a->key));
 }
 
 static void revoke_lease(struct jobs *jobs, const struct action *a)
 {
-	jobs->peers.revoke(jobs->peers.user, a->peer, &a->key);
+	jobs->peers.revoke_lease(jobs->peers.user, a->peer, &a->key);
 	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
 		  LEASE_VALUES(&a->key));
 }
 
 static void close_peer(struct jobs *jobs, const struct action *a)
 {
-	live_jobs_drop_waiting(jobs->live, a->peer); /* the worker may return under the same number */
-	jobs->peers.dismiss(jobs->peers.user, a->peer, a->text);
+	live_jobs_drop_waiting(jobs->live_jobs, a->peer); /* the worker may return under the same number */
+	jobs->peers.dismiss_peer(jobs->peers.user, a->peer, a->text);
 }
 
 void dispatch_update(struct jobs *jobs, const struct update *u, const struct incoming *in)
@@ -231,10 +234,10 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 		case ACTION_JOB_FORGOTTEN:
 			break;
 		case ACTION_SUBMITTED:
-			submitted(jobs, a, in);
+			add_submitted_job(jobs, a, in);
 			break;
 		case ACTION_REJECTED:
-			rejected(a, in);
+			report_rejection(a, in);
 			break;
 		case ACTION_SEND_LEASE:
 			send_lease(jobs, a);
@@ -243,34 +246,34 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 			revoke_lease(jobs, a);
 			break;
 		case ACTION_MERGE:
-			merge(jobs, a, in);
+			merge_result(jobs, a, in);
 			break;
 		case ACTION_ACK:
-			acknowledge(jobs, a);
+			acknowledge_result(jobs, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
-			dispatch_prepare(jobs, jobs_find(jobs, a->job));
+			dispatch_prepare(jobs, jobs_find_live(jobs, a->job));
 			break;
 		case ACTION_EVALUATE_ERROR:
-			publish_start(jobs, jobs_find(jobs, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			publish_start(jobs, jobs_find_live(jobs, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
-			publish_start(jobs, jobs_find(jobs, a->job), PUBLISH_RESULT, a->rounds);
+			publish_start(jobs, jobs_find_live(jobs, a->job), PUBLISH_RESULT, a->rounds);
 			break;
 		case ACTION_JOB_CHANGED:
-			job_changed(jobs, a);
+			note_job_change(jobs, a);
 			break;
-		case ACTION_TAKE_BACK:
-			take_back(jobs, a, in);
+		case ACTION_ROLL_BACK:
+			roll_back(jobs, a, in);
 			break;
-		case ACTION_CHAINS_ANEW:
-			trust_anew(jobs, a);
+		case ACTION_RESTART_CHAINS:
+			trust_note_chain_restart(jobs, a);
 			break;
-		case ACTION_WRONG:
-			trust_wrong(jobs, a);
+		case ACTION_WRONG_RESULT:
+			trust_log_wrong_result(jobs, a);
 			break;
 		case ACTION_QUARANTINE:
-			trust_quarantined(jobs, a);
+			trust_record_quarantine(jobs, a);
 			break;
 		case ACTION_CLOSE_PEER:
 			close_peer(jobs, a);

@@ -2,15 +2,15 @@
 /*
  * Everything that must be on disk before it is acknowledged: submissions, results, the ends of jobs.
  *
- * Results: durable_reserve reserves space in the journal and the films before the core sees a result, so merging it
- * cannot fail for lack of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next
- * flushes the journals of all queued acknowledgements in the thread pool (group commit), and journals_flushed sends
- * them.
+ * Results: durable_reserve_result reserves space in the journal and the films before the core sees a result, so merging
+ * it cannot fail for lack of space. durable_append_result appends it. durable_ack queues its acknowledgement;
+ * flush_next flushes the journals of all queued acknowledgements in the thread pool (group commit), and
+ * on_journals_flushed sends them.
  *
  * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements
- * are parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted.
- * A job whose end cannot be recorded stays in a list of endings until it can; disk space for that is kept
- * (spool_reserve). Only running out of memory for these lists (some 200 bytes) ends the process.
+ * are parked, and durable_retry_job tries again every retry_seconds, with a new journal if the old one cannot be
+ * trusted. A job whose end cannot be recorded stays in a list of endings until it can; disk space for that is kept
+ * (spool_create_reserve). Only running out of memory for these lists (some 200 bytes) ends the process.
  */
 #include "coordinator/jobs/durable.h"
 
@@ -29,27 +29,29 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PINNED_ROOM = 512 /* bytes for the record of the fingerprint, which is written before the first batch */ };
-enum { NOBODY = 0 /* no peer: peers are numbered from 1 */ };
+enum {
+	PINNED_RECORD_BYTES = 512 /* bytes for the record of the fingerprint, which is written before the first batch */
+};
+enum { NO_PEER = 0 /* no peer: peers are numbered from 1 */ };
 
 /* A job whose end is not recorded on disk yet. */
 struct ending {
 	struct ending *next;
 	struct job_record record;
-	bool kept; /* its films are kept (keep.h), and it may be extended meanwhile */
+	bool films_kept; /* its films are kept (keep.h), and it may be extended meanwhile */
 };
 
 struct durable_ack {
 	STAILQ_ENTRY(durable_ack) next;
-	uint64_t peer; /* NOBODY: no peer waits for the answer */
+	uint64_t peer; /* NO_PEER: no peer waits for the answer */
 	struct lease_key key;
 	enum ack ack;
-	int failed;		 /* -errno of the flush; 0: none */
+	int flush_error;	 /* -errno of the flush; 0: none */
 	struct journal *journal; /* a reference */
 };
 
 /* A flush of the journals of all acknowledgements queued before it. */
-struct flush {
+struct journal_flush {
 	uv_work_t work;
 	struct jobs *jobs;
 	struct ack_list acks;
@@ -62,11 +64,11 @@ static int pack_plan(const struct live_job *job, unsigned char **frame, size_t *
 	return envelope_pack(ENVELOPE(JOB_INFO, job_info, .job = job->id, .plan = &plan), NULL, 0, frame, size, e);
 }
 
-int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
-		 struct error *e)
+int durable_pack_job(const struct live_job *job, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
+		     struct error *e)
 {
 	*submission = *plan = NULL;
-	int rc = envelope_pack(job->submit.message, NULL, 0, submission, &j->submission_size, e);
+	int rc = envelope_pack(job->submission.message, NULL, 0, submission, &j->submission_size, e);
 	if (!rc)
 		rc = pack_plan(job, plan, &j->plan_size, e);
 	j->submission = *submission;
@@ -74,7 +76,7 @@ int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char
 	return rc;
 }
 
-int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
+int durable_add_job(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
@@ -84,10 +86,10 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 			       .name = job->record.name,
 			       .version = HSLT_VERSION,
 			       .priority = job->record.priority,
-			       .mixed = live_job_submit(job)->mixed,
+			       .mixed = live_job_submission(job)->mixed,
 			       .submitted = job->record.submitted};
 	spool_job_path(jobs->spool, job->id, NULL, folder);
-	int rc = durable_pack(job, &j, &submission, &plan, e);
+	int rc = durable_pack_job(job, &j, &submission, &plan, e);
 	if (!rc)
 		rc = record_to_json(&job->record, &record, e);
 	if (!rc)
@@ -96,7 +98,7 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 		j.record = record;
 		rc = ledger_add(jobs->ledger, &j, e);
 		if (rc) /* it may have been written in spite of the error, and the client is told that it failed */
-			ledger_forget(jobs->ledger, job->id, NULL);
+			ledger_delete(jobs->ledger, job->id, NULL);
 	}
 	mem_free(record);
 	mem_free(submission);
@@ -106,56 +108,56 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 
 /* Records the end of a job. If it has no result, this must also work on a full disk, since its end may be all that
  * frees space, so the reserve is used. */
-static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
+static int ledger_end_with_reserve(struct jobs *jobs, const struct job_record *r, bool films_kept, struct error *e)
 {
-	int rc = ledger_end(jobs->ledger, r, kept, e);
-	return disk_is_full(rc) && !r->has_result && spool_use_reserve(jobs->spool)
-		       ? ledger_end(jobs->ledger, r, kept, e)
+	int rc = ledger_end_job(jobs->ledger, r, films_kept, e);
+	return disk_is_full(rc) && !r->has_result && spool_release_reserve(jobs->spool)
+		       ? ledger_end_job(jobs->ledger, r, films_kept, e)
 		       : rc;
 }
 
-/* Records the end of a job, and deletes its films once the ledger durably contains the end. kept: the films stay
+/* Records the end of a job, and deletes its films once the ledger durably contains the end. films_kept: the films stay
  * (keep.h). */
-static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
+static int write_end(struct jobs *jobs, const struct job_record *r, bool films_kept, struct error *e)
 {
-	int rc = ledger_end(jobs->ledger, r, kept, e);
-	if (rc && !r->has_result && !kept) /* its films are useless now, and may be what fills the disk */
-		keep_drop(jobs, r->id);
+	int rc = ledger_end_job(jobs->ledger, r, films_kept, e);
+	if (rc && !r->has_result && !films_kept) /* its films are useless now, and may be what fills the disk */
+		keep_drop_films(jobs, r->id);
 	if (disk_is_full(rc))
-		keep_drop_all(jobs);
+		keep_drop_all_films(jobs);
 	if (rc)
-		rc = ledger_end_at_last(jobs, r, kept, e);
-	if (!rc && !kept)
-		keep_drop(jobs, r->id);
+		rc = ledger_end_with_reserve(jobs, r, films_kept, e);
+	if (!rc && !films_kept)
+		keep_drop_films(jobs, r->id);
 	return rc;
 }
 
-static void end_later(struct jobs *jobs, const struct job_record *r, bool kept)
+static void queue_ending(struct jobs *jobs, const struct job_record *r, bool films_kept)
 {
 	struct ending *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
-	*n = (struct ending){jobs->endings, *r, kept};
+	*n = (struct ending){jobs->endings, *r, films_kept};
 	jobs->endings = n;
-	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	jobs->endings_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 }
 
-void durable_end_again(struct jobs *jobs, const struct job_record *r)
+void durable_restore_end(struct jobs *jobs, const struct job_record *r)
 {
 	struct error e;
-	if (ledger_end(jobs->ledger, r, true, &e) == 0)
+	if (ledger_end_job(jobs->ledger, r, true, &e) == 0)
 		return;
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it will be tried again\"", (unsigned long long)r->id,
 		  log_quote(e.text).text);
-	end_later(jobs, r, true);
+	queue_ending(jobs, r, true);
 }
 
-int durable_end(struct jobs *jobs, struct live_job *job)
+int durable_end_job(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	if (journal_write(job->journal, &e)) /* for an extension; results that are not written are computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(jobs, &job->record, keep_films(jobs, job, &job->record), &e);
+	int rc = write_end(jobs, &job->record, keep_wants_films(jobs, job, &job->record), &e);
 	if (rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
@@ -163,21 +165,21 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		return rc;
 	}
 	if (!rc)
-		journal_settle(job->journal); /* nothing that still waits for a flush is needed any more */
-	journal_release(job->journal);	      /* its space is freed together with its last reference */
+		journal_mark_settled(job->journal); /* nothing that still waits for a flush is needed any more */
+	journal_release(job->journal);		    /* its space is freed together with its last reference */
 	job->journal = NULL;
 	/* The journal that write_end deleted took up space until now. */
 	if (rc && write_end(jobs, &job->record, false, &e))
-		end_later(jobs, &job->record, false);
+		queue_ending(jobs, &job->record, false);
 	return 0;
 }
 
-int durable_end_soon(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
+int durable_end_early(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
 {
-	return ledger_end_at_last(jobs, r, keep_films(jobs, job, r), e);
+	return ledger_end_with_reserve(jobs, r, keep_wants_films(jobs, job, r), e);
 }
 
-int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)
+int durable_check_ended(const struct jobs *jobs, uint64_t job, struct error *e)
 {
 	for (const struct ending *n = jobs->endings; n; n = n->next)
 		if (n->record.id == job)
@@ -185,50 +187,51 @@ int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)
 	return 0;
 }
 
-static void end_again(struct jobs *jobs)
+static void retry_endings(struct jobs *jobs)
 {
 	struct error e;
-	if (!jobs->endings || jobs_now(jobs) < jobs->endings_again)
+	if (!jobs->endings || jobs_now(jobs) < jobs->endings_retry_at)
 		return;
-	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	jobs->endings_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 	for (struct ending *n; (n = jobs->endings);) {
-		if (write_end(jobs, &n->record, n->kept, &e))
+		if (write_end(jobs, &n->record, n->films_kept, &e))
 			return;
 		jobs->endings = n->next;
 		mem_free(n);
 	}
 }
 
-static void hold_job(struct jobs *jobs, struct live_job *job, const char *text)
+static void set_storage_hold(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
-	if (!*text != !job->held) {
+	if (!*text != !job->held_for_storage) {
 		live_job_log(job, *text ? LOG_JOB_HELD : LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released",
 			     log_quote(text).text);
-		job->held = *text != 0;
+		job->held_for_storage = *text != 0;
 	}
-	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 	jobs_step(jobs, &ev);
 }
 
-void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, const char *why)
+void durable_hold_job(struct jobs *jobs, struct live_job *job, const char *consequence, const char *cause)
 {
 	char text[256];
-	text_print(text, sizeof text, "%s: %s", what, why);
-	hold_job(jobs, job, text);
+	text_print(text, sizeof text, "%s: %s", consequence, cause);
+	set_storage_hold(jobs, job, text);
 }
 
 /* Checks whether memory has room for the result's chain states, if they are larger than those that they replace. */
 static int reserve_memory(const struct jobs *jobs, struct live_job *job, const struct batch *b, struct error *e)
 {
-	const struct chain_state *now = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
-	uint64_t before = chain_states_bytes(now, job->chains_per_lease);
+	const struct chain_state *current = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
+	uint64_t before = chain_states_bytes(current, job->chains_per_lease);
 	uint64_t after = chain_states_bytes(b->states, b->state_count);
-	uint64_t all = job->state_bytes - before + after, first = after > before ? room_for_states(jobs, job, all) : 0;
-	job->held_states = first ? all : 0;
-	return first ? error_set(e, ENOMEM, "memory has no room for its chain states beside those of j%llu",
-				 (unsigned long long)first)
-		     : 0;
+	uint64_t total = job->state_bytes - before + after,
+		 blocker = after > before ? room_states_blocker(jobs, job, total) : 0;
+	job->blocked_state_bytes = blocker ? total : 0;
+	return blocker ? error_set(e, ENOMEM, "memory has no room for its chain states beside those of j%llu",
+				   (unsigned long long)blocker)
+		       : 0;
 }
 
 static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct incoming *in, size_t size,
@@ -236,41 +239,41 @@ static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct in
 {
 	int rc;
 	do {
-		uint64_t first = room_first(jobs, job);
-		rc = first ? error_set(e, ENOSPC,
-				       "the disk has no room for its results besides those of j%llu, which go first",
-				       (unsigned long long)first)
-		     : room_is_left(jobs, job, size)
-			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
+		uint64_t blocker = room_write_blocker(jobs, job);
+		rc = blocker ? error_set(e, ENOSPC,
+					 "the disk has no room for its results besides those of j%llu, which go first",
+					 (unsigned long long)blocker)
+		     : room_fits_checkpoint(jobs, job, size)
+			     ? journal_reserve(job->journal, size + PINNED_RECORD_BYTES, e)
 			     : error_set(e, ENOSPC,
 					 "the space left on the disk is needed for a checkpoint of its results");
 		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 			rc = canvas_reserve(job->canvas, in->batch, e);
-	} while (disk_is_full(rc) && room_make(jobs));
+	} while (disk_is_full(rc) && room_evict(jobs));
 	return rc;
 }
 
-int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e)
+int durable_reserve_result(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
 	} result = {in->result}; /* generated structures have no const members */
-	if (job->unsure)
+	if (job->checkpoint_uncertain)
 		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, result.to), NULL, 0, &in->frame, &in->frame_size,
 			       e);
 	if (rc)
 		return rc;
 	size_t size = in->frame_size + in->payload->size;
-	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
+	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX_SIZE), (uint32_t)in->payload->size);
 	rc = reserve_memory(jobs, job, in->batch, e);
 	if (!rc)
 		rc = reserve_disk(jobs, job, in, size, e);
 	if (!rc)
 		return 0;
-	job->held_bytes = size;
-	durable_hold(jobs, job, "its results cannot be stored", e->text);
+	job->blocked_result_bytes = size;
+	durable_hold_job(jobs, job, "its results cannot be stored", e->text);
 	return rc;
 }
 
@@ -278,36 +281,39 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 static int write_pinned(struct jobs *jobs, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
-	if (job->pinned || !farm_job(jobs->farm, job->id, jobs_now(jobs), &status) || !*status.fingerprint)
+	if (job->fingerprint_journaled || !farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status) ||
+	    !*status.fingerprint)
 		return 0;
-	job->pinned = true;
-	return journal_append(job->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint,
+	job->fingerprint_journaled = true;
+	return journal_append(job->journal, JOURNAL_FINGERPRINT, NULL, elapsed, status.fingerprint,
 			      strlen(status.fingerprint), NULL, e);
 }
 
-int durable_merged(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *at, struct error *e)
+int durable_append_result(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *offset,
+			  struct error *e)
 {
 	const struct lease_key *k = &in->batch->key;
-	bool again = k->kind == LEASE_RENDER && job->again[(size_t)k->group * job->plan.parts + k->part];
-	double elapsed = farm_elapsed(jobs->farm, job->id, jobs_now(jobs));
+	bool is_replacement =
+		k->kind == LEASE_RENDER && job->is_replacement[(size_t)k->group * job->plan.parts + k->part];
+	double elapsed = farm_job_elapsed(jobs->farm, job->id, jobs_now(jobs));
 	assert(in->frame);
 	int rc = write_pinned(jobs, job, elapsed, e);
-	*at = journal_bytes(job->journal);
+	*offset = journal_bytes(job->journal);
 	return rc ? rc
-		  : journal_append(job->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
-				   in->frame_size, in->payload, e);
+		  : journal_append(job->journal, is_replacement ? JOURNAL_BATCH_REPLACEMENT : JOURNAL_BATCH, k, elapsed,
+				   in->frame, in->frame_size, in->payload, e);
 }
 
 static void flush_next(struct jobs *jobs);
 
 static void flush_journals(uv_work_t *work)
 {
-	struct flush *w = work->data;
+	struct journal_flush *w = work->data;
 	struct durable_ack *a;
 	STAILQ_FOREACH(a, &w->acks, next) {
 		struct error e;
-		a->failed = journal_sync(a->journal, &e);
-		if (a->failed)
+		a->flush_error = journal_sync(a->journal, &e);
+		if (a->flush_error)
 			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	}
 }
@@ -321,7 +327,7 @@ static void drop_ack(struct durable_ack *a)
 /* Keeps an acknowledgement whose flush failed until the journal is replaced. */
 static void park_ack(struct jobs *jobs, struct durable_ack *a)
 {
-	struct live_job *job = jobs->stopping ? NULL : jobs_find(jobs, a->key.job);
+	struct live_job *job = jobs->stopping ? NULL : jobs_find_live(jobs, a->key.job);
 	if (!job) {
 		drop_ack(a);
 		return;
@@ -330,35 +336,35 @@ static void park_ack(struct jobs *jobs, struct durable_ack *a)
 		STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 		return;
 	}
-	STAILQ_INSERT_HEAD(&jobs->parked, a, next);
-	if (!job->held)
-		durable_hold(jobs, job, "its results cannot be stored", strerror(-a->failed));
+	STAILQ_INSERT_HEAD(&jobs->parked_acks, a, next);
+	if (!job->held_for_storage)
+		durable_hold_job(jobs, job, "its results cannot be stored", strerror(-a->flush_error));
 }
 
-static void answer(struct jobs *jobs, struct durable_ack *a)
+static void finish_ack(struct jobs *jobs, struct durable_ack *a)
 {
-	if (a->failed) {
+	if (a->flush_error) {
 		park_ack(jobs, a);
 		return;
 	}
 	if (a->ack == ACK_MERGED)
 		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->key.job), log_u64(a->peer),
 			  LEASE_VALUES(&a->key));
-	if (!jobs->stopping && a->peer != NOBODY)
-		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, "");
+	if (!jobs->stopping && a->peer != NO_PEER)
+		jobs->peers.acknowledge_result(jobs->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);
 }
 
-static void journals_flushed(uv_work_t *work, int status)
+static void on_journals_flushed(uv_work_t *work, int status)
 {
-	struct flush *w = work->data;
+	struct journal_flush *w = work->data;
 	struct jobs *jobs = w->jobs;
 	assert(status == 0);
 	(void)status;
 	jobs->flushing = false;
 	for (struct durable_ack *a; (a = STAILQ_FIRST(&w->acks));) {
 		STAILQ_REMOVE_HEAD(&w->acks, next);
-		answer(jobs, a);
+		finish_ack(jobs, a);
 	}
 	mem_free(w);
 	flush_next(jobs);
@@ -368,14 +374,14 @@ static void flush_next(struct jobs *jobs)
 {
 	if (jobs->flushing || STAILQ_EMPTY(&jobs->acks))
 		return;
-	struct flush *w = mem_alloc(1, sizeof *w);
+	struct journal_flush *w = mem_alloc(1, sizeof *w);
 	if (!w) /* as with events: without 200 bytes nothing can continue */
 		abort();
 	w->jobs = jobs;
 	STAILQ_INIT(&w->acks);
 	STAILQ_CONCAT(&w->acks, &jobs->acks);
 	jobs->flushing = true;
-	jobs_in_pool(jobs, &w->work, w, flush_journals, journals_flushed);
+	jobs_queue_work(jobs, &w->work, w, flush_journals, on_journals_flushed);
 }
 
 void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
@@ -395,25 +401,25 @@ static int append_note(struct jobs *jobs, const struct live_job *job, enum journ
 {
 	int rc = journal_append(job->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
-		durable_ack(jobs, job, NOBODY, &(struct lease_key){.job = job->id}, ACK_REPEAT);
+		durable_ack(jobs, job, NO_PEER, &(struct lease_key){.job = job->id}, ACK_REPEAT);
 	return rc;
 }
 
-void durable_look(struct jobs *jobs, uint64_t id)
+void durable_store_look(struct jobs *jobs, uint64_t id)
 {
-	struct live_job *job = jobs_find(jobs, id);
+	struct live_job *job = jobs_find_live(jobs, id);
 	struct job_status status;
 	struct error e;
-	if (!job || !farm_job(jobs->farm, id, jobs_now(jobs), &status) || status.looks->count == 0)
+	if (!job || !farm_job_status(jobs->farm, id, jobs_now(jobs), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
 	if (l->work <= job->look_written)
 		return;
 	job->look_written = l->work;
 	/* Only forecasts use it: after a restart the estimate itself is made again. */
-	unsigned char note[STORED_NOTE_MOST];
+	unsigned char note[STORED_NOTE_MAX];
 	size_t size = stored_pack_look(l, note);
-	if (append_note(jobs, job, JOURNAL_LOOK, farm_elapsed(jobs->farm, id, jobs_now(jobs)), note, size, &e))
+	if (append_note(jobs, job, JOURNAL_LOOK, farm_job_elapsed(jobs->farm, id, jobs_now(jobs)), note, size, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(e.text).text);
 }
 
@@ -421,28 +427,29 @@ void durable_look(struct jobs *jobs, uint64_t id)
  * acknowledgement; nor during a checkpoint, which contains the latest counters and replaces the journal. */
 static void write_counts(struct jobs *jobs, struct live_job *job)
 {
-	struct job_counts now;
+	struct job_counts current;
 	struct error e;
-	if (job->ended || job->busy || !farm_counts(jobs->farm, job->id, &now) ||
-	    memcmp(&now, &job->record.counts, sizeof now) == 0)
+	if (job->ended || job->busy || !farm_job_counts(jobs->farm, job->id, &current) ||
+	    memcmp(&current, &job->record.counts, sizeof current) == 0)
 		return;
-	unsigned char note[STORED_NOTE_MOST];
-	if (append_note(jobs, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
-		job->record.counts = now;
+	unsigned char note[STORED_NOTE_MAX];
+	if (append_note(jobs, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&current, note), &e) ==
+	    0)
+		job->record.counts = current;
 }
 
 /* Queues the parked acknowledgements whose journals have been replaced, for another flush. */
 static void release_parked_acks(struct jobs *jobs)
 {
 	struct ack_list list = STAILQ_HEAD_INITIALIZER(list);
-	STAILQ_CONCAT(&list, &jobs->parked);
+	STAILQ_CONCAT(&list, &jobs->parked_acks);
 	for (struct durable_ack *a; (a = STAILQ_FIRST(&list));) {
-		struct live_job *job = jobs_find(jobs, a->key.job);
+		struct live_job *job = jobs_find_live(jobs, a->key.job);
 		STAILQ_REMOVE_HEAD(&list, next);
 		if (!job) {
 			drop_ack(a);
 		} else if (a->journal == job->journal && journal_is_bad(a->journal)) {
-			STAILQ_INSERT_HEAD(&jobs->parked, a, next);
+			STAILQ_INSERT_HEAD(&jobs->parked_acks, a, next);
 		} else {
 			STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 		}
@@ -450,11 +457,13 @@ static void release_parked_acks(struct jobs *jobs)
 	flush_next(jobs);
 }
 
-int durable_mend(struct jobs *jobs, struct live_job *job)
+int durable_retry_job(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
-	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (job->unsure || (job->held_states && room_for_states(jobs, job, job->held_states)) || room_first(jobs, job))
+	job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
+	if (job->checkpoint_uncertain ||
+	    (job->blocked_state_bytes && room_states_blocker(jobs, job, job->blocked_state_bytes)) ||
+	    room_write_blocker(jobs, job))
 		return -EAGAIN;
 	int rc;
 	do {
@@ -462,42 +471,42 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 		if (rc && rc != -EAGAIN)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 		/* Otherwise the next result would be held again. */
-		if (!rc && !room_is_left(jobs, job, 2 * job->held_bytes))
+		if (!rc && !room_fits_checkpoint(jobs, job, 2 * job->blocked_result_bytes))
 			rc = -ENOSPC;
 		if (!rc)
-			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
-	} while (disk_is_full(rc) && room_make(jobs)); /* deletes scene files and films that were kept for later use */
+			rc = journal_reserve(job->journal, 2 * job->blocked_result_bytes, &e);
+	} while (disk_is_full(rc) && room_evict(jobs)); /* deletes scene files and films that were kept for later use */
 	if (!rc)
-		hold_job(jobs, job, "");
+		set_storage_hold(jobs, job, "");
 	return rc;
 }
 
-static void mend_ledger(struct jobs *jobs)
+static void retry_ledger(struct jobs *jobs)
 {
 	struct error e;
-	if (jobs_now(jobs) < jobs->ledger_again)
+	if (jobs_now(jobs) < jobs->ledger_retry_at)
 		return;
-	jobs->ledger_again = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (ledger_mend(jobs->ledger, &e))
+	jobs->ledger_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
+	if (ledger_repair_copy(jobs->ledger, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
-	spool_reserve(jobs->spool);
+	spool_create_reserve(jobs->spool);
 }
 
 void durable_tick(struct jobs *jobs)
 {
-	for (struct live_job *job = jobs->live; job; job = job->next)
+	for (struct live_job *job = jobs->live_jobs; job; job = job->next)
 		write_counts(jobs, job);
-	if (!STAILQ_EMPTY(&jobs->parked))
+	if (!STAILQ_EMPTY(&jobs->parked_acks))
 		release_parked_acks(jobs);
-	end_again(jobs);
-	mend_ledger(jobs);
+	retry_endings(jobs);
+	retry_ledger(jobs);
 }
 
 void durable_close(struct jobs *jobs)
 {
 	assert(!jobs->flushing && STAILQ_EMPTY(&jobs->acks));
-	for (struct durable_ack *a; (a = STAILQ_FIRST(&jobs->parked));) {
-		STAILQ_REMOVE_HEAD(&jobs->parked, next);
+	for (struct durable_ack *a; (a = STAILQ_FIRST(&jobs->parked_acks));) {
+		STAILQ_REMOVE_HEAD(&jobs->parked_acks, next);
 		drop_ack(a);
 	}
 	for (struct ending *n; (n = jobs->endings);) {

@@ -10,21 +10,22 @@
 
 #include "coordinator/live_job/jobs.h"
 
-enum { FILES_CHECKED = 60 /* s: a file checked within this time is not read again before it is sent */ };
+enum { FILES_CHECKED_SECONDS = 60 /* s: a file checked within this time is not read again before it is sent */ };
 
 /* Checks a file that a worker requests or a client submits. Returns 0 if it is right; -EINPROGRESS if it is being
- * read, in which case file_read of peer_calls.h follows. After other errors it cannot be sent, and the jobs that lack
- * it are held. */
+ * read, in which case announce_file_checked of peer_calls.h follows. After other errors it cannot be sent, and the jobs
+ * that lack it are held. */
 int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e);
 /* Holds the job if the store lacks one of its files, or releases it if it lacks none any more. Returns true if a step
  * was made, after which any job may be gone. */
-bool files_look(struct jobs *jobs, struct live_job *job);
+bool files_update_hold(struct jobs *jobs, struct live_job *job);
 /* Call when a worker complains: has all files of the job read again, except those that were read after their last
  * chunk was sent. The job may be gone afterwards. */
-void files_read(struct jobs *jobs, struct live_job *job);
-bool files_are_read(const struct jobs *jobs, const struct live_job *job); /* whether some of its files are being read */
+void files_reread(struct jobs *jobs, struct live_job *job);
+bool files_are_being_read(const struct jobs *jobs,
+			  const struct live_job *job); /* whether some of its files are being read */
 /* Whether all files of the job were right when last read. */
-bool files_are_right(const struct jobs *jobs, const struct live_job *job);
+bool files_are_intact(const struct jobs *jobs, const struct live_job *job);
 void files_tick(struct jobs *jobs); /* releases jobs whose missing files exist now */
 
 #endif

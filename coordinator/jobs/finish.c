@@ -11,70 +11,70 @@
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/results.h"
-#include "coordinator/retention/ages.h"
+#include "coordinator/retention/observed_time.h"
 #include "coordinator/retention/clear.h"
 #include "coordinator/retention/keep.h"
 
-static struct job_record record_of(const struct jobs *jobs, const struct live_job *job)
+static struct job_record final_record(const struct jobs *jobs, const struct live_job *job)
 {
 	struct job_view v;
-	jobs_view_end(jobs, job, &v);
-	v.record.ended_seen = ages_now(jobs);
+	jobs_get_end_view(jobs, job, &v);
+	v.record.ended_seen = observed_time_now(jobs);
 	if (!v.record.cut)
 		v.record.ended = clock_wall_seconds();
 	return v.record;
 }
 
-static void finish(struct jobs *jobs, struct live_job *job)
+static void finish_job(struct jobs *jobs, struct live_job *job)
 {
-	job->record = record_of(jobs, job);
-	if (durable_end(jobs, job)) { /* start.c tries again */
-		job->unrecorded = true;
-		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	job->record = final_record(jobs, job);
+	if (durable_end_job(jobs, job)) { /* start.c tries again */
+		job->record_pending = true;
+		job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
 	ended_jobs_add(jobs, &job->record);
-	jobs->peers.job_ended(jobs->peers.user, job->id);
-	keep_trim(jobs);
-	clear_soon(jobs);
-	live_job_release_blobs(live_job_submit(job), jobs->blobs);
-	struct live_job **at = &jobs->live;
+	jobs->peers.announce_job_end(jobs->peers.user, job->id);
+	keep_trim_films(jobs);
+	clear_schedule_soon(jobs);
+	live_job_release_blobs(live_job_submission(job), jobs->blobs);
+	struct live_job **at = &jobs->live_jobs;
 	while (*at != job)
 		at = &(*at)->next;
 	*at = job->next;
 	struct waiting_list late = STAILQ_HEAD_INITIALIZER(late);
 	STAILQ_CONCAT(&late, &job->waiting);
 	live_job_free(job);
-	for (struct waiting_batch *w; (w = STAILQ_FIRST(&late));) { /* the core refuses them, since the job is over */
+	for (struct waiting_message *w; (w = STAILQ_FIRST(&late));) { /* the core refuses them, since the job is over */
 		STAILQ_REMOVE_HEAD(&late, next);
-		results_take_waiting(jobs, w);
-		waiting_batch_free(w);
+		results_handle_waiting(jobs, w);
+		waiting_message_free(w);
 	}
 }
 
-int finish_cancelled(struct jobs *jobs, uint64_t id, struct error *e)
+int finish_check_cancelled(struct jobs *jobs, uint64_t id, struct error *e)
 {
-	struct live_job *job = jobs_find(jobs, id);
+	struct live_job *job = jobs_find_live(jobs, id);
 	if (!job)
-		return durable_ended(jobs, id, e);
+		return durable_check_ended(jobs, id, e);
 	if (!job->ended)
 		return 0;
-	struct job_record r = record_of(jobs, job);
-	return durable_end_soon(jobs, job, &r, e);
+	struct job_record r = final_record(jobs, job);
+	return durable_end_early(jobs, job, &r, e);
 }
 
 void finish_ended(struct jobs *jobs)
 {
 	bool finished = false;
-	for (struct live_job *job = jobs->live, *next; job; job = next) {
+	for (struct live_job *job = jobs->live_jobs, *next; job; job = next) {
 		next = job->next;
-		if (job->ended && !job->busy && !job->unpublished && !job->unrecorded) {
-			finish(jobs, job);
+		if (job->ended && !job->busy && !job->publish_pending && !job->record_pending) {
+			finish_job(jobs, job);
 			finished = true;
-			next = jobs->live; /* results that waited may have ended other jobs */
+			next = jobs->live_jobs; /* results that waited may have ended other jobs */
 		}
 	}
 	if (finished)
-		jobs->peers.jobs_let_go(jobs->peers.user);
-	extend_waiting(jobs);
+		jobs->peers.release_watchers(jobs->peers.user);
+	extend_handle_waiting(jobs);
 }

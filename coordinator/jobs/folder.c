@@ -5,23 +5,23 @@
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/late_feed.h"
 
-static const double every_seconds = 1;
+static const double check_interval_seconds = 1;
 
-static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
+static int recreate_folder(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(jobs->spool, "jobs", path);
 	int rc = disk_make_folder(path, e);
 	if (!rc)
-		rc = spool_make_job(jobs->spool, job->id, e);
+		rc = spool_create_job_folder(jobs->spool, job->id, e);
 	if (rc)
 		return rc;
 	spool_job_path(jobs->spool, job->id, "log", path);
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 	if (fd < 0)
 		return error_file(e, errno, path);
-	disk_close(job->log);
-	job->log = fd;
+	disk_close(job->log_fd);
+	job->log_fd = fd;
 	return 0;
 }
 
@@ -32,27 +32,27 @@ static void restore_folder(struct jobs *jobs, struct live_job *job)
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
 	spool_job_path(jobs->spool, job->id, NULL, folder);
-	int rc = make_anew(jobs, job, &e);
+	int rc = recreate_folder(jobs, job, &e);
 	live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder,
 		     rc ? e.text : "restored, and the job continues");
 	if (rc) {
 		if (!job->ended)
-			durable_hold(jobs, job, "its folder is missing and cannot be restored", e.text);
+			durable_hold_job(jobs, job, "its folder is missing and cannot be restored", e.text);
 		return;
 	}
 	if (job->ended)
 		return;
-	journal_distrust(job->journal);
+	journal_mark_bad(job->journal);
 	if (job->checkpoint_bytes) {
 		/* Results that wait exist only in the old journal, and no checkpoint contains them. */
-		if (!late_drop(jobs, job->id))
+		if (!late_drop_all(jobs, job->id))
 			return;
-		job->unsure = true;
-		if (job->generation_least <= journal_generation(job->journal))
-			job->generation_least = journal_generation(job->journal) + 1;
-		job->checkpoint_after = 0;
+		job->checkpoint_uncertain = true;
+		if (job->min_generation <= journal_generation(job->journal))
+			job->min_generation = journal_generation(job->journal) + 1;
+		job->checkpoint_not_before = 0;
 	}
-	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is being restored");
+	durable_hold_job(jobs, job, "its results cannot be stored", "its folder was removed, and is being restored");
 }
 
 /* Whether the job's folder has disappeared. Normally the journal's file is looked for. If the journal is bad already,
@@ -63,17 +63,17 @@ static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
 	if (!journal_is_bad(job->journal) && !job->ended)
-		return journal_is_gone(job->journal);
+		return journal_file_is_missing(job->journal);
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
 }
 
 void folder_tick(struct jobs *jobs)
 {
-	if (jobs_now(jobs) < jobs->folders_next)
+	if (jobs_now(jobs) < jobs->next_folder_check)
 		return;
-	jobs->folders_next = jobs_now(jobs) + every_seconds;
-	for (struct live_job *job = jobs->live; job; job = job->next)
+	jobs->next_folder_check = jobs_now(jobs) + check_interval_seconds;
+	for (struct live_job *job = jobs->live_jobs; job; job = job->next)
 		if (!job->busy && job->journal && is_gone(jobs, job)) {
 			restore_folder(jobs, job);
 			return; /* the list may have changed; continue next time */

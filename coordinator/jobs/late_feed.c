@@ -9,7 +9,7 @@
 
 /* Gives up a stored result that has been damaged meanwhile or is dropped: if the core had given its lease to a
  * worker, the lease is open again. */
-static void give_up(struct jobs *jobs, struct live_job *job, const struct late_result *l, const char *why)
+static void drop_result(struct jobs *jobs, struct live_job *job, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = job->id, .lease = {.key = l->key}};
 	live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
@@ -18,16 +18,16 @@ static void give_up(struct jobs *jobs, struct live_job *job, const struct late_r
 }
 
 /* Gives a stored result to the core, which decides whether it counts. */
-static int offer(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
+static int offer_result(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
 {
-	struct event ev = {.kind = EVENT_STORED, .job = job->id, .lease = {.key = l->key, .valid = true}};
+	struct event ev = {.kind = EVENT_STORED_BATCH, .job = job->id, .lease = {.key = l->key, .valid = true}};
 	struct envelope env;
 	struct batch batch = {0};
 	struct buf copy = {0};
 	unsigned char *body;
 	const unsigned char *payload;
 	size_t size, payload_size;
-	int rc = journal_body(job->journal, l->at, &body, &size, e);
+	int rc = journal_read_body(job->journal, l->offset, &body, &size, e);
 	if (rc)
 		return rc;
 	rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
@@ -36,7 +36,7 @@ static int offer(struct jobs *jobs, const struct live_job *job, const struct lat
 		return rc;
 	}
 	rc = batch_unpack(&batch, &job->plan, env.message->lease_result, payload, payload_size, e);
-	if (!rc && farm_verifies(jobs->farm, &l->key))
+	if (!rc && farm_lease_is_verified(jobs->farm, &l->key))
 		rc = digest_batch(&batch, &ev.lease.digest, e);
 	copy.limit = payload_size;
 	if (!rc && !buf_append(&copy, payload, payload_size))
@@ -45,8 +45,8 @@ static int offer(struct jobs *jobs, const struct live_job *job, const struct lat
 		const struct incoming in = {.batch = &batch,
 					    .result = env.message->lease_result,
 					    .payload = &copy,
-					    .stored = true,
-					    .stored_at = l->at};
+					    .is_stored = true,
+					    .stored_offset = l->offset};
 		jobs_step_with(jobs, &ev, &in);
 	}
 	buf_fini(&copy);
@@ -56,12 +56,12 @@ static int offer(struct jobs *jobs, const struct live_job *job, const struct lat
 	return rc;
 }
 
-bool late_drop(struct jobs *jobs, uint64_t id)
+bool late_drop_all(struct jobs *jobs, uint64_t id)
 {
 	struct live_job *job;
-	while ((job = jobs_find(jobs, id)) && job->late_count) {
-		struct late_result l = job->late[--job->late_count];
-		give_up(jobs, job, &l, "a waiting result in the journal is computed again");
+	while ((job = jobs_find_live(jobs, id)) && job->late_count) {
+		struct late_result l = job->late_results[--job->late_count];
+		drop_result(jobs, job, &l, "a waiting result in the journal is computed again");
 	}
 	return job != NULL;
 }
@@ -71,23 +71,24 @@ bool late_drop(struct jobs *jobs, uint64_t id)
 static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
 	for (size_t i = 0; i < job->late_count; i++) {
-		struct late_result l = job->late[i];
+		struct late_result l = job->late_results[i];
 		struct error e;
 		const uint64_t id = job->id;
-		enum replay_place place = replay_place(job, &l.key);
-		if (place == REPLAY_LATE)
+		enum replay_readiness readiness = replay_readiness(job, &l.key);
+		if (readiness == REPLAY_LATE)
 			continue;
-		int rc = place == REPLAY_FITS ? offer(jobs, job, &l, &e) : 0;
+		int rc = readiness == REPLAY_READY ? offer_result(jobs, job, &l, &e) : 0;
 		if (rc == -ENOMEM) /* try again later */
 			return false;
-		if (!rc && !jobs_find(jobs, id)) /* a sum left the films' range, which ended the job */
+		if (!rc && !jobs_find_live(jobs, id)) /* a sum left the films' range, which ended the job */
 			return true;
-		if (!rc && replay_place(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
+		if (!rc &&
+		    replay_readiness(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
 			continue;
-		l = job->late[i];
+		l = job->late_results[i];
 		late_remove(job, i);
 		if (rc)
-			give_up(jobs, job, &l, e.text);
+			drop_result(jobs, job, &l, e.text);
 		return true;
 	}
 	return false;
@@ -95,12 +96,12 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 
 void late_feed(struct jobs *jobs)
 {
-	if (jobs->feeding || jobs->stepping || jobs->stopping)
+	if (jobs->feeding_late_results || jobs->stepping || jobs->stopping)
 		return;
-	jobs->feeding = true;
-	for (struct live_job *job = jobs->live; job;) {
+	jobs->feeding_late_results = true;
+	for (struct live_job *job = jobs->live_jobs; job;) {
 		bool fed = job->late_count && !job->busy && !job->ended && feed_one(jobs, job);
-		job = fed ? jobs->live : job->next; /* the list may have changed */
+		job = fed ? jobs->live_jobs : job->next; /* the list may have changed */
 	}
-	jobs->feeding = false;
+	jobs->feeding_late_results = false;
 }

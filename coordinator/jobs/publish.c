@@ -21,7 +21,7 @@
 
 enum { HEADER_EFFECTS_MAX = 64 };
 
-static const char *const files[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_RESULT] = "result.exr"};
+static const char *const file_names[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_RESULT] = "result.exr"};
 
 static const char *end_name(enum job_end end)
 {
@@ -31,7 +31,7 @@ static const char *end_name(enum job_end end)
 				  : merge_end_name(MERGE_ROUNDS, false);
 }
 
-static void inputs_of(const Farm__Submit *m, struct plan_scene *out)
+static void collect_inputs(const Farm__Submit *m, struct plan_scene *out)
 {
 	*out = (struct plan_scene){.define_count = 0};
 	for (size_t i = 0; i < m->n_defines && i < PLAN_DEFINES_MAX; i++)
@@ -47,32 +47,32 @@ static bool scene_hash(const Farm__Submit *m, char hex[BLOB_HEX_SIZE])
 	for (size_t i = 0; i < m->n_files; i++)
 		if (strcmp(m->files[i]->name, m->scene) == 0 && m->files[i]->hash.len == sizeof h.bytes) {
 			memcpy(h.bytes, m->files[i]->hash.data, sizeof h.bytes);
-			blob_hex(&h, hex);
+			blob_hash_to_hex(&h, hex);
 			return true;
 		}
 	return false;
 }
 
-static int write_image(struct publishing *w)
+static int write_image(struct publish_task *w)
 {
 	const struct live_job *job = w->job;
-	const Farm__Submit *m = live_job_submit(job);
+	const Farm__Submit *m = live_job_submission(job);
 	const char *slash = strrchr(m->scene, '/');
 	struct header_effect effects[HEADER_EFFECTS_MAX];
 	struct plan_scene inputs;
 	char hex[BLOB_HEX_SIZE];
-	inputs_of(m, &inputs);
+	collect_inputs(m, &inputs);
 	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
 				 .scene_hash = scene_hash(m, hex) ? hex : NULL,
 				 .inputs = &inputs,
 				 .camera = m->camera,
 				 .scene_notes = job->record.scene_notes,
 				 .effects = effects,
-				 .mixed = m->mixed,
+				 .mixed_fingerprints = m->mixed,
 				 .wall_seconds = w->wall_seconds,
 				 .cpu_seconds = job->record.cpu_seconds,
-				 .workers = job->worker_count,
-				 .end = w->what == PUBLISH_RESULT ? end_name(w->end) : NULL};
+				 .worker_count = job->worker_count,
+				 .end_name = w->kind == PUBLISH_RESULT ? end_name(w->end) : NULL};
 	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
 		const Farm__Effect *f = m->effects[x.effect_count];
 		effects[x.effect_count] = (struct header_effect){f->name, f->on, f->forced, f->why, f->saves};
@@ -81,70 +81,71 @@ static int write_image(struct publishing *w)
 	size_t size = 0;
 	int rc = image_file_encode(&w->image, &job->plan, &x, &bytes, &size, &w->error);
 	if (!rc)
-		rc = spool_write(w->jobs->spool, job->id, files[w->what], bytes, size, &w->error);
+		rc = spool_write_job_file(w->jobs->spool, job->id, file_names[w->kind], bytes, size, &w->error);
 	mem_free(bytes);
 	return rc;
 }
 
-static void work_on_film(uv_work_t *work)
+static void run_publish_task(uv_work_t *work)
 {
-	struct publishing *w = work->data;
-	w->rc = canvas_image(w->job->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
+	struct publish_task *w = work->data;
+	w->rc = canvas_image_init(w->job->canvas, w->kind == PUBLISH_PREVIEW, &w->image, &w->error);
 	if (!w->rc)
 		convergence_judge(&w->job->plan, &w->image, &w->convergence);
-	if (!w->rc && w->what != PUBLISH_ERROR_ONLY)
+	if (!w->rc && w->kind != PUBLISH_ERROR_ONLY)
 		w->rc = write_image(w);
 }
 
 /* tell_error and tell_image make steps of the core, which may request the next image at once or end the job, so w may
  * be reused or freed. */
-static void tell_error(const struct publishing *w)
+static void tell_error(const struct publish_task *w)
 {
 	struct jobs *jobs = w->jobs;
 	bool doubtful;
 	double upper = stated_error_upper(&w->image, &doubtful);
 	struct event ev = {
-		.kind = EVENT_ERROR_KNOWN,
+		.kind = EVENT_ERROR_ESTIMATED,
 		.job = w->job->id,
-		.error_known = {.job = w->job->id,
-				.rounds = w->rounds,
-				.rel_error = w->rc ? NAN : upper,
-				.rel_mse = w->rc ? NAN : w->image.rel_mse,
-				.degrees = w->rc ? NAN : w->image.rel_mse_degrees,
-				.doubtful = !w->rc && doubtful,
-				.cpu_seconds = w->job->record.cpu_seconds - w->job->record.bootstrap_cpu_seconds,
-				.black = !w->rc && w->image.black}};
+		.error_estimated = {.job = w->job->id,
+				    .rounds = w->rounds,
+				    .rel_error = w->rc ? NAN : upper,
+				    .rel_mse = w->rc ? NAN : w->image.rel_mse,
+				    .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+				    .doubtful = !w->rc && doubtful,
+				    .cpu_seconds = w->job->record.cpu_seconds - w->job->record.bootstrap_cpu_seconds,
+				    .black = !w->rc && w->image.is_black}};
 	jobs_step(jobs, &ev);
-	durable_look(jobs, ev.job);
+	durable_store_look(jobs, ev.job);
 }
 
-static void tell_image(const struct publishing *w)
+static void tell_image(const struct publish_task *w)
 {
 	uint64_t job = w->job->id;
 	if (*w->convergence.text)
 		live_job_log(w->job, LOG_JOB_NOTE, "text=%s", log_quote(w->convergence.text).text);
-	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
-			   .job = job,
-			   .image_known = {.job = job, .disagrees = w->convergence.verdict == CHAINS_DISAGREE}};
+	struct event ev = {
+		.kind = EVENT_IMAGE_PUBLISHED,
+		.job = job,
+		.image_published = {.job = job, .chains_disagree = w->convergence.verdict == CHAINS_DISAGREE}};
 	jobs_step(w->jobs, &ev);
 }
 
 /* Keeps a job that the core has ended until the disk accepts the image. */
-static void cannot_write(struct publishing *w)
+static void note_write_failure(struct publish_task *w)
 {
 	struct live_job *job = w->job;
-	job->unpublished = true;
-	job->unpublished_rounds = w->rounds;
+	job->publish_pending = true;
+	job->publish_rounds = w->rounds;
 	if (disk_is_full(w->rc))
-		room_make(w->jobs);
-	job->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
+		room_evict(w->jobs);
+	job->retry_at = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(job->record.why, w->error.text) != 0)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
 			     log_quote(w->error.text).text);
 	text_copy(job->record.why, sizeof job->record.why, w->error.text);
 }
 
-static void has_written(struct live_job *job)
+static void note_written(struct live_job *job)
 {
 	job->record.has_result = true;
 	job->record.cleared = 0;
@@ -152,58 +153,58 @@ static void has_written(struct live_job *job)
 }
 
 /* Stores the outcome in the live job. */
-static void take_outcome(struct publishing *w)
+static void store_outcome(struct publish_task *w)
 {
 	struct live_job *job = w->job;
 	/* Every image states its error, whether the job has a target error or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
-		record_take_error(&job->record, &w->image);
+		record_set_error(&job->record, &w->image);
 	if (!w->rc)
-		record_take_convergence(&job->record, &w->image, &w->convergence);
-	if (w->what == PUBLISH_RESULT && !w->rc)
-		job->black = w->image.black;
-	if (w->what == PUBLISH_RESULT && w->rc)
-		cannot_write(w);
-	else if (w->what == PUBLISH_RESULT)
-		has_written(job);
+		record_set_convergence(&job->record, &w->image, &w->convergence);
+	if (w->kind == PUBLISH_RESULT && !w->rc)
+		job->black = w->image.is_black;
+	if (w->kind == PUBLISH_RESULT && w->rc)
+		note_write_failure(w);
+	else if (w->kind == PUBLISH_RESULT)
+		note_written(job);
 	else if (w->rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-	if (w->what == PUBLISH_PREVIEW)
-		job->preview_made = jobs_now(w->jobs);
+	if (w->kind == PUBLISH_PREVIEW)
+		job->preview_made_at = jobs_now(w->jobs);
 	canvas_image_fini(&w->image);
 }
 
-static void film_work_done(uv_work_t *work, int status)
+static void on_publish_done(uv_work_t *work, int status)
 {
-	struct publishing *w = work->data;
+	struct publish_task *w = work->data;
 	struct jobs *jobs = w->jobs;
 	uint64_t id = w->job->id;
 	assert(status == 0);
 	(void)status;
-	take_outcome(w);
+	store_outcome(w);
 	w->job->busy = false;
 	if (jobs->stopping)
 		return;
-	if (w->what == PUBLISH_ERROR_ONLY)
+	if (w->kind == PUBLISH_ERROR_ONLY)
 		tell_error(w);
-	else if (w->what == PUBLISH_RESULT && !w->rc)
+	else if (w->kind == PUBLISH_RESULT && !w->rc)
 		tell_image(w);
-	jobs_films_free(jobs);
-	jobs->peers.films_free(jobs->peers.user, id);
-	jobs->changes++;
+	jobs_notify_films_free(jobs);
+	jobs->peers.serve_previews(jobs->peers.user, id);
+	jobs->change_count++;
 }
 
-void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what what, uint64_t rounds)
+void publish_start(struct jobs *jobs, struct live_job *job, enum publish_kind kind, uint64_t rounds)
 {
 	assert(job && job->canvas);
 	assert(!job->busy);
-	struct publishing *w = &job->publishing;
-	*w = (struct publishing){.jobs = jobs, .job = job, .what = what, .rounds = rounds};
+	struct publish_task *w = &job->publishing;
+	*w = (struct publish_task){.jobs = jobs, .job = job, .kind = kind, .rounds = rounds};
 	struct job_status status; /* for the time from the first lease until now */
-	if (farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
+	if (farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;
 	}
 	job->busy = true;
-	jobs_in_pool(jobs, &w->work, w, work_on_film, film_work_done);
+	jobs_queue_work(jobs, &w->work, w, run_publish_task, on_publish_done);
 }

@@ -20,12 +20,12 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { NAMED_MOST = 8 /* lost jobs that the error names */ };
+enum { LOST_NAMES_MAX = 8 /* lost jobs that the error names */ };
 
-struct looking {
+struct reconciliation {
 	struct jobs *jobs;
-	uint64_t lost;	/* number of lost jobs */
-	char text[600]; /* their names */
+	uint64_t lost_count; /* number of lost jobs */
+	char text[600];	     /* their names */
 	struct text names;
 };
 
@@ -35,7 +35,7 @@ static void log_fault(uint64_t id, const char *what)
 }
 
 /* Moves the folder to spool/lost, so that an operator can look into it, and deletes the row. */
-static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct error *e)
+static int move_to_lost(struct reconciliation *l, uint64_t id, const char *why, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], lost[SPOOL_PATH_MAX], jobs[SPOOL_PATH_MAX], name[64];
@@ -43,12 +43,12 @@ static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct 
 	spool_job_path(spool, id, NULL, from);
 	spool_path(spool, "jobs", jobs);
 	spool_path(spool, "lost", lost);
-	int rc = ledger_forget(l->jobs->ledger, id, e);
+	int rc = ledger_delete(l->jobs->ledger, id, e);
 	if (rc || disk_stat(from, &st))
 		return rc;
 	rc = disk_make_folder(lost, e);
 	if (!rc)
-		rc = spool_write(spool, id, "why", why, strlen(why), e);
+		rc = spool_write_job_file(spool, id, "why", why, strlen(why), e);
 	for (unsigned n = 0; !rc; n++) {
 		snprintf(name, sizeof name, n ? "lost/j%llu.%u" : "lost/j%llu", (unsigned long long)id, n);
 		spool_path(spool, name, to);
@@ -60,12 +60,12 @@ static int move_to_lost(struct looking *l, uint64_t id, const char *why, struct 
 	return rc;
 }
 
-static int is_lost(struct looking *l, uint64_t id, const char *why, struct error *e)
+static int handle_lost_job(struct reconciliation *l, uint64_t id, const char *why, struct error *e)
 {
 	char text[400];
 	text_print(text, sizeof text, "j%llu (%s)", (unsigned long long)id, why);
-	if (l->lost++ < NAMED_MOST)
-		text_put(&l->names, "%s%s", l->lost > 1 ? ", " : "", text);
+	if (l->lost_count++ < LOST_NAMES_MAX)
+		text_appendf(&l->names, "%s%s", l->lost_count > 1 ? ", " : "", text);
 	if (!l->jobs->config.accept_loss) {
 		log_fault(id, why);
 		return 0;
@@ -77,9 +77,9 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 }
 
 /* Whether the job must have been accepted, because something of it was merged or made: returns 1, 0 or -errno.
- * started: a journal is enough, even an empty one. This is for a ledger that knows no job: otherwise an id is noted
- * in the ledger before the job gets a folder. A folder that cannot be read says nothing, hence -errno. */
-static int has_results(const struct spool *spool, uint64_t id, bool started, struct error *e)
+ * journal_suffices: a journal is enough, even an empty one. This is for a ledger that knows no job: otherwise an id is
+ * noted in the ledger before the job gets a folder. A folder that cannot be read says nothing, hence -errno. */
+static int check_results_exist(const struct spool *spool, uint64_t id, bool journal_suffices, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	struct stat st;
@@ -95,7 +95,7 @@ static int has_results(const struct spool *spool, uint64_t id, bool started, str
 		if (disk_stat(path, &st))
 			any = error_file(e, errno, path);
 		else
-			any = !journal || started || st.st_size > (off_t)JOURNAL_HEAD;
+			any = !journal || journal_suffices || st.st_size > (off_t)JOURNAL_HEAD_SIZE;
 	}
 	struct error fault;
 	int rc = disk_list_end(&l, 0, &fault);
@@ -105,32 +105,33 @@ static int has_results(const struct spool *spool, uint64_t id, bool started, str
 	return rc;
 }
 
-static int look_at(struct looking *l, uint64_t id, struct error *e)
+static int check_folder(struct reconciliation *l, uint64_t id, struct error *e)
 {
 	struct ledger_job j;
-	int rc = ledger_get(l->jobs->ledger, id, &j, e);
+	int rc = ledger_read_row(l->jobs->ledger, id, &j, e);
 	if (rc < 0)
 		return rc;
 	if (rc)
-		return j.damaged ? is_lost(l, id, "its rows in jobs.db and jobs-copy.db are damaged", e) : 0;
-	rc = has_results(l->jobs->spool, id, ledger_is_new(l->jobs->ledger), e);
+		return j.is_damaged ? handle_lost_job(l, id, "its rows in jobs.db and jobs-copy.db are damaged", e) : 0;
+	rc = check_results_exist(l->jobs->spool, id, ledger_is_new(l->jobs->ledger), e);
 	if (rc < 0)
 		return rc;
 	if (rc)
-		return is_lost(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results", e);
-	struct error left;
-	if (spool_drop_job(l->jobs->spool, id, &left)) /* a folder that cannot be deleted does no harm */
-		log_fault(id, left.text);
+		return handle_lost_job(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results",
+				       e);
+	struct error drop_error;
+	if (spool_delete_job(l->jobs->spool, id, &drop_error)) /* a folder that cannot be deleted does no harm */
+		log_fault(id, drop_error.text);
 	return 0;
 }
 
-static int look_at_folders(struct looking *l, struct error *e)
+static int check_folders(struct reconciliation *l, struct error *e)
 {
 	uint64_t *ids;
 	size_t count;
-	int rc = spool_jobs(l->jobs->spool, &ids, &count, e);
+	int rc = spool_list_jobs(l->jobs->spool, &ids, &count, e);
 	for (size_t i = 0; i < count && !rc; i++)
-		rc = look_at(l, ids[i], e);
+		rc = check_folder(l, ids[i], e);
 	if (!rc && count)
 		rc = ledger_skip_ids(l->jobs->ledger, ids[count - 1], e);
 	mem_free(ids);
@@ -138,22 +139,23 @@ static int look_at_folders(struct looking *l, struct error *e)
 }
 
 /* Looks at rows without a folder. Live jobs among them fail later with a sentence (recovery.c). */
-static int look_at_rows(struct looking *l, struct error *e)
+static int check_rows(struct reconciliation *l, struct error *e)
 {
 	struct ledger_job j;
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
 	uint64_t *ids;
 	size_t count;
-	int rc = ledger_ids(l->jobs->ledger, LEDGER_ALL, &ids, &count, e);
+	int rc = ledger_list_ids(l->jobs->ledger, LEDGER_ALL, &ids, &count, e);
 	for (size_t i = 0; i < count && !rc; i++) {
 		spool_job_path(l->jobs->spool, ids[i], NULL, path);
-		if (disk_stat(path, &st) == 0) /* look_at has read its row */
+		if (disk_stat(path, &st) == 0) /* check_folder has read its row */
 			continue;
-		rc = ledger_get(l->jobs->ledger, ids[i], &j, e);
+		rc = ledger_read_row(l->jobs->ledger, ids[i], &j, e);
 		if (rc > 0)
-			rc = j.damaged
-				     ? is_lost(l, ids[i],
+			rc = j.is_damaged
+				     ? handle_lost_job(
+					       l, ids[i],
 					       "its rows in jobs.db and jobs-copy.db are damaged, and its folder is missing",
 					       e)
 				     : 0;
@@ -162,23 +164,23 @@ static int look_at_rows(struct looking *l, struct error *e)
 	return rc;
 }
 
-int reconcile(struct jobs *jobs, struct error *e)
+int reconcile_spool(struct jobs *jobs, struct error *e)
 {
-	struct looking l = {.jobs = jobs};
+	struct reconciliation l = {.jobs = jobs};
 	l.names = (struct text){l.text, sizeof l.text};
-	int rc = ledger_open(&jobs->ledger, jobs->config.spool, e);
+	int rc = ledger_open(&jobs->ledger, jobs->config.spool_folder, e);
 	if (!rc)
 		rc = import_files(jobs, e);
 	if (!rc)
-		rc = look_at_folders(&l, e);
+		rc = check_folders(&l, e);
 	if (!rc)
-		rc = look_at_rows(&l, e);
-	if (rc || !l.lost || jobs->config.accept_loss)
+		rc = check_rows(&l, e);
+	if (rc || !l.lost_count || jobs->config.accept_loss)
 		return rc;
 	return error_set(
 		e, EBADMSG,
 		"%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with "
 		"--accept-loss: what is left of them is then moved to lost/ in the spool, and the other jobs continue",
-		jobs->config.spool, (unsigned long long)l.lost, l.lost == 1 ? "" : "s", l.text,
-		l.lost > NAMED_MOST ? ", ..." : "");
+		jobs->config.spool_folder, (unsigned long long)l.lost_count, l.lost_count == 1 ? "" : "s", l.text,
+		l.lost_count > LOST_NAMES_MAX ? ", ..." : "");
 }

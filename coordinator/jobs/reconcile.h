@@ -9,6 +9,6 @@
 
 #include "coordinator/live_job/jobs.h"
 
-int reconcile(struct jobs *jobs, struct error *e); /* -EBADMSG: something is lost */
+int reconcile_spool(struct jobs *jobs, struct error *e); /* -EBADMSG: something is lost */
 
 #endif

@@ -17,7 +17,7 @@
 #include "common/base/text.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/restore.h"
-#include "coordinator/retention/ages.h"
+#include "coordinator/retention/observed_time.h"
 #include "coordinator/retention/keep.h"
 #include "coordinator/store/journal_file.h"
 
@@ -28,44 +28,45 @@
 struct recovery {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct recovering_job **last, *at; /* last: end of the list jobs.found; at: the job being read, NULL: none */
-	uint64_t bytes, read;		   /* bytes to read for all jobs; bytes of the jobs that have been read */
-	bool under_way;
+	struct recovering_job **tail,
+		*current; /* tail: end of the list jobs.found; current: the job being read, NULL: none */
+	uint64_t total_bytes, bytes_read; /* bytes to read for all jobs; bytes of the jobs that have been read */
+	bool is_reading;
 	int rc; /* result for the job just read */
 	struct error error;
 };
 
-bool recovery_is_on(const struct jobs *jobs)
+bool recovery_is_running(const struct jobs *jobs)
 {
 	return jobs->recovery != NULL;
 }
 
-double recovery_share(const struct jobs *jobs)
+double recovery_progress(const struct jobs *jobs)
 {
 	const struct recovery *r = jobs->recovery;
-	uint64_t read = r->read + (r->at ? atomic_load(&r->at->progress.read) : 0);
-	return r->bytes > 0 && read < r->bytes ? (double)read / (double)r->bytes : 1;
+	uint64_t read = r->bytes_read + (r->current ? atomic_load(&r->current->progress.bytes_read) : 0);
+	return r->total_bytes > 0 && read < r->total_bytes ? (double)read / (double)r->total_bytes : 1;
 }
 
-static double share_of(const struct recovering_job *f)
+static double read_fraction(const struct recovering_job *f)
 {
-	uint64_t read = atomic_load(&f->progress.read);
+	uint64_t read = atomic_load(&f->progress.bytes_read);
 	return read < f->bytes ? (double)read / (double)f->bytes : 1;
 }
 
 static void fill_view(const struct recovering_job *f, struct job_view *v)
 {
-	view_of_record(v, &f->record);
-	v->reading = share_of(f);
+	view_from_record(v, &f->record);
+	v->reading = read_fraction(f);
 	text_copy(v->record.state, sizeof v->record.state, "reading");
 	text_print(v->waiting, sizeof v->waiting, "reading, %u %%: its results are read from the spool",
 		   (unsigned)(100 * v->reading));
 	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 }
 
-bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
+bool recovery_get_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 {
-	const struct recovering_job *f = jobs->found;
+	const struct recovering_job *f = jobs->recovering_jobs;
 	while (f && f->record.id != job)
 		f = f->next;
 	if (f)
@@ -73,10 +74,10 @@ bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 	return f != NULL;
 }
 
-size_t recovery_views(const struct jobs *jobs, struct job_view *v)
+size_t recovery_list_views(const struct jobs *jobs, struct job_view *v)
 {
 	size_t n = 0;
-	for (const struct recovering_job *f = jobs->found; f; f = f->next, n++)
+	for (const struct recovering_job *f = jobs->recovering_jobs; f; f = f->next, n++)
 		if (v)
 			fill_view(f, &v[n]);
 	return n;
@@ -84,7 +85,7 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 
 /* Puts damaged files of a job aside. Its batches can be computed again, with the same bits. Nothing is deleted, since
  * somebody may want to look at the files. Returns -errno if a file is still where it was, and would be read again. */
-static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e)
+static int set_damaged_aside(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], damaged[SPOOL_PATH_MAX];
 	spool_job_path(jobs->spool, job->id, NULL, folder);
@@ -92,7 +93,7 @@ static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e
 	spool_job_path(jobs->spool, job->id, "checkpoint.damaged", damaged);
 	if (disk_rename(path, damaged) && errno != ENOENT)
 		return error_file(e, errno, path);
-	int rc = journal_keep_damaged(folder, e);
+	int rc = journal_rename_damaged(folder, e);
 	if (rc)
 		return rc;
 	live_job_log(job, LOG_SPOOL_FAULT,
@@ -103,12 +104,12 @@ static int keep_damaged(struct jobs *jobs, struct live_job *job, struct error *e
 
 /* Whether this is an error of the stored data and not of the machine, so that it would recur at every start. ENOENT:
  * the folder is missing. */
-static bool is_lasting(int rc)
+static bool is_permanent_error(int rc)
 {
 	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
 }
 
-static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
+static void record_failure(struct jobs *jobs, struct job_record *r, const char *why)
 {
 	struct error e;
 	text_copy(r->state, sizeof r->state, "failed");
@@ -116,36 +117,36 @@ static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 	text_copy(r->why, sizeof r->why, why);
 	r->exit_code = 3;
 	r->ended = (double)time(NULL);
-	r->ended_seen = ages_now(jobs);
+	r->ended_seen = observed_time_now(jobs);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (ledger_end(jobs->ledger, r, false, &e))
+	if (ledger_end_job(jobs->ledger, r, false, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	ended_jobs_add(jobs, r);
 }
 
 /* Fails the job if its error would recur at every start; otherwise returns the error, which is one of the machine. */
-static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, struct error *e)
+static int fail_if_permanent(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, struct error *e)
 {
 	struct error why = *e;
-	bool there;
-	if (!is_lasting(rc))
+	bool exists;
+	if (!is_permanent_error(rc))
 		return error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	struct job_record *r = mem_alloc(1, sizeof *r);
-	rc = r ? restore_record(jobs, id, r, &there, e) : error_set(e, ENOMEM, "no memory for the jobs");
-	if (!rc && !there)
-		record_begin(r, id, "", "");
+	rc = r ? restore_record(jobs, id, r, &exists, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	if (!rc && !exists)
+		record_init(r, id, "", "");
 	if (!rc) {
 		r->extended = extended;
-		write_end(jobs, r, why.text);
+		record_failure(jobs, r, why.text);
 	}
 	mem_free(r);
 	return rc;
 }
 
-static void fail(struct jobs *jobs, int rc, const struct error *e)
+static void stop_with_error(struct jobs *jobs, int rc, const struct error *e)
 {
-	jobs->fault = rc;
-	jobs->fault_error = *e;
+	jobs->fatal_code = rc;
+	jobs->fatal_error = *e;
 	jobs->stop(jobs->stop_user);
 }
 
@@ -159,24 +160,24 @@ static void on_trim(uv_idle_t *h)
 }
 
 /* All jobs have been read: tells the core of them, in order. */
-static int finish(struct jobs *jobs, struct error *e)
+static int finish_recovery(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
 	int rc = 0;
-	for (struct recovering_job *f; !rc && (f = jobs->found);) {
+	for (struct recovering_job *f; !rc && (f = jobs->recovering_jobs);) {
 		struct ledger_job j;
 		struct live_job *job = f->job;
 		uint64_t id = job->id;
-		jobs->found = f->next;
-		job->next = jobs->live;
-		jobs->live = job;
+		jobs->recovering_jobs = f->next;
+		job->next = jobs->live_jobs;
+		jobs->live_jobs = job;
 		mem_free(f);
-		rc = ledger_get(jobs->ledger, job->id, &j, e);
-		rc = rc > 0   ? restore_tell(jobs, job, j.held, 0, e)
+		rc = ledger_read_row(jobs->ledger, job->id, &j, e);
+		rc = rc > 0   ? restore_tell_core(jobs, job, j.holder, 0, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is missing");
-		if (!rc && (job = jobs_find(jobs, id))) /* the job may have ended at once */
-			files_look(jobs, job);
+		if (!rc && (job = jobs_find_live(jobs, id))) /* the job may have ended at once */
+			files_update_hold(jobs, job);
 		if (rc)
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	}
@@ -184,36 +185,36 @@ static int finish(struct jobs *jobs, struct error *e)
 		return rc;
 	mem_free(r);
 	jobs->recovery = NULL;
-	jobs->changes++;
-	uv_idle_start(&jobs->trim, on_trim); /* by now live jobs hold their files */
-	keep_trim(jobs);
-	jobs->peers.jobs_read(jobs->peers.user);
+	jobs->change_count++;
+	uv_idle_start(&jobs->trim_idle, on_trim); /* by now live jobs hold their files */
+	keep_trim_films(jobs);
+	jobs->peers.resume_requests(jobs->peers.user);
 	return 0;
 }
 
 static void read_films(uv_work_t *work)
 {
 	struct recovery *r = work->data;
-	r->rc = replay_films(r->jobs->spool, r->at->job, &r->at->progress, &r->error);
+	r->rc = replay_films(r->jobs->spool, r->current->job, &r->current->progress, &r->error);
 }
 
-static void films_read(uv_work_t *work, int status);
+static void on_films_read(uv_work_t *work, int status);
 
 /* Starts to read the next job, or finishes. */
 static int read_next(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
-	if (!r->at)
-		return finish(jobs, e);
-	r->at->job->film_folder = jobs_film_folder(jobs, &r->at->job->plan);
-	r->under_way = true;
-	jobs_in_pool(jobs, &r->work, r, read_films, films_read);
+	if (!r->current)
+		return finish_recovery(jobs, e);
+	r->current->job->film_folder = jobs_film_folder(jobs, &r->current->job->plan);
+	r->is_reading = true;
+	jobs_queue_work(jobs, &r->work, r, read_films, on_films_read);
 	return 0;
 }
 
-static void remove_found(struct recovery *r, struct recovering_job *f)
+static void remove_recovering_job(struct recovery *r, struct recovering_job *f)
 {
-	struct recovering_job **at = &r->jobs->found;
+	struct recovering_job **at = &r->jobs->recovering_jobs;
 	while (*at != f)
 		at = &(*at)->next;
 	*at = f->next;
@@ -221,36 +222,36 @@ static void remove_found(struct recovery *r, struct recovering_job *f)
 }
 
 /* Handles a job that could not be read. Returns 0 if it is to be read again, or has failed for good. */
-static int take_failure(struct jobs *jobs, struct error *e)
+static int handle_failure(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
-	struct recovering_job *f = r->at;
+	struct recovering_job *f = r->current;
 	struct ledger_job j;
 	uint64_t id = f->record.id, extended = f->job->record.extended;
 	int rc = r->rc;
 	*e = r->error;
 	live_job_log(f->job, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	bool anew = rc == -EBADMSG && !f->anew;
-	if (anew && (rc = keep_damaged(jobs, f->job, e)))
-		anew = false;
-	restore_drop(jobs, f->job);
+	bool start_over = rc == -EBADMSG && !f->is_starting_over;
+	if (start_over && (rc = set_damaged_aside(jobs, f->job, e)))
+		start_over = false;
+	restore_drop_job(jobs, f->job);
 	f->job = NULL;
-	if (anew) {
-		f->anew = true;
-		rc = ledger_get(jobs->ledger, id, &j, e);
+	if (start_over) {
+		f->is_starting_over = true;
+		rc = ledger_read_row(jobs->ledger, id, &j, e);
 		rc = rc > 0   ? restore_live_job(jobs, &j, &f->job, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is missing");
 		if (!rc)
 			return 0;
 	}
-	r->at = f->next;
-	r->read += f->bytes;
-	remove_found(r, f);
-	return give_up(jobs, id, extended, rc, e);
+	r->current = f->next;
+	r->bytes_read += f->bytes;
+	remove_recovering_job(r, f);
+	return fail_if_permanent(jobs, id, extended, rc, e);
 }
 
-static void films_read(uv_work_t *work, int status)
+static void on_films_read(uv_work_t *work, int status)
 {
 	struct recovery *r = work->data;
 	struct jobs *jobs = r->jobs;
@@ -258,22 +259,22 @@ static void films_read(uv_work_t *work, int status)
 	int rc = 0;
 	assert(status == 0);
 	(void)status;
-	r->under_way = false;
+	r->is_reading = false;
 	if (jobs->stopping)
 		return;
 	if (r->rc) {
-		rc = take_failure(jobs, &e);
+		rc = handle_failure(jobs, &e);
 	} else {
-		r->read += r->at->bytes;
-		r->at = r->at->next;
+		r->bytes_read += r->current->bytes;
+		r->current = r->current->next;
 	}
 	if (!rc)
 		rc = read_next(jobs, &e);
 	if (rc)
-		fail(jobs, rc, &e);
+		stop_with_error(jobs, rc, &e);
 }
 
-static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error *e)
+static int add_recovering_job(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
 	struct recovering_job *f = mem_alloc(1, sizeof *f);
@@ -283,15 +284,15 @@ static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error
 	int rc = restore_live_job(jobs, j, &f->job, e);
 	if (rc) {
 		mem_free(f);
-		return give_up(jobs, id, extended, rc, e);
+		return fail_if_permanent(jobs, id, extended, rc, e);
 	}
 	f->record = f->job->record;
 	/* Whoever reads the files will meet and report an error; here they only count for the progress. */
-	struct error unread;
-	spool_film_bytes(jobs->spool, id, 2, &f->bytes, &unread);
-	r->bytes += f->bytes;
-	*r->last = f;
-	r->last = &f->next;
+	struct error ignored;
+	spool_film_bytes(jobs->spool, id, 2, &f->bytes, &ignored);
+	r->total_bytes += f->bytes;
+	*r->tail = f;
+	r->tail = &f->next;
 	return 0;
 }
 
@@ -302,22 +303,22 @@ int recovery_begin(struct jobs *jobs, struct error *e)
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	r->jobs = jobs;
-	r->last = &jobs->found;
+	r->tail = &jobs->recovering_jobs;
 	for (size_t i = 0; i < jobs->restored_count; i++) {
-		int rc = ledger_get(jobs->ledger, jobs->restored[i], &j, e);
+		int rc = ledger_read_row(jobs->ledger, jobs->restored_ids[i], &j, e);
 		if (rc > 0)
-			rc = add_found(jobs, &j, e);
+			rc = add_recovering_job(jobs, &j, e);
 		if (rc)
 			return rc;
 	}
-	r->at = jobs->found;
+	r->current = jobs->recovering_jobs;
 	return read_next(jobs, e);
 }
 
 void recovery_stop(struct jobs *jobs)
 {
-	for (struct recovering_job *f = jobs->found; f; f = f->next)
-		atomic_store(&f->progress.stop, true);
+	for (struct recovering_job *f = jobs->recovering_jobs; f; f = f->next)
+		atomic_store(&f->progress.stop_requested, true);
 }
 
 void recovery_close(struct jobs *jobs)
@@ -325,13 +326,13 @@ void recovery_close(struct jobs *jobs)
 	struct recovery *r = jobs->recovery;
 	if (!r)
 		return;
-	assert(!r->under_way);
-	while (jobs->found) {
-		struct recovering_job *next = jobs->found->next;
-		if (jobs->found->job)
-			live_job_free(jobs->found->job);
-		mem_free(jobs->found);
-		jobs->found = next;
+	assert(!r->is_reading);
+	while (jobs->recovering_jobs) {
+		struct recovering_job *next = jobs->recovering_jobs->next;
+		if (jobs->recovering_jobs->job)
+			live_job_free(jobs->recovering_jobs->job);
+		mem_free(jobs->recovering_jobs);
+		jobs->recovering_jobs = next;
 	}
 	mem_free(r);
 	jobs->recovery = NULL;

@@ -26,65 +26,67 @@
 #include "coordinator/jobs/step.h"
 
 /* Refuses a result through no fault of the worker. Its lease is computed again. */
-static void refuse(struct jobs *jobs, uint64_t peer, const struct lease_key *k, const char *why)
+static void refuse_result(struct jobs *jobs, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
-	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
+	jobs->peers.acknowledge_result(jobs->peers.user, peer, k, ACK_REFUSED, why);
 	jobs_step(jobs, &ev);
 }
 
-static void fail(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k, const char *why)
+static void fail_result(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
+			const char *why)
 {
-	const char *name = jobs->peers.name(jobs->peers.user, peer);
+	const char *name = jobs->peers.peer_name(jobs->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
 	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s " LEASE_FORMAT, log_quote(name ? name : "?").text,
 		     log_quote(why).text, LEASE_VALUES(k));
-	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
+	jobs->peers.acknowledge_result(jobs->peers.user, peer, k, ACK_REFUSED, why);
 	jobs_step(jobs, &ev);
 }
 
-static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
+static void handle_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
 	struct error e = {""};
 	struct batch batch = {0};
 	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
-		jobs->peers.fault(jobs->peers.user, peer, e.text);
+		jobs->peers.fault_peer(jobs->peers.user, peer, e.text);
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *job = jobs_find(jobs, ev.job);
+	struct live_job *job = jobs_find_live(jobs, ev.job);
 	int rc = job ? batch_unpack(&batch, &job->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (job && !rc && batch.state_count && !m->states_digest.len)
 		rc = error_set(&e, EBADMSG, "chain states without a digest");
-	if (job && !rc && farm_verifies(jobs->farm, &ev.lease.key))
+	if (job && !rc && farm_lease_is_verified(jobs->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (job && !rc && job->canvas && batch.key.kind == LEASE_RENDER)
-		rc = canvas_admits(job->canvas, &batch, &e);
+		rc = canvas_check_range(job->canvas, &batch, &e);
 	if (rc == -ERANGE) { /* treated as a failed lease, because the results of all workers may be like that */
-		fail(jobs, job, peer, &ev.lease.key, e.text);
+		fail_result(jobs, job, peer, &ev.lease.key, e.text);
 		batch_fini(&batch);
 		return;
 	}
-	struct peer_status from;
-	struct worker_status who;
+	struct peer_status peer_info;
+	struct worker_status worker;
 	Farm__LeaseResult stored = *m;
 	Farm__Maker maker;
 	farm__maker__init(&maker);
-	bool known = farm_peer(jobs->farm, peer, &from) && farm_worker(jobs->farm, from.who, &who);
-	if (known) {
-		maker.name = text_borrow(who.name);
-		maker.certificate = text_borrow(who.certificate);
-		maker.home = text_borrow(who.home);
-		maker.restarts = who.restarts;
+	bool is_known = farm_peer_status(jobs->farm, peer, &peer_info) &&
+			farm_worker_status(jobs->farm, peer_info.worker_id, &worker);
+	if (is_known) {
+		maker.name = text_unconst(worker.name);
+		maker.certificate = text_unconst(worker.certificate);
+		maker.home = text_unconst(worker.home);
+		maker.restarts = worker.restarts;
 	}
-	stored.maker = known ? &maker : NULL;
+	stored.maker = is_known ? &maker : NULL;
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
 	/* No room for the result, in memory or on the disk. */
-	if (rc == -ENOMEM || (job && ev.lease.valid && durable_reserve(jobs, job, &in, &e)))
-		refuse(jobs, peer, &ev.lease.key, e.text);
+	if (rc == -ENOMEM || (job && ev.lease.valid && durable_reserve_result(jobs, job, &in, &e)))
+		refuse_result(jobs, peer, &ev.lease.key, e.text);
 	else
 		jobs_step_with(jobs, &ev, &in);
 	batch_fini(&batch);
@@ -94,47 +96,50 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 static bool has_room(const struct jobs *jobs, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
-	for (const struct live_job *job = jobs->live; job; job = job->next)
+	for (const struct live_job *job = jobs->live_jobs; job; job = job->next)
 		bytes += job->waiting_bytes;
-	return bytes <= jobs->config.waiting_bytes;
+	return bytes <= jobs->config.max_waiting_bytes;
 }
 
 /* Keeps a result that arrives while the films are in use, if the core would merge it: one for each lease that its
  * worker holds, and one for a lease that the worker does not hold. */
-static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
-		    struct envelope *env, struct buf *payload)
+static void defer_result(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
+			 struct envelope *env, struct buf *payload)
 {
-	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
-	enum farm_delivery awaited = answer_awaits(jobs->farm, peer, k);
-	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
+	struct event ev = {
+		.kind = EVENT_BATCH_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
+	enum farm_delivery awaited = answer_delivery(jobs->farm, peer, k);
+	const struct waiting_message *w = awaited == DELIVERY_OPEN ? live_job_find_waiting(job, k) : NULL;
 	if (w && w->peer == peer) /* the acknowledgement of the waiting result will do for this one, too */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(jobs, payload) || !live_job_put_off(job, peer, k, env, payload, false)) {
-		refuse(jobs, peer, k,
-		       w ? "another worker's result of this lease is waiting" : "no room for more waiting results");
+	else if (w || !has_room(jobs, payload) || !live_job_enqueue_message(job, peer, k, env, payload, false)) {
+		refuse_result(jobs, peer, k,
+			      w ? "another worker's result of this lease is waiting"
+				: "no room for more waiting results");
 		return;
 	}
 	jobs_step(jobs, &ev);
 }
 
-/* Logs a failed lease. holds: the worker holds the lease and refuses its current states; otherwise no maker is named.
+/* Logs a failed lease. holds_lease: the worker holds the lease and refuses its current states; otherwise no maker is
+ * named.
  */
 static void log_failure(const struct jobs *jobs, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
-			const struct lease_key *k, const char *text, bool holds)
+			const struct lease_key *k, const char *text, bool holds_lease)
 {
-	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
+	struct log_value name = log_quote(from ? from : "?"), quoted_text = log_quote(text);
 	if (f->bad_states)
 		live_job_log(job, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s " LEASE_FORMAT,
-			     log_quote(holds ? doubt_maker(jobs->farm, k) : "?").text, name.text, said.text,
-			     LEASE_VALUES(k));
+			     log_quote(holds_lease ? doubt_maker_name(jobs->farm, k) : "?").text, name.text,
+			     quoted_text.text, LEASE_VALUES(k));
 	else
 		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s " LEASE_FORMAT, name.text, f->own,
-			     said.text, LEASE_VALUES(k));
+			     quoted_text.text, LEASE_VALUES(k));
 }
 
-static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)
+static void handle_lease_failed(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)
 {
 	struct error e;
 	char text[1024];
@@ -144,105 +149,106 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	text_copy(text, sizeof text, f->text);
 	text_clean(text);
 	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
-	    (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
-		jobs->peers.fault(jobs->peers.user, peer, "an invalid key or digest of a failed lease");
+	    (f->bad_states && chain_states_digest_from_wire(&f->states_digest, &states, &e))) {
+		jobs->peers.fault_peer(jobs->peers.user, peer, "an invalid key or digest of a failed lease");
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *job = jobs_find(jobs, ev.job);
-	ev.lease.own = f->own;
-	ev.lease.later = f->later;
+	struct live_job *job = jobs_find_live(jobs, ev.job);
+	ev.lease.worker_at_fault = f->own;
+	ev.lease.memory_full = f->later;
 	ev.lease.bad_states = f->bad_states;
-	ev.lease.other_states = f->bad_states && !(job && live_job_gives_states(job, &ev.lease.key, &states));
+	ev.lease.states_outdated = f->bad_states && !(job && live_job_states_match(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (job && *f->text && !blamed && answer_counts(jobs->farm, peer, &ev.lease.key) &&
-	    !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
+	if (job && *f->text && !blamed && answer_failure_counts(jobs->farm, peer, &ev.lease.key) &&
+	    !files_are_intact(jobs, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
-	struct rollback back = {0};
-	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
-		     !ev.lease.other_states; /* otherwise no batch is read for it */
-	/* Failures with `later` may come every few seconds: the status shows them, but they are not logged. */
+	struct rollback rollback = {0};
+	bool holds_lease = answer_delivery(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
+			   !ev.lease.states_outdated; /* otherwise no batch is read for it */
+	/* Failures with `memory_full` may come every few seconds: the status shows them, but they are not logged. */
 	if (job && *text && !f->later)
-		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
-	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
+		log_failure(jobs, jobs->peers.peer_name(jobs->peers.user, peer), job, f, &ev.lease.key, text,
+			    holds_lease);
+	if (job && *text && f->bad_states && holds_lease && !job->busy && !jobs->stepping &&
 	    journal_write(job->journal, &e) == 0)
-		ev.lease.can_take_back = rollback_read(job, job->journal, &ev.lease.key, &back, &e) == 0;
-	if (ev.lease.can_take_back)
-		jobs_step_with(jobs, &ev, &(struct incoming){.back = &back});
+		ev.lease.can_roll_back = rollback_read(job, job->journal, &ev.lease.key, &rollback, &e) == 0;
+	if (ev.lease.can_roll_back)
+		jobs_step_with(jobs, &ev, &(struct incoming){.rollback = &rollback});
 	else
 		jobs_step(jobs, &ev);
-	rollback_fini(&back);
+	rollback_fini(&rollback);
 }
 
 /* Has the job's files read, once, before a failure counts that the spool may be to blame for. Returns false if they
  * have been read. */
-static bool awaits_files(struct jobs *jobs, struct live_job *job, bool *checked)
+static bool must_await_files(struct jobs *jobs, struct live_job *job, bool *checked)
 {
 	if (*checked)
 		return false;
 	const uint64_t id = job->id;
-	bool reading = files_are_read(jobs, job); /* perhaps since before the failure */
+	bool reading = files_are_being_read(jobs, job); /* perhaps since before the failure */
 	if (!reading)
-		files_read(jobs, job);
+		files_reread(jobs, job);
 	*checked = !reading;
-	job = jobs_find(jobs, id);
-	return job && files_are_read(jobs, job);
+	job = jobs_find_live(jobs, id);
+	return job && files_are_being_read(jobs, job);
 }
 
 /* Handles a failed lease. Refused states are handled when no thread reads the films. No file is read for a failure
- * that does not count, since anybody can send many of them. checked: as in struct waiting_batch. */
-static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload, bool checked)
+ * that does not count, since anybody can send many of them. checked: as in struct waiting_message. */
+static void handle_failure(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload, bool checked)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
-	struct live_job *job = m->key ? jobs_find(jobs, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find_live(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	bool waits = false;
-	if (job && lease_key_from_wire(m->key, &k, &e) == 0 && answer_counts(jobs->farm, peer, &k))
-		waits = m->bad_states ? job->busy : *m->text && !m->own && awaits_files(jobs, job, &checked);
+	if (job && lease_key_from_wire(m->key, &k, &e) == 0 && answer_failure_counts(jobs->farm, peer, &k))
+		waits = m->bad_states ? job->busy : *m->text && !m->own && must_await_files(jobs, job, &checked);
 	if (!waits) {
-		if (jobs->peers.name(jobs->peers.user, peer))
-			fail_lease(jobs, peer, m);
-	} else if (!has_room(jobs, payload) || !live_job_put_off(job, peer, &k, env, payload, checked)) {
-		refuse(jobs, peer, &k, "no room for more waiting results");
+		if (jobs->peers.peer_name(jobs->peers.user, peer))
+			handle_lease_failed(jobs, peer, m);
+	} else if (!has_room(jobs, payload) || !live_job_enqueue_message(job, peer, &k, env, payload, checked)) {
+		refuse_result(jobs, peer, &k, "no room for more waiting results");
 	}
 }
 
-void results_take_waiting(struct jobs *jobs, struct waiting_batch *w)
+void results_handle_waiting(struct jobs *jobs, struct waiting_message *w)
 {
 	if (w->envelope.message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED)
-		take_failure(jobs, w->peer, &w->envelope, &w->payload, w->checked);
+		handle_failure(jobs, w->peer, &w->envelope, &w->payload, w->files_checked);
 	else
-		results_take(jobs, w->peer, &w->envelope, &w->payload);
+		results_handle(jobs, w->peer, &w->envelope, &w->payload);
 }
 
-void results_let_go(struct jobs *jobs, uint64_t peer)
+void results_release_peer(struct jobs *jobs, uint64_t peer)
 {
-	for (struct live_job *job = jobs->live; job;) {
-		struct waiting_batch *w = live_job_take_failure(job, peer);
+	for (struct live_job *job = jobs->live_jobs; job;) {
+		struct waiting_message *w = live_job_pop_failure(job, peer);
 		if (w) {
-			take_failure(jobs, peer, &w->envelope, &w->payload, true);
-			waiting_batch_free(w);
+			handle_failure(jobs, peer, &w->envelope, &w->payload, true);
+			waiting_message_free(w);
 		}
-		job = w ? jobs->live : job->next; /* the list may have changed */
+		job = w ? jobs->live_jobs : job->next; /* the list may have changed */
 	}
-	live_jobs_drop_waiting(jobs->live, peer);
+	live_jobs_drop_waiting(jobs->live_jobs, peer);
 }
 
-void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
+void results_handle(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	if (env->message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED) {
-		take_failure(jobs, peer, env, payload, false);
+		handle_failure(jobs, peer, env, payload, false);
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;
-	struct live_job *job = m->key ? jobs_find(jobs, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find_live(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (job && job->busy && lease_key_from_wire(m->key, &k, &e) == 0)
-		put_off(jobs, job, peer, &k, env, payload);
+		defer_result(jobs, job, peer, &k, env, payload);
 	else
-		take_result(jobs, peer, m, payload);
+		handle_result(jobs, peer, m, payload);
 }

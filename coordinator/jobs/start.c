@@ -5,8 +5,8 @@
  * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read the
  * jobs that have not (recovery.c). After each step of the core: finishes jobs that have ended, merges results that
  * waited for others, and starts a checkpoint if one is due. When films are free again: the same without checkpoints;
- * then results that arrived while the films were read follow, one in each turn of the loop, by `drain`. An error of
- * the spool ends the start with a sentence; jobs_close then closes what was opened.
+ * then results that arrived while the films were read follow, one in each turn of the loop, by `drain_idle`. An error
+ * of the spool ends the start with a sentence; jobs_close then closes what was opened.
  */
 #include "coordinator/jobs/start.h"
 
@@ -25,7 +25,7 @@
 #include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
-#include "coordinator/retention/ages.h"
+#include "coordinator/retention/observed_time.h"
 #include "coordinator/retention/clear.h"
 #include "coordinator/retention/keep.h"
 
@@ -33,68 +33,69 @@
 static void on_drain(uv_idle_t *h)
 {
 	struct jobs *jobs = h->data;
-	struct live_job *job = jobs->live;
-	while (job && (job->busy || STAILQ_EMPTY(&job->waiting) || files_are_read(jobs, job)))
+	struct live_job *job = jobs->live_jobs;
+	while (job && (job->busy || STAILQ_EMPTY(&job->waiting) || files_are_being_read(jobs, job)))
 		job = job->next;
 	if (!job) {
 		uv_idle_stop(h);
 		return;
 	}
-	struct waiting_batch *w = live_job_take_waiting(job);
-	results_take_waiting(jobs, w);
-	waiting_batch_free(w);
+	struct waiting_message *w = live_job_pop_waiting(job);
+	results_handle_waiting(jobs, w);
+	waiting_message_free(w);
 }
 
 static void on_step(struct jobs *jobs)
 {
 	finish_ended(jobs);
 	late_feed(jobs);
-	checkpoint_where_due(jobs);
+	checkpoint_start_due(jobs);
 }
 
-static void films_free(struct jobs *jobs)
+static void on_films_free(struct jobs *jobs)
 {
 	if (!jobs->stopping)
-		uv_idle_start(&jobs->drain, on_drain);
+		uv_idle_start(&jobs->drain_idle, on_drain);
 	finish_ended(jobs);
 	late_feed(jobs);
 }
 
-static const struct follow_up follow_up = {.carry_out = dispatch_update, .stepped = on_step, .films_free = films_free};
+static const struct step_handlers step_handlers = {
+	.carry_out = dispatch_update, .step_done = on_step, .films_free = on_films_free};
 
 static bool drop_films(void *jobs)
 {
-	return keep_drop_all(jobs);
+	return keep_drop_all_films(jobs);
 }
 
 int jobs_open(struct jobs *jobs, struct error *e)
 {
 	struct farm_config config;
-	int rc = spool_open(&jobs->spool, jobs->config.spool, e);
+	int rc = spool_open(&jobs->spool, jobs->config.spool_folder, e);
 	if (!rc)
-		rc = blob_store_open(&jobs->blobs, spool_blobs(jobs->spool), jobs->config.blob_bytes, e);
+		rc = blob_store_open(&jobs->blobs, spool_blob_folder(jobs->spool), jobs->config.max_blob_bytes, e);
 	if (!rc) {
-		blob_store_ask(jobs->blobs, drop_films, jobs);
-		rc = reconcile(jobs, e);
+		blob_store_set_full_handler(jobs->blobs, drop_films, jobs);
+		rc = reconcile_spool(jobs, e);
 	}
 	if (!rc)
-		ages_open(jobs);
+		observed_time_open(jobs);
 	if (!rc)
-		rc = ledger_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored, &jobs->restored_count, e);
+		rc = ledger_list_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored_ids, &jobs->restored_count, e);
 	if (!rc)
 		rc = ended_jobs_open(jobs, e);
 	if (rc)
 		return rc;
-	if (jobs->config.keep_partials && disk_mkdir(jobs->config.keep_partials, 0777) && errno != EEXIST)
-		return error_file(e, errno, jobs->config.keep_partials);
+	if (jobs->config.partials_folder && disk_mkdir(jobs->config.partials_folder, 0777) && errno != EEXIST)
+		return error_file(e, errno, jobs->config.partials_folder);
 	farm_config_init(&config);
 	config.max_peers = jobs->config.max_connections;
-	config.first_job = ledger_next_id(jobs->ledger);
-	config.silent_after = 3 * jobs->config.heartbeat_seconds;
+	config.first_job_id = ledger_next_id(jobs->ledger);
+	config.silence_timeout = 3 * jobs->config.heartbeat_seconds;
 	config.max_faults = jobs->config.max_faults;
-	config.first_pause = 2 * jobs->config.heartbeat_seconds;
+	config.initial_backoff = 2 * jobs->config.heartbeat_seconds;
 	uv_random(NULL, NULL, &config.verify_seed, sizeof config.verify_seed, 0, NULL);
-	config.forget_after = 6 * jobs->config.heartbeat_seconds;
+	config.disconnect_timeout = 6 * jobs->config.heartbeat_seconds;
 	rc = farm_new(&jobs->farm, &config, e);
 	if (!rc)
 		rc = trust_open(jobs, e);
@@ -105,85 +106,85 @@ int jobs_open(struct jobs *jobs, struct error *e)
 
 void jobs_init(struct jobs *jobs)
 {
-	jobs->follow_up = &follow_up;
+	jobs->step_handlers = &step_handlers;
 	STAILQ_INIT(&jobs->deferred);
 	STAILQ_INIT(&jobs->acks);
-	STAILQ_INIT(&jobs->parked);
-	STAILQ_INIT(&jobs->checks);
-	uv_timer_init(jobs->loop, &jobs->wake);
-	uv_idle_init(jobs->loop, &jobs->drain);
-	uv_idle_init(jobs->loop, &jobs->trim);
-	jobs->wake.data = jobs->drain.data = jobs->trim.data = jobs;
-	jobs->read = jobs_now(jobs);
+	STAILQ_INIT(&jobs->parked_acks);
+	STAILQ_INIT(&jobs->file_checks);
+	uv_timer_init(jobs->loop, &jobs->wake_timer);
+	uv_idle_init(jobs->loop, &jobs->drain_idle);
+	uv_idle_init(jobs->loop, &jobs->trim_idle);
+	jobs->wake_timer.data = jobs->drain_idle.data = jobs->trim_idle.data = jobs;
+	jobs->read_until = jobs_now(jobs);
 }
 
 /* Retries, for each live job whose time has come, what the disk refused: image, record, films, or results. */
-static void retry(struct jobs *jobs)
+static void retry_writes(struct jobs *jobs)
 {
-	for (struct live_job *job = jobs->live; job; job = job->next) {
-		if (jobs_now(jobs) < job->try_again || job->busy)
+	for (struct live_job *job = jobs->live_jobs; job; job = job->next) {
+		if (jobs_now(jobs) < job->retry_at || job->busy)
 			continue;
-		if (job->unpublished) {
-			job->unpublished = false;
-			publish_start(jobs, job, PUBLISH_RESULT, job->unpublished_rounds);
+		if (job->publish_pending) {
+			job->publish_pending = false;
+			publish_start(jobs, job, PUBLISH_RESULT, job->publish_rounds);
 		}
-		if (job->unrecorded) {
-			job->unrecorded = false;
+		if (job->record_pending) {
+			job->record_pending = false;
 			finish_ended(jobs);
 			return; /* the list may have changed; continue next time */
 		}
-		if (job->unprepared && !job->ended) {
+		if (job->prepare_pending && !job->ended) {
 			struct event ev = {.kind = EVENT_TICK};
 			dispatch_prepare(jobs, job);
 			jobs_step(jobs, &ev);
 			return;
 		}
-		if (job->held && !job->ended && durable_mend(jobs, job) == 0)
+		if (job->held_for_storage && !job->ended && durable_retry_job(jobs, job) == 0)
 			return;
 	}
 }
 
 void jobs_tick(struct jobs *jobs)
 {
-	if (recovery_is_on(jobs))
-		jobs->changes++;
+	if (recovery_is_running(jobs))
+		jobs->change_count++;
 	durable_tick(jobs);
-	retry(jobs);
+	retry_writes(jobs);
 	files_tick(jobs);
 	folder_tick(jobs);
 	clear_tick(jobs);
-	checkpoint_where_due(jobs);
+	checkpoint_start_due(jobs);
 }
 
 void jobs_stop(struct jobs *jobs)
 {
 	jobs->stopping = true;
-	uv_close((uv_handle_t *)&jobs->wake, NULL);
-	uv_close((uv_handle_t *)&jobs->drain, NULL);
-	uv_close((uv_handle_t *)&jobs->trim, NULL);
+	uv_close((uv_handle_t *)&jobs->wake_timer, NULL);
+	uv_close((uv_handle_t *)&jobs->drain_idle, NULL);
+	uv_close((uv_handle_t *)&jobs->trim_idle, NULL);
 	recovery_stop(jobs);
 }
 
 void jobs_close(struct jobs *jobs)
 {
 	recovery_close(jobs);
-	while (jobs->live) {
-		struct live_job *next = jobs->live->next;
-		live_job_free(jobs->live);
-		jobs->live = next;
+	while (jobs->live_jobs) {
+		struct live_job *next = jobs->live_jobs->next;
+		live_job_free(jobs->live_jobs);
+		jobs->live_jobs = next;
 	}
-	for (struct deferred *d; (d = STAILQ_FIRST(&jobs->deferred));) {
+	for (struct deferred_event *d; (d = STAILQ_FIRST(&jobs->deferred));) {
 		STAILQ_REMOVE_HEAD(&jobs->deferred, next);
 		mem_free(d);
 	}
-	if (jobs->seen.up > 0)
-		ages_keep(jobs);
+	if (jobs->observed_clock.uptime > 0)
+		observed_time_store(jobs);
 	durable_close(jobs);
 	clear_close(jobs);
 	if (jobs->farm)
 		farm_free(jobs->farm);
 	blob_store_close(jobs->blobs);
 	spool_close(jobs->spool);
-	mem_free(jobs->ended);
-	mem_free(jobs->restored);
+	mem_free(jobs->ended_jobs);
+	mem_free(jobs->restored_ids);
 }

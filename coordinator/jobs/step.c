@@ -3,7 +3,7 @@
  * Passes an event through the core and carries out the core's actions.
  *
  * jobs_step gives the event to the core (core/farm.h), which changes its state and answers with a list of actions.
- * The table `follow_up` carries these out. Events that arise meanwhile are queued and handled before jobs_step
+ * The table `step_handlers` carries these out. Events that arise meanwhile are queued and handled before jobs_step
  * returns; then the table is told that the step is over. The timer `wake` sends the event that the core needs when
  * only time has passed.
  *
@@ -19,9 +19,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-void jobs_defer(struct jobs *jobs, const struct event *ev)
+void jobs_defer_event(struct jobs *jobs, const struct event *ev)
 {
-	struct deferred *d = mem_alloc(1, sizeof *d);
+	struct deferred_event *d = mem_alloc(1, sizeof *d);
 	if (!d) /* 300 bytes, without which nothing can continue */
 		abort();
 	d->event = *ev;
@@ -30,57 +30,58 @@ void jobs_defer(struct jobs *jobs, const struct event *ev)
 	STAILQ_INSERT_TAIL(&jobs->deferred, d, next);
 }
 
-void jobs_break(struct jobs *jobs, uint64_t job, const char *text)
+void jobs_defer_failure(struct jobs *jobs, uint64_t job, const char *text)
 {
 	struct event ev = {.kind = EVENT_JOB_BROKEN, .job = job, .text = text};
-	jobs_defer(jobs, &ev);
+	jobs_defer_event(jobs, &ev);
 }
 
 static void on_wake(uv_timer_t *t);
 
-static const struct incoming nothing;
+static const struct incoming empty_incoming;
 
-static void one_step(struct jobs *jobs, struct event *ev, const struct incoming *in)
+static void run_step(struct jobs *jobs, struct event *ev, const struct incoming *in)
 {
 	struct update u;
 	ev->time = jobs_now(jobs);
-	ev->unread = ev->time - jobs->read;
-	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* too short a silence to blame anybody */
-		ev->unread = 0;
+	ev->unread_seconds = ev->time - jobs->read_until;
+	if (ev->unread_seconds <
+	    jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* too short a silence to blame anybody */
+		ev->unread_seconds = 0;
 	farm_step(jobs->farm, ev, &u);
-	jobs->changes++;
-	jobs->follow_up->carry_out(jobs, &u, in);
-	if (isfinite(u.wake) && !jobs->stopping) {
-		double ms = ceil(1000 * (u.wake - jobs_now(jobs)));
-		uv_timer_start(&jobs->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
+	jobs->change_count++;
+	jobs->step_handlers->carry_out(jobs, &u, in);
+	if (isfinite(u.wake_time) && !jobs->stopping) {
+		double ms = ceil(1000 * (u.wake_time - jobs_now(jobs)));
+		uv_timer_start(&jobs->wake_timer, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
 	} else {
-		uv_timer_stop(&jobs->wake);
+		uv_timer_stop(&jobs->wake_timer);
 	}
 }
 
 void jobs_step(struct jobs *jobs, struct event *ev)
 {
 	if (jobs->stepping) /* messages of sessions may arrive while an update is being carried out */
-		jobs_defer(jobs, ev);
+		jobs_defer_event(jobs, ev);
 	else
-		jobs_step_with(jobs, ev, &nothing);
+		jobs_step_with(jobs, ev, &empty_incoming);
 }
 
 void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in)
 {
 	assert(!jobs->stepping);
 	jobs->stepping = true;
-	one_step(jobs, ev, in);
-	for (struct deferred *d; (d = STAILQ_FIRST(&jobs->deferred));) {
+	run_step(jobs, ev, in);
+	for (struct deferred_event *d; (d = STAILQ_FIRST(&jobs->deferred));) {
 		STAILQ_REMOVE_HEAD(&jobs->deferred, next);
-		one_step(jobs, &d->event, &nothing);
+		run_step(jobs, &d->event, &empty_incoming);
 		mem_free(d);
 	}
 	jobs->stepping = false;
-	jobs->follow_up->stepped(jobs);
+	jobs->step_handlers->step_done(jobs);
 }
 
-int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e)
+int jobs_try_step(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e)
 {
 	*e = (struct error){""};
 	in->refusal = e;
@@ -94,7 +95,7 @@ static void on_wake(uv_timer_t *t)
 	jobs_step(t->data, &ev);
 }
 
-void jobs_films_free(struct jobs *jobs)
+void jobs_notify_films_free(struct jobs *jobs)
 {
-	jobs->follow_up->films_free(jobs);
+	jobs->step_handlers->films_free(jobs);
 }

@@ -6,10 +6,10 @@
 #include "coordinator/live_job/jobs.h"
 
 /* The functions that carry out the core's actions, as a table, because they make steps themselves (start.c). */
-struct follow_up {
+struct step_handlers {
 	/* Carries out the actions of an update, in order. in: data that came with the event. */
 	void (*carry_out)(struct jobs *jobs, const struct update *u, const struct incoming *in);
-	void (*stepped)(struct jobs *jobs);    /* the event and all events deferred meanwhile have been handled */
+	void (*step_done)(struct jobs *jobs);  /* the event and all events deferred meanwhile have been handled */
 	void (*films_free)(struct jobs *jobs); /* a live job is no longer busy */
 };
 
@@ -19,13 +19,13 @@ void jobs_step(struct jobs *jobs, struct event *ev);
 void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in);
 /* Like jobs_step_with(), for an event that the core, or the disk, may refuse. Returns -EPERM with the reason if it is
  * refused. Sets in->refusal. */
-int jobs_ask(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e);
+int jobs_try_step(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e);
 /* Handles the event after the current update. Copies the text. */
-void jobs_defer(struct jobs *jobs, const struct event *ev);
-void jobs_break(struct jobs *jobs, uint64_t job, const char *text); /* fails the job after the current update */
+void jobs_defer_event(struct jobs *jobs, const struct event *ev);
+void jobs_defer_failure(struct jobs *jobs, uint64_t job, const char *text); /* fails the job after the current update */
 
 /* Call when a live job is no longer busy: what waited for its canvas continues. Live jobs that have ended are gone
  * afterwards. */
-void jobs_films_free(struct jobs *jobs);
+void jobs_notify_films_free(struct jobs *jobs);
 
 #endif

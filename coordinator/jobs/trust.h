@@ -16,16 +16,16 @@ int trust_open(struct jobs *jobs, struct error *e);
 
 /* Returns the fraction of the job's leases to verify: what the job requests, but at least the minimum for all jobs; 0
  * for a mixed job. */
-double trust_share(const struct jobs *jobs, const Farm__Submit *m);
+double trust_verify_fraction(const struct jobs *jobs, const Farm__Submit *m);
 
 /* Counts a merged result of the worker that was not verified. */
-void trust_merged(struct live_job *job, const struct action *a);
-void trust_taken_back(struct live_job *job, uint64_t who); /* one of its results does not count any more */
+void trust_count_merged(struct live_job *job, const struct action *a);
+void trust_discount_result(struct live_job *job, uint64_t who); /* one of its results does not count any more */
 /* Logs a wrong result in the job's log. */
-void trust_wrong(struct jobs *jobs, const struct action *a);
+void trust_log_wrong_result(struct jobs *jobs, const struct action *a);
 /* chains start again from their seeds: logs and notes that in the job. */
-void trust_anew(struct jobs *jobs, const struct action *a);
+void trust_note_chain_restart(struct jobs *jobs, const struct action *a);
 /* Logs and stores that a worker is quarantined, and notes its unverified results in all live jobs. */
-void trust_quarantined(struct jobs *jobs, const struct action *a);
+void trust_record_quarantine(struct jobs *jobs, const struct action *a);
 
 #endif

@@ -18,23 +18,22 @@
 
 static const char magic[8] = "hsltC005", old_magic[8] = "hsltC004";
 
-static uint32_t slots_of(const struct live_job *job)
+static uint32_t slot_count(const struct live_job *job)
 {
 	return job->plan.groups * job->plan.parts;
 }
 
-void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status)
+void checkpoint_head_fill(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status)
 {
 	uint64_t generation = journal_generation(job->journal) + 1;
 	*h = (struct checkpoint_head){.worker_count = job->worker_count,
 				      .job = job->id,
-				      .generation =
-					      generation < job->generation_least ? job->generation_least : generation,
+				      .generation = generation < job->min_generation ? job->min_generation : generation,
 				      .cpu_seconds = job->record.cpu_seconds,
 				      .bootstrap_cpu_seconds = job->record.bootstrap_cpu_seconds,
 				      .look_written = job->look_written,
 				      .times = job->times,
-				      .lit = job->lit,
+				      .bootstrap_result = job->bootstrap_result,
 				      .counts = job->record.counts,
 				      .looks = *status->looks};
 	snprintf(h->fingerprint, sizeof h->fingerprint, "%s", status->fingerprint);
@@ -43,10 +42,10 @@ void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, c
 static int write_states(const struct live_job *job, struct checked_file *out, struct error *e)
 {
 	int rc = 0;
-	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
-		uint32_t there = job->states[i] != NULL;
-		rc = checked_file_write_numbers(out, &there, sizeof there, 1, e);
-		for (uint32_t k = 0; there && k < job->chains_per_lease && !rc; k++) {
+	for (uint32_t i = 0; i < slot_count(job) && !rc; i++) {
+		uint32_t has_states = job->states[i] != NULL;
+		rc = checked_file_write_numbers(out, &has_states, sizeof has_states, 1, e);
+		for (uint32_t k = 0; has_states && k < job->chains_per_lease && !rc; k++) {
 			const struct chain_state *c = &job->states[i][k];
 			rc = checked_file_write_numbers(out, &c->size, sizeof c->size, 1, e);
 			if (!rc)
@@ -58,7 +57,7 @@ static int write_states(const struct live_job *job, struct checked_file *out, st
 
 static int write_head(const struct checkpoint_head *h, struct checked_file *out, struct error *e)
 {
-	unsigned char bytes[STORED_HEAD_MOST];
+	unsigned char bytes[STORED_HEAD_MAX];
 	uint32_t size = (uint32_t)stored_pack_head(h, bytes);
 	int rc = checked_file_write(out, magic, sizeof magic, e);
 	if (!rc)
@@ -80,10 +79,10 @@ int checkpoint_write(const struct live_job *job, const struct checkpoint_head *h
 static int read_states(struct live_job *job, struct checked_file *in, struct error *e)
 {
 	int rc = 0;
-	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
-		uint32_t there;
-		rc = checked_file_read_numbers(in, &there, sizeof there, 1, e);
-		if (rc || !there)
+	for (uint32_t i = 0; i < slot_count(job) && !rc; i++) {
+		uint32_t has_states;
+		rc = checked_file_read_numbers(in, &has_states, sizeof has_states, 1, e);
+		if (rc || !has_states)
 			continue;
 		job->states[i] = mem_alloc(job->chains_per_lease, sizeof *job->states[i]);
 		if (!job->states[i])
@@ -92,7 +91,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 			struct chain_state *c = &job->states[i][k];
 			uint32_t size;
 			rc = checked_file_read_numbers(in, &size, sizeof size, 1, e);
-			if (!rc && (size == 0 || size > chain_state_max(&job->plan)))
+			if (!rc && (size == 0 || size > chain_state_max_bytes(&job->plan)))
 				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
 			if (!rc && !(c->bytes = mem_alloc(size, 1)))
 				rc = error_set(e, ENOMEM, "no memory for chains");
@@ -106,16 +105,16 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 	return rc;
 }
 
-static void take_head(struct live_job *job, const struct checkpoint_head *h)
+static void apply_head(struct live_job *job, const struct checkpoint_head *h)
 {
 	job->worker_count = h->worker_count;
 	job->record.cpu_seconds = h->cpu_seconds;
 	job->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
 	job->look_written = h->look_written;
 	job->times = h->times;
-	job->lit = h->lit;
+	job->bootstrap_result = h->bootstrap_result;
 	job->record.looks.count = 0;
-	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS; i++)
+	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS_MAX; i++)
 		forecast_add_look(&job->record.looks, &h->looks.looks[i]);
 	job->record.counts = h->counts;
 	snprintf(job->fingerprint, sizeof job->fingerprint, "%s", h->fingerprint);
@@ -124,7 +123,7 @@ static void take_head(struct live_job *job, const struct checkpoint_head *h)
 /* Reads the head of a file of version 004. */
 static int read_old_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
 {
-	unsigned char bytes[STORED_OLD_HEAD];
+	unsigned char bytes[STORED_OLD_HEAD_SIZE];
 	uint32_t sizes[2]; /* size of the head; worker_count */
 	int rc = checked_file_read_numbers(in, sizes, sizeof *sizes, 2, e);
 	if (!rc && sizes[0] != sizeof magic + sizeof sizes + sizeof bytes)
@@ -133,20 +132,20 @@ static int read_old_head(struct checkpoint_head *h, struct checked_file *in, str
 	if (!rc)
 		rc = checked_file_read(in, bytes, sizeof bytes, e);
 	if (!rc)
-		stored_old_head(bytes, sizes[1], h);
+		stored_unpack_old_head(bytes, sizes[1], h);
 	return rc;
 }
 
 static int read_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
 {
-	unsigned char bytes[STORED_HEAD_MOST];
-	char got[sizeof magic];
+	unsigned char bytes[STORED_HEAD_MAX];
+	char file_magic[sizeof magic];
 	uint32_t size;
-	int rc = checked_file_read(in, got, sizeof got, e);
-	if (!rc && memcmp(got, old_magic, sizeof got) == 0)
+	int rc = checked_file_read(in, file_magic, sizeof file_magic, e);
+	if (!rc && memcmp(file_magic, old_magic, sizeof file_magic) == 0)
 		return read_old_head(h, in, e);
 	if (!rc)
-		rc = spool_check_version(got, magic, in->path, e);
+		rc = spool_check_version(file_magic, magic, in->path, e);
 	if (!rc)
 		rc = checked_file_read_numbers(in, &size, sizeof size, 1, e);
 	if (!rc && size > sizeof bytes)
@@ -158,7 +157,7 @@ static int read_head(struct checkpoint_head *h, struct checked_file *in, struct 
 	return rc;
 }
 
-static int read_all(struct live_job *job, struct checked_file *in, uint64_t *generation, struct error *e)
+static int read_checkpoint(struct live_job *job, struct checked_file *in, uint64_t *generation, struct error *e)
 {
 	struct checkpoint_head h;
 	int rc = read_head(&h, in, e);
@@ -166,9 +165,10 @@ static int read_all(struct live_job *job, struct checked_file *in, uint64_t *gen
 		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
 	if (rc)
 		return rc;
-	take_head(job, &h);
+	apply_head(job, &h);
 	*generation = h.generation;
-	int exponent = canvas_grid_exponent(&job->plan, job->lit.b_pooled, live_job_submit(job)->brightest);
+	int exponent =
+		canvas_grid_exponent(&job->plan, job->bootstrap_result.b_pooled, live_job_submission(job)->brightest);
 	rc = canvas_new(&job->canvas, &job->plan, exponent, job->film_folder, e);
 	if (!rc && job->seeds)
 		rc = checked_file_read_numbers(in, job->seeds, sizeof *job->seeds, job->plan.chains, e);
@@ -177,10 +177,10 @@ static int read_all(struct live_job *job, struct checked_file *in, uint64_t *gen
 	if (!rc)
 		rc = canvas_load(job->canvas, in, e);
 	if (!rc)
-		rc = checked_file_end(in, e);
+		rc = checked_file_expect_end(in, e);
 	bootstrap_free(job->bootstrap);
 	job->bootstrap = NULL;
-	job->checkpoint_bytes = in->bytes;
+	job->checkpoint_bytes = in->bytes_written;
 	return rc;
 }
 
@@ -192,11 +192,11 @@ int checkpoint_load(const struct spool *spool, struct live_job *job, uint64_t *g
 	spool_job_path(spool, job->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* left behind by a run that ended while writing it */
 	spool_job_path(spool, job->id, "checkpoint", name);
-	int rc = checked_file_open_watched(&in, name, progress, user, e);
+	int rc = checked_file_open_with_progress(&in, name, progress, user, e);
 	if (rc)
 		return rc;
-	in.bytes = in.left;
-	rc = read_all(job, &in, generation, e);
+	in.bytes_written = in.remaining;
+	rc = read_checkpoint(job, &in, generation, e);
 	checked_file_close(&in);
 	return rc;
 }

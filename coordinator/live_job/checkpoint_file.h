@@ -20,9 +20,9 @@
 #include "common/base/checked_file.h"
 #include "coordinator/live_job/stored.h"
 
-/* checkpoint_head_of fills in the head, with the generation of the journal that will follow the checkpoint;
+/* checkpoint_head_fill fills in the head, with the generation of the journal that will follow the checkpoint;
  * checkpoint_write writes the head and the job's current state. */
-void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status);
+void checkpoint_head_fill(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status);
 int checkpoint_write(const struct live_job *job, const struct checkpoint_head *h, struct checked_file *out,
 		     struct error *e);
 

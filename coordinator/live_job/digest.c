@@ -29,7 +29,7 @@ static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 	if (!rc)
 		rc = add_part(p, b->counters, sizeof b->counters, e);
 	if (!rc)
-		rc = add_part(p, b->strategy, b->strategy_count * sizeof *b->strategy, e);
+		rc = add_part(p, b->strategies, b->strategy_count * sizeof *b->strategies, e);
 	if (!rc)
 		rc = add_part(p, sums, sizeof sums, e);
 	return rc ? rc : add_part(p, b->classes, sizeof b->classes, e);
@@ -37,8 +37,8 @@ static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 
 static int add_tile(struct parts *p, const struct tile *t, struct error *e)
 {
-	const uint32_t where[] = {t->x, t->y, t->width, t->height};
-	int rc = add_part(p, where, sizeof where, e);
+	const uint32_t rectangle[] = {t->x, t->y, t->width, t->height};
+	int rc = add_part(p, rectangle, sizeof rectangle, e);
 	return rc ? rc : add_part(p, t->xyz, (size_t)t->width * t->height * TILE_CHANNELS * sizeof *t->xyz, e);
 }
 
@@ -47,7 +47,7 @@ int digest_batch(const struct batch *b, struct batch_digest *out, struct error *
 	enum { NUMBERS = 5, ARRAYS = 2 };
 	struct parts p = {mem_alloc(NUMBERS + 2 * (size_t)b->tile_count + b->state_count + ARRAYS, sizeof *p.hashes),
 			  0};
-	struct blob_hash all;
+	struct blob_hash combined;
 	if (!p.hashes)
 		return error_set(e, ENOMEM, "no memory for a digest");
 	int rc = add_numbers(&p, b, e);
@@ -60,10 +60,10 @@ int digest_batch(const struct batch *b, struct batch_digest *out, struct error *
 	if (!rc)
 		rc = add_part(&p, b->moments, b->moment_count * sizeof *b->moments, e);
 	if (!rc)
-		rc = blob_hash_bytes(p.hashes, p.count * sizeof *p.hashes, &all, e);
+		rc = blob_hash_bytes(p.hashes, p.count * sizeof *p.hashes, &combined, e);
 	mem_free(p.hashes);
-	_Static_assert(sizeof all.bytes == sizeof out->bytes, "SHA-256 both");
+	_Static_assert(sizeof combined.bytes == sizeof out->bytes, "SHA-256 both");
 	if (!rc)
-		memcpy(out->bytes, all.bytes, sizeof out->bytes);
+		memcpy(out->bytes, combined.bytes, sizeof out->bytes);
 	return rc ? -ENOMEM : 0;
 }

@@ -17,28 +17,28 @@ struct rollback;
 
 /* A job being submitted. */
 struct submission {
-	struct envelope *submit; /* taken over by the job if accepted */
+	struct envelope *envelope; /* taken over by the job if accepted */
 	const struct plan *plan;
-	const char *rule;	     /* what the length of its epochs was derived from; "": it was requested */
+	const char *epoch_rule;	     /* what the length of its epochs was derived from; "": it was requested */
 	const char *owner, *address; /* of the submitter; owner "": no certificate */
-	uint64_t job;		     /* the new job's id; 0: refused by the core */
+	uint64_t job_id;	     /* the new job's id; 0: refused by the core */
 };
 
 struct incoming {
-	struct error *refusal;	       /* set by jobs_ask: where the reason of a refusal goes; NULL: not needed */
+	struct error *refusal;	       /* set by jobs_try_step: where the reason of a refusal goes; NULL: not needed */
 	struct submission *submission; /* EVENT_SUBMIT */
-	struct rollback *back;	       /* EVENT_LEASE_FAILED: the batch that can be taken back; NULL: none */
-	/* EVENT_BATCH, EVENT_STORED: */
+	struct rollback *rollback;     /* EVENT_LEASE_FAILED: the batch that can be taken back; NULL: none */
+	/* EVENT_BATCH, EVENT_STORED_BATCH: */
 	struct batch *batch; /* the job takes over its states if it is merged */
 	const Farm__LeaseResult *result;
 	struct buf *payload;
-	/* EVENT_BATCH: the result without its payload, as a frame for the journal; made by durable_reserve,
+	/* EVENT_BATCH: the result without its payload, as a frame for the journal; made by durable_reserve_result,
 	 * mem_alloc'd */
 	unsigned char *frame;
 	size_t frame_size;
-	/* EVENT_STORED: the offset of the result in the journal */
-	bool stored;
-	uint64_t stored_at;
+	/* EVENT_STORED_BATCH: the offset of the result in the journal */
+	bool is_stored;
+	uint64_t stored_offset;
 };
 
 #endif

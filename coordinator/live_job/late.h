@@ -12,11 +12,11 @@
 /* at: offset in the journal. -ENOMEM. */
 int late_add(struct live_job *job, const struct lease_key *k, uint64_t at, struct error *e);
 /* Drops the results of this (group, part) from this epoch on. */
-void late_forget(struct live_job *job, const struct lease_key *k);
+void late_remove_from_epoch(struct live_job *job, const struct lease_key *k);
 void late_sort(struct live_job *job); /* sorts them by the order in which they can be merged */
 void late_remove(struct live_job *job, size_t i);
 /* Call when the core gives a lease to this worker. Returns true if a stored result will be merged soon in place of a
  * new one, so the lease need not be sent. */
-bool late_withholds(struct live_job *job, const struct lease_key *k, uint64_t peer);
+bool late_claim_lease(struct live_job *job, const struct lease_key *k, uint64_t peer);
 
 #endif

@@ -23,11 +23,11 @@
 #include <stdarg.h>
 #include <string.h>
 
-static const uint64_t log_most = 16 << 20;
+static const uint64_t max_log_bytes = 16 << 20;
 
-const Farm__Submit *live_job_submit(const struct live_job *job)
+const Farm__Submit *live_job_submission(const struct live_job *job)
 {
-	return job->submit.message->submit;
+	return job->submission.message->submit;
 }
 
 static json_t *effects_to_json(const Farm__Submit *m)
@@ -42,16 +42,16 @@ static json_t *effects_to_json(const Farm__Submit *m)
 
 static void begin_record(struct live_job *job, const char *owner, double submitted)
 {
-	const Farm__Submit *m = live_job_submit(job);
+	const Farm__Submit *m = live_job_submission(job);
 	struct job_record *r = &job->record;
-	record_begin(r, job->id, m->name, owner);
+	record_init(r, job->id, m->name, owner);
 	text_copy(r->integrator, sizeof r->integrator, job->plan.integrator);
 	text_copy(r->mixture, sizeof r->mixture, job->plan.mutations);
 	text_copy(r->state, sizeof r->state, "queued");
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;
-	record_take_effects(r, effects_to_json(m));
-	text_lines(r->scene_notes, sizeof r->scene_notes, (const char *const *)m->notes, m->n_notes);
+	record_set_effects(r, effects_to_json(m));
+	text_join_lines(r->scene_notes, sizeof r->scene_notes, (const char *const *)m->notes, m->n_notes);
 	r->target_error = job->plan.target_error;
 	r->submitted = submitted > 0 ? submitted : clock_wall_seconds();
 }
@@ -63,36 +63,36 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 	if (!job)
 		return error_set(e, ENOMEM, "no memory for a job");
 	job->id = id;
-	job->log = -1;
+	job->log_fd = -1;
 	job->plan = *plan;
-	job->submit = *submit;
+	job->submission = *submit;
 	memset(submit, 0, sizeof *submit);
 	STAILQ_INIT(&job->waiting);
 	job->times = (struct live_job_times){NAN, NAN, NAN};
 	begin_record(job, owner, submitted);
 	job->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->states);
 	job->makers = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->makers);
-	job->again = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->again);
+	job->is_replacement = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->is_replacement);
 	if (plan->kind == PLAN_CHAINS) {
 		job->chains_per_lease = plan->chains / (plan->groups * plan->parts);
 		job->seeds = mem_alloc(plan->chains, sizeof *job->seeds);
 	}
 	int rc = 0;
-	if (!job->states || !job->makers || !job->again || (plan->kind == PLAN_CHAINS && !job->seeds))
+	if (!job->states || !job->makers || !job->is_replacement || (plan->kind == PLAN_CHAINS && !job->seeds))
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&job->bootstrap, plan, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
-	job->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-	if (!rc && job->log < 0)
+	job->log_fd = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+	if (!rc && job->log_fd < 0)
 		rc = error_file(e, errno, path);
 	struct stat st;
-	if (!rc && disk_fstat(job->log, &st) == 0)
+	if (!rc && disk_fstat(job->log_fd, &st) == 0)
 		job->log_bytes = (uint64_t)st.st_size;
 	if (rc) {
-		*submit = job->submit;
-		memset(&job->submit, 0, sizeof job->submit);
+		*submit = job->submission;
+		memset(&job->submission, 0, sizeof job->submission);
 		live_job_free(job);
 		return rc;
 	}
@@ -103,24 +103,24 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 void live_job_free(struct live_job *job)
 {
 	assert(!job->busy);
-	for (struct waiting_batch *w; (w = live_job_take_waiting(job));)
-		waiting_batch_free(w);
+	for (struct waiting_message *w; (w = live_job_pop_waiting(job));)
+		waiting_message_free(w);
 	for (uint32_t i = 0; job->states && i < job->plan.groups * job->plan.parts; i++)
-		states_fini(job->states[i], job->chains_per_lease);
+		chain_states_free(job->states[i], job->chains_per_lease);
 	mem_free(job->states);
 	mem_free(job->makers);
-	mem_free(job->again);
-	mem_free(job->merged);
+	mem_free(job->is_replacement);
+	mem_free(job->merged_records);
 	mem_free(job->seeds);
 	mem_free(job->credits);
-	mem_free(job->late);
+	mem_free(job->late_results);
 	bootstrap_free(job->bootstrap);
 	canvas_free(job->canvas);
-	if (job->log >= 0)
-		disk_close(job->log);
+	if (job->log_fd >= 0)
+		disk_close(job->log_fd);
 	journal_release(job->journal);
-	envelope_fini(&job->submit);
-	mem_free(job->earlier);
+	envelope_fini(&job->submission);
+	mem_free(job->earlier_record);
 	mem_free(job);
 }
 
@@ -138,13 +138,13 @@ void live_job_log(struct live_job *job, enum log_event event, const char *fields
 	log_format(line, sizeof line - 1, event, text);
 	size_t size = strlen(line);
 	line[size++] = '\n';
-	if (job->log_bytes >= log_most)
+	if (job->log_bytes >= max_log_bytes)
 		return;
 	job->log_bytes += size;
-	if (job->log_bytes >= log_most)
+	if (job->log_bytes >= max_log_bytes)
 		size = (size_t)snprintf(line, sizeof line,
 					"the log of this job is full: the rest is in the coordinator's log\n");
-	int rc = disk_write_all(job->log, line, size); /* if this fails, the coordinator's log still has the line */
+	int rc = disk_write_all(job->log_fd, line, size); /* if this fails, the coordinator's log still has the line */
 	(void)rc;
 }
 
@@ -157,7 +157,7 @@ void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state
 {
 	job->state_bytes += chain_states_bytes(states, job->chains_per_lease);
 	job->state_bytes -= chain_states_bytes(job->states[slot], job->chains_per_lease);
-	states_fini(job->states[slot], job->chains_per_lease);
+	chain_states_free(job->states[slot], job->chains_per_lease);
 	job->states[slot] = states;
 }
 
@@ -174,14 +174,14 @@ int live_job_merge(struct live_job *job, struct batch *b, struct error *e)
 		live_job_set_states(job, slot, b->states);
 		b->states = NULL;
 		b->state_count = 0;
-		job->again[slot] = false;
+		job->is_replacement[slot] = false;
 	}
 	return rc;
 }
 
-uint64_t live_job_rounds(const struct live_job *job)
+uint64_t live_job_complete_rounds(const struct live_job *job)
 {
-	return job->canvas ? canvas_rounds(job->canvas) : 0;
+	return job->canvas ? canvas_complete_rounds(job->canvas) : 0;
 }
 
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
@@ -191,32 +191,33 @@ void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
 	job->times.elapsed = elapsed;
 	if (!job->canvas)
 		job->times.opened = elapsed; /* remains the time of the last bootstrap batch */
-	if (live_job_rounds(job) > rounds)
+	if (live_job_complete_rounds(job) > rounds)
 		job->times.completed = elapsed;
 }
 
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e)
 {
-	bootstrap_merge(job->bootstrap, &job->lit);
-	int exponent = canvas_grid_exponent(&job->plan, job->lit.b_pooled, live_job_submit(job)->brightest);
+	bootstrap_compute_b(job->bootstrap, &job->bootstrap_result);
+	int exponent =
+		canvas_grid_exponent(&job->plan, job->bootstrap_result.b_pooled, live_job_submission(job)->brightest);
 	int rc = canvas_new(&job->canvas, &job->plan, exponent, canvas_folder, e);
 	if (rc)
 		return rc;
-	bootstrap_to_canvas(job->bootstrap, job->canvas);
+	bootstrap_add_to_canvas(job->bootstrap, job->canvas);
 	uint32_t per_group = job->plan.kind == PLAN_CHAINS ? job->plan.chains / job->plan.groups : 0;
 	for (uint32_t g = 0; job->seeds && g < job->plan.groups; g++)
-		bootstrap_seeds(job->bootstrap, g, job->seeds + (size_t)g * per_group);
+		bootstrap_draw_seeds(job->bootstrap, g, job->seeds + (size_t)g * per_group);
 	bootstrap_free(job->bootstrap);
 	job->bootstrap = NULL;
 	return 0;
 }
 
-int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
+int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool from_seeds, unsigned char **frame,
 			size_t *size, struct error *e)
 {
 	if (k->kind == LEASE_BOOTSTRAP || job->plan.kind != PLAN_CHAINS)
 		return grant_pack(k, NULL, NULL, 0, frame, size, e);
-	if (k->epoch > 0 && !anew)
+	if (k->epoch > 0 && !from_seeds)
 		return grant_pack(k, NULL, *states_at(job, k), job->chains_per_lease, frame, size, e);
 	struct plan_range r = plan_chain_range(&job->plan, k->part);
 	assert(r.end - r.begin == job->chains_per_lease);
@@ -224,38 +225,40 @@ int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, b
 	return grant_pack(k, seeds, NULL, job->chains_per_lease, frame, size, e);
 }
 
-bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest)
+bool live_job_states_match(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest)
 {
-	struct blob_hash own;
+	struct blob_hash current;
 	struct error e;
 	bool begins_with_states = k->kind == LEASE_RENDER && job->plan.kind == PLAN_CHAINS &&
 				  k->group < job->plan.groups && k->part < job->plan.parts && k->epoch > 0 &&
 				  *states_at(job, k);
-	return begins_with_states && states_digest(*states_at(job, k), job->chains_per_lease, &own, &e) == 0 &&
-	       blob_hash_equal(&own, digest);
+	return begins_with_states &&
+	       chain_states_digest(*states_at(job, k), job->chains_per_lease, &current, &e) == 0 &&
+	       blob_hash_equal(&current, digest);
 }
 
 void live_job_count_worker(struct live_job *job, uint64_t peer)
 {
-	enum { KNOWN = sizeof job->last_workers / sizeof *job->last_workers };
-	for (uint32_t i = 0; i < KNOWN; i++)
+	enum { REMEMBERED = sizeof job->last_workers / sizeof *job->last_workers };
+	for (uint32_t i = 0; i < REMEMBERED; i++)
 		if (job->last_workers[i] == peer)
 			return;
-	job->last_workers[job->worker_count++ % KNOWN] = peer;
+	job->last_workers[job->worker_count++ % REMEMBERED] = peer;
 }
 
-static size_t waiting_size(const struct waiting_batch *w)
+static size_t waiting_size(const struct waiting_message *w)
 {
 	return sizeof *w + w->envelope.bytes + w->payload.capacity;
 }
 
-bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
-		      struct buf *payload, bool checked)
+bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
+			      struct buf *payload, bool files_checked)
 {
-	struct waiting_batch *w = mem_alloc(1, sizeof *w);
+	struct waiting_message *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return false;
-	*w = (struct waiting_batch){.peer = peer, .key = *k, .envelope = *env, .payload = *payload, .checked = checked};
+	*w = (struct waiting_message){
+		.peer = peer, .key = *k, .envelope = *env, .payload = *payload, .files_checked = files_checked};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
 	STAILQ_INSERT_TAIL(&job->waiting, w, next);
@@ -263,9 +266,9 @@ bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_ke
 	return true;
 }
 
-const struct waiting_batch *live_job_waits_for(const struct live_job *job, const struct lease_key *k)
+const struct waiting_message *live_job_find_waiting(const struct live_job *job, const struct lease_key *k)
 {
-	const struct waiting_batch *w;
+	const struct waiting_message *w;
 	STAILQ_FOREACH(w, &job->waiting, next) {
 		if (lease_key_equal(&w->key, k))
 			break;
@@ -273,11 +276,11 @@ const struct waiting_batch *live_job_waits_for(const struct live_job *job, const
 	return w;
 }
 
-static struct waiting_batch *remove_waiting(struct live_job *job, struct waiting_batch *w)
+static struct waiting_message *remove_waiting(struct live_job *job, struct waiting_message *w)
 {
 	if (!w)
 		return NULL;
-	STAILQ_REMOVE(&job->waiting, w, waiting_batch, next);
+	STAILQ_REMOVE(&job->waiting, w, waiting_message, next);
 	job->waiting_bytes -= waiting_size(w);
 	return w;
 }
@@ -285,33 +288,33 @@ static struct waiting_batch *remove_waiting(struct live_job *job, struct waiting
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 {
 	for (struct live_job *job = first; job; job = job->next)
-		for (struct waiting_batch *w = STAILQ_FIRST(&job->waiting), *next; w; w = next) {
+		for (struct waiting_message *w = STAILQ_FIRST(&job->waiting), *next; w; w = next) {
 			next = STAILQ_NEXT(w, next);
 			if (w->peer == peer)
-				waiting_batch_free(remove_waiting(job, w));
+				waiting_message_free(remove_waiting(job, w));
 		}
 }
 
-struct waiting_batch *live_job_take_waiting(struct live_job *job)
+struct waiting_message *live_job_pop_waiting(struct live_job *job)
 {
 	return remove_waiting(job, STAILQ_FIRST(&job->waiting));
 }
 
-static bool is_failure(const struct waiting_batch *w)
+static bool is_failure(const struct waiting_message *w)
 {
 	const Farm__Envelope *m = w->envelope.message;
 	return m->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED && !m->lease_failed->bad_states;
 }
 
-struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer)
+struct waiting_message *live_job_pop_failure(struct live_job *job, uint64_t peer)
 {
-	struct waiting_batch *w = STAILQ_FIRST(&job->waiting);
+	struct waiting_message *w = STAILQ_FIRST(&job->waiting);
 	while (w && (w->peer != peer || !is_failure(w)))
 		w = STAILQ_NEXT(w, next);
 	return remove_waiting(job, w);
 }
 
-void waiting_batch_free(struct waiting_batch *w)
+void waiting_message_free(struct waiting_message *w)
 {
 	envelope_fini(&w->envelope);
 	buf_fini(&w->payload);

@@ -24,17 +24,17 @@ struct jobs;
 struct live_job;
 
 /* Tasks that read whole films (coordinator/jobs/publish.h). */
-enum publish_what {
-	PUBLISH_ERROR_ONLY, /* estimates the error; answered by EVENT_ERROR_KNOWN */
+enum publish_kind {
+	PUBLISH_ERROR_ONLY, /* estimates the error; answered by EVENT_ERROR_ESTIMATED */
 	PUBLISH_PREVIEW,    /* writes preview.exr */
 	PUBLISH_RESULT,	    /* writes result.exr */
 };
 
-struct publishing { /* a task; at most one at a time per live job */
+struct publish_task { /* a task; at most one at a time per live job */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct live_job *job;
-	enum publish_what what;
+	enum publish_kind kind;
 	uint64_t rounds;
 	double wall_seconds;
 	enum job_end end;
@@ -45,13 +45,13 @@ struct publishing { /* a task; at most one at a time per live job */
 };
 
 /* A result that arrived while the canvas was busy, or a failure that arrived while the job's files were being read. */
-struct waiting_batch {
-	STAILQ_ENTRY(waiting_batch) next;
+struct waiting_message {
+	STAILQ_ENTRY(waiting_message) next;
 	uint64_t peer;
 	struct lease_key key;
 	struct envelope envelope;
 	struct buf payload;
-	bool checked; /* of a failure: the job's files have been read since it arrived */
+	bool files_checked; /* of a failure: the job's files have been read since it arrived */
 };
 
 /* Seconds after the job's first lease, including earlier runs: at the last merged batch, at the start of the first
@@ -62,21 +62,21 @@ struct live_job_times {
 
 /* How many results of a worker were merged without having been verified. */
 struct live_job_credit {
-	uint64_t who; /* the core's id of the worker */
-	uint64_t leases;
+	uint64_t worker_id; /* the core's id of the worker */
+	uint64_t lease_count;
 };
 
 /* A stored result that cannot be merged yet (late.h). */
 struct late_result {
 	struct lease_key key;
-	uint64_t at;
+	uint64_t offset;
 	uint64_t peer; /* worker to which the core has given the lease; 0: none */
 };
 
 /* Where in the journal the batch of an epoch is (rollback.h). */
 struct merged_record {
 	uint32_t slot;
-	uint64_t epoch, at;
+	uint64_t epoch, offset;
 };
 
 /* The worker that made a batch; name "": not known. */
@@ -88,63 +88,64 @@ struct live_job_maker {
 struct live_job {
 	struct live_job *next;
 	uint64_t id;
-	struct envelope submit; /* owned */
+	struct envelope submission; /* owned */
 	struct plan plan;
 	struct job_record record; /* its counters are those last written; the core has the current ones */
 	/* Record of the end before the job was extended, whose image still exists; NULL: none. */
-	struct job_record *earlier;
+	struct job_record *earlier_record;
 	struct bootstrap *bootstrap; /* NULL once the canvas exists */
 	struct canvas *canvas;	     /* NULL before the bootstrap is complete */
 	/* Folder for the films while the job is being read from the spool; NULL: they are in memory. */
 	const char *film_folder;
-	struct bootstrap_result lit;
+	struct bootstrap_result bootstrap_result;
 	uint64_t *seeds;	       /* [groups][chains / groups]; NULL if the plan has no chains */
 	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch is merged yet */
 	uint64_t state_bytes;	       /* memory that `states` takes */
 	struct live_job_maker *makers; /* [groups x parts]: workers that made `states` */
-	bool *again;		       /* [groups x parts]: the next batch replaces one that was taken back */
-	struct merged_record *merged;  /* journal records of batches that can be taken back, in order of merging */
-	size_t merged_count;
-	/* Bytes of JOURNAL_KEPT records in the journal; their batches are also in the checkpoint. */
-	uint64_t kept_bytes;
+	bool *is_replacement;	       /* [groups x parts]: the next batch replaces one that was taken back */
+	struct merged_record
+		*merged_records; /* journal records of batches that can be taken back, in order of merging */
+	size_t merged_record_count;
+	/* Bytes of JOURNAL_MERGED_BATCH records in the journal; their batches are also in the checkpoint. */
+	uint64_t kept_record_bytes;
 	uint32_t chains_per_lease;
-	int log; /* file descriptor of the log */
+	int log_fd; /* file descriptor of the log */
 	uint64_t log_bytes;
 	struct journal *journal;
-	bool pinned; /* the journal has a record of the fingerprint */
+	bool fingerprint_journaled; /* the journal has a record of the fingerprint */
 	struct live_job_times times;
 	char fingerprint[256];	   /* numeric fingerprint that the job was pinned to when it was read from the spool */
 	uint64_t checkpoint_bytes; /* size of the last checkpoint; 0: none */
-	double checkpoint_after;   /* s of the loop's clock: no checkpoint before this time */
-	double look_written;	   /* work of the last estimate stored in the journal */
-	bool lacks_file;	   /* files of its scene are missing or damaged, so it is held */
-	bool unread;		   /* a file could not be read, or was wrong, when the files were last read */
-	bool held;		   /* held because its results cannot be stored */
-	size_t held_bytes;	   /* size of the result for which there was no space */
+	double checkpoint_not_before; /* s of the loop's clock: no checkpoint before this time */
+	double look_written;	      /* work of the last estimate stored in the journal */
+	bool has_missing_file;	      /* files of its scene are missing or damaged, so it is held */
+	bool files_suspect;	      /* a file could not be read, or was wrong, when the files were last read */
+	bool held_for_storage;	      /* held because its results cannot be stored */
+	size_t blocked_result_bytes;  /* size of the result for which there was no space */
 	/* Bytes of chain states for which there was no room when the job was held; 0: states were not the reason. */
-	uint64_t held_states;
-	double try_again; /* s of the loop's clock: when to try again what the disk refused */
+	uint64_t blocked_state_bytes;
+	double retry_at; /* s of the loop's clock: when to try again what the disk refused */
 	/* It is unknown whether the rename of the last checkpoint is durable, so nothing is stored before the next
 	 * checkpoint. */
-	bool unsure;
-	uint64_t generation_least; /* the next checkpoint has at least this generation */
-	bool unprepared;	   /* its bootstrap is complete, but the disk has no room for its films yet */
-	bool unpublished;	   /* it has ended, but its image could not be written yet */
-	uint64_t unpublished_rounds;
-	bool unrecorded; /* it has ended, but its record could not be written yet */
-	bool overflowed; /* a sum left the range of the films, which are kept as they are */
+	bool checkpoint_uncertain;
+	uint64_t min_generation; /* the next checkpoint has at least this generation */
+	bool prepare_pending;	 /* its bootstrap is complete, but the disk has no room for its films yet */
+	bool publish_pending;	 /* it has ended, but its image could not be written yet */
+	uint64_t publish_rounds;
+	bool record_pending; /* it has ended, but its record could not be written yet */
+	bool overflowed;     /* a sum left the range of the films, which are kept as they are */
 	bool busy, ended;
-	struct publishing publishing; /* valid while busy */
-	bool black;		      /* whether the published image or, without one, the bootstrap is black */
-	double preview_made;	      /* when preview.exr was last made, s of the loop's clock; 0: never */
-	uint32_t worker_count;	      /* number of workers that had leases of the job */
+	struct publish_task publishing; /* valid while busy */
+	bool black;			/* whether the published image or, without one, the bootstrap is black */
+	double preview_made_at;		/* when preview.exr was last made, s of the loop's clock; 0: never */
+	uint32_t worker_count;		/* number of workers that had leases of the job */
 	uint64_t last_workers[64];
 	struct live_job_credit *credits;
 	size_t credit_count;
-	char doubts[512]; /* notes on results of workers that have been quarantined since; "": none */
-	struct late_result *late;
+	char quarantine_notes[512]; /* notes on results of workers that have been quarantined since; "": none */
+	struct late_result *late_results;
 	size_t late_count;
-	STAILQ_HEAD(waiting_list, waiting_batch) waiting;
+	STAILQ_HEAD(waiting_list, waiting_message) waiting;
 	size_t waiting_bytes;
 };
 
@@ -156,7 +157,7 @@ int live_job_new(struct live_job **job, uint64_t id, struct envelope *submit, co
 /* Frees the memory of a job that is not busy; scene files and the job's folder stay. */
 void live_job_free(struct live_job *job);
 
-const Farm__Submit *live_job_submit(const struct live_job *job);
+const Farm__Submit *live_job_submission(const struct live_job *job);
 __attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *job, enum log_event event, const char *fields,
 							...);
 
@@ -167,30 +168,30 @@ int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
 void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state *states);
 /* Call after a batch was merged. elapsed: seconds after the first lease; rounds: complete rounds before the merge. */
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
-uint64_t live_job_rounds(const struct live_job *job); /* complete rounds */
+uint64_t live_job_complete_rounds(const struct live_job *job); /* complete rounds */
 /* Computes b, seeds and canvas when the bootstrap is complete. */
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e);
 /* Whether a lease starts from chain states (those after the previous epoch) and they have this digest. */
-bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
+bool live_job_states_match(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
 /* Packs a lease as a frame for a worker. anew: with seeds instead of states, whatever its epoch. */
 int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
 			size_t *size, struct error *e);
 /* Counts the worker in worker_count, unless it is among the last 64 different ones. */
 void live_job_count_worker(struct live_job *job, uint64_t peer);
 
-/* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload. checked: as
- * in struct waiting_batch. Returns false if out of memory. */
-bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
-		      struct buf *payload, bool checked);
+/* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload. files_checked:
+ * as in struct waiting_message. Returns false if out of memory. */
+bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
+			      struct buf *payload, bool checked);
 /* Returns a waiting message about this lease; NULL: none. */
-const struct waiting_batch *live_job_waits_for(const struct live_job *job, const struct lease_key *k);
+const struct waiting_message *live_job_find_waiting(const struct live_job *job, const struct lease_key *k);
 /* The first one, which then belongs to the caller; NULL: none. */
-struct waiting_batch *live_job_take_waiting(struct live_job *job);
+struct waiting_message *live_job_pop_waiting(struct live_job *job);
 /* Removes and returns the first waiting failure of this worker, not counting refusals of chain states; NULL: none. */
-struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer);
+struct waiting_message *live_job_pop_failure(struct live_job *job, uint64_t peer);
 /* Drops all waiting messages of a worker that is gone. */
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
-void waiting_batch_free(struct waiting_batch *w);
+void waiting_message_free(struct waiting_message *w);
 
 /* Releases the blobs of the submission's scene files. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);

@@ -15,36 +15,37 @@ struct live_job;
 struct peers;
 
 struct peer_calls {
-	struct peers *user;					/* the first argument of every function */
-	const char *(*name)(struct peers *user, uint64_t peer); /* the peer's own name; NULL: it is gone */
+	struct peers *user;					     /* the first argument of every function */
+	const char *(*peer_name)(struct peers *user, uint64_t peer); /* the peer's own name; NULL: it is gone */
 
 	/* Messages to a worker. send_lease: anew: with seeds, whatever the epoch. */
 	void (*send_lease)(struct peers *user, uint64_t peer, const struct live_job *job, const struct lease_key *k,
 			   bool anew);
-	void (*revoke)(struct peers *user, uint64_t peer, const struct lease_key *k);
-	void (*acknowledge)(struct peers *user, uint64_t peer, const struct lease_key *k, enum ack ack,
-			    const char *text);
+	void (*revoke_lease)(struct peers *user, uint64_t peer, const struct lease_key *k);
+	void (*acknowledge_result)(struct peers *user, uint64_t peer, const struct lease_key *k, enum ack ack,
+				   const char *text);
 
-	/* Disconnect any peer. fault: it has sent something invalid; dismiss: like fault, but the core has already
-	 * forgotten the peer. */
-	void (*fault)(struct peers *user, uint64_t peer, const char *text);
-	void (*dismiss)(struct peers *user, uint64_t peer, const char *text);
+	/* Disconnect any peer. fault_peer: it has sent something invalid; dismiss_peer: like fault, but the core has
+	 * already forgotten the peer. */
+	void (*fault_peer)(struct peers *user, uint64_t peer, const char *text);
+	void (*dismiss_peer)(struct peers *user, uint64_t peer, const char *text);
 	/* The answer to extend_job. refusal: the reason; NULL: the job was extended, and text says how. */
-	void (*extended)(struct peers *user, uint64_t peer, const char *refusal, const char *text);
+	void (*answer_extension)(struct peers *user, uint64_t peer, const char *refusal, const char *text);
 
 	/* Calls that concern several peers: */
-	void (*job_ended)(struct peers *user, uint64_t job);  /* tells workers that a job has ended */
-	void (*jobs_let_go)(struct peers *user);	      /* lets clients go that watch a job that has ended */
-	void (*films_free)(struct peers *user, uint64_t job); /* serves clients that wait for a preview of this job */
+	void (*announce_job_end)(struct peers *user, uint64_t job); /* tells workers that a job has ended */
+	void (*release_watchers)(struct peers *user); /* lets clients go that watch a job that has ended */
+	void (*serve_previews)(struct peers *user,
+			       uint64_t job); /* serves clients that wait for a preview of this job */
 	/* A file that files_check was asked for has been read. rc: 0, or an error, described by text. */
-	void (*file_read)(struct peers *user, const struct blob_hash *h, int rc, const char *text);
+	void (*announce_file_checked)(struct peers *user, const struct blob_hash *h, int rc, const char *text);
 	/* The jobs of the last run have been read; handles the requests that waited for that. */
-	void (*jobs_read)(struct peers *user);
+	void (*resume_requests)(struct peers *user);
 
 	/* Whether a client is fetching the result, or waits for it. */
-	bool (*uses_result)(const struct peers *user, uint64_t job);
+	bool (*is_result_in_use)(const struct peers *user, uint64_t job);
 	/* Returns how many bytes of scene files other connections with this peer's certificate are sending. */
-	uint64_t (*uploading)(struct peers *user, uint64_t peer);
+	uint64_t (*uploading_bytes)(struct peers *user, uint64_t peer);
 };
 
 #endif

@@ -11,21 +11,21 @@
 
 #include <stdint.h>
 
-struct quota {	       /* 0: no limit */
-	uint64_t jobs; /* live jobs of one owner */
+struct quota {		   /* 0: no limit */
+	uint64_t max_jobs; /* live jobs of one owner */
 	/* Scene files of the owner's live jobs, counted once per job, including those being uploaded. */
-	uint64_t asset_bytes;
-	uint64_t film_bytes; /* films of one job, as computed by canvas_bytes */
-	uint64_t mutations;  /* mutations or samples of one job; if set, every job must have such a bound */
+	uint64_t max_asset_bytes;
+	uint64_t max_film_bytes; /* films of one job, as computed by canvas_bytes */
+	uint64_t max_mutations;	 /* mutations or samples of one job; if set, every job must have such a bound */
 };
 
 /* The resources that the owner already uses. */
-struct quota_use {
+struct quota_usage {
 	uint64_t jobs, asset_bytes;
 };
 
 /* Returns -EDQUOT with a sentence for the client if the new job would exceed a limit. */
-int quota_check(const struct quota *q, const struct quota_use *has, const struct plan *p, uint64_t asset_bytes,
+int quota_check(const struct quota *q, const struct quota_usage *has, const struct plan *p, uint64_t asset_bytes,
 		struct error *e);
 
 #endif

@@ -22,42 +22,42 @@
 
 #include <string.h>
 
-enum { DAMAGED_MOST = 16 /* damaged leases that are named in the log */ };
+enum { DAMAGED_NAMED_MAX = 16 /* damaged leases that are named in the log */ };
 
 struct replay {
 	struct live_job *job;
 	struct replay_progress *progress; /* NULL: nobody watches the progress */
 	double elapsed;
 	uint64_t batches;
-	struct lease_key damaged[DAMAGED_MOST]; /* leases of damaged records, to be computed again */
+	struct lease_key damaged[DAMAGED_NAMED_MAX]; /* leases of damaged records, to be computed again */
 	size_t damaged_count;
 };
 
-enum replay_place replay_place(const struct live_job *job, const struct lease_key *k)
+enum replay_readiness replay_readiness(const struct live_job *job, const struct lease_key *k)
 {
 	if (k->kind == LEASE_BOOTSTRAP) {
-		bool merged = !job->bootstrap || bootstrap_has(job->bootstrap, k->group, k->part);
-		return merged ? REPLAY_MERGED : REPLAY_FITS;
+		bool merged = !job->bootstrap || bootstrap_has_lease(job->bootstrap, k->group, k->part);
+		return merged ? REPLAY_MERGED : REPLAY_READY;
 	}
 	if (job->bootstrap)
 		return REPLAY_LATE;
-	if (canvas_has(job->canvas, k))
+	if (canvas_has_lease(job->canvas, k))
 		return REPLAY_MERGED;
-	struct lease_key before = *k;
-	before.epoch--;
-	bool open = k->epoch <= canvas_rounds(job->canvas) + 1;
-	return open && (k->epoch == 0 || canvas_has(job->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
+	struct lease_key previous = *k;
+	previous.epoch--;
+	bool open = k->epoch <= canvas_complete_rounds(job->canvas) + 1;
+	return open && (k->epoch == 0 || canvas_has_lease(job->canvas, &previous)) ? REPLAY_READY : REPLAY_LATE;
 }
 
-static int merge(struct replay *r, struct batch *b, struct error *e)
+static int merge_batch(struct replay *r, struct batch *b, struct error *e)
 {
 	struct live_job *job = r->job;
-	uint64_t rounds = live_job_rounds(job);
+	uint64_t rounds = live_job_complete_rounds(job);
 	int rc = live_job_merge(job, b, e);
 	if (rc == -EEXIST || rc == -EAGAIN) /* the file is at fault, not the machine */
 		rc = error_prefix(e, -EBADMSG, "a batch out of order");
 	live_job_note_times(job, r->elapsed, rounds);
-	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
+	if (!rc && job->bootstrap && bootstrap_missing_count(job->bootstrap) == 0)
 		rc = live_job_prepare(job, job->film_folder, e);
 	r->batches++;
 	return rc;
@@ -73,42 +73,42 @@ static int foreign_record_error(const struct replay *r, const char *what, size_t
 }
 
 /* Like foreign_record_error(), for estimates and counters, where e already says what is wrong. */
-static int strange_note(const struct replay *r, int rc, struct error *e)
+static int foreign_note_error(const struct replay *r, int rc, struct error *e)
 {
 	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another version wrote it",
 					    (unsigned long long)r->job->id)
 			     : rc;
 }
 
-static int take_batch(struct replay *r, const struct journal_item *item, struct error *e)
+static int replay_batch(struct replay *r, const struct journal_item *item, struct error *e)
 {
 	struct envelope env;
 	struct batch batch = {0};
 	const unsigned char *payload;
 	size_t payload_size;
-	int rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
+	int rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->body_size, &payload,
 				       &payload_size, e);
 	if (rc)
-		return rc == -EBADMSG ? foreign_record_error(r, "a result", item->size, e) : rc;
+		return rc == -EBADMSG ? foreign_record_error(r, "a result", item->body_size, e) : rc;
 	rc = batch_unpack(&batch, &r->job->plan, env.message->lease_result, payload, payload_size, e);
 	if (rc == -EBADMSG)
-		rc = foreign_record_error(r, "a result", item->size, e);
-	if (!rc && item->kind == JOURNAL_AGAIN)
+		rc = foreign_record_error(r, "a result", item->body_size, e);
+	if (!rc && item->kind == JOURNAL_BATCH_REPLACEMENT)
 		rc = rollback_replay(r->job, item->journal, &batch.key, e);
-	if (!rc && item->kind == JOURNAL_KEPT) {
-		r->job->kept_bytes += item->size;
-		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
+	if (!rc && item->kind == JOURNAL_MERGED_BATCH) {
+		r->job->kept_record_bytes += item->body_size;
+		rollback_note_batch(r->job, &batch.key, item->offset, env.message->lease_result->maker);
 		batch_fini(&batch);
 		envelope_fini(&env);
 		return 0;
 	}
-	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->job, &batch.key);
-	if (place == REPLAY_FITS)
-		rc = merge(r, &batch, e);
-	if (place == REPLAY_FITS && !rc)
-		rollback_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
-	else if (place == REPLAY_LATE)
-		rc = late_add(r->job, &batch.key, item->at, e);
+	enum replay_readiness readiness = rc ? REPLAY_MERGED : replay_readiness(r->job, &batch.key);
+	if (readiness == REPLAY_READY)
+		rc = merge_batch(r, &batch, e);
+	if (readiness == REPLAY_READY && !rc)
+		rollback_note_batch(r->job, &batch.key, item->offset, env.message->lease_result->maker);
+	else if (readiness == REPLAY_LATE)
+		rc = late_add(r->job, &batch.key, item->offset, e);
 	batch_fini(&batch);
 	envelope_fini(&env);
 	return rc;
@@ -116,7 +116,8 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 
 static void note_damage(struct replay *r, const struct journal_item *item)
 {
-	if ((item->kind == JOURNAL_BATCH || item->kind == JOURNAL_AGAIN) && r->damaged_count < DAMAGED_MOST)
+	if ((item->kind == JOURNAL_BATCH || item->kind == JOURNAL_BATCH_REPLACEMENT) &&
+	    r->damaged_count < DAMAGED_NAMED_MAX)
 		r->damaged[r->damaged_count++] = item->lease;
 }
 
@@ -125,31 +126,32 @@ static int report_progress(void *user, size_t bytes, struct error *e)
 	struct replay_progress *p = ((struct replay *)user)->progress;
 	if (!p)
 		return 0;
-	atomic_fetch_add(&p->read, bytes);
-	return atomic_load(&p->stop) ? error_set(e, ECANCELED, "the coordinator stops") : 0;
+	atomic_fetch_add(&p->bytes_read, bytes);
+	return atomic_load(&p->stop_requested) ? error_set(e, ECANCELED, "the coordinator stops") : 0;
 }
 
-static int take_record(void *user, const struct journal_item *item, struct error *e)
+static int replay_record(void *user, const struct journal_item *item, struct error *e)
 {
 	struct replay *r = user;
 	struct live_job *job = r->job;
 	struct forecast_look look;
 	const unsigned char *body = item->body;
-	size_t size = item->size;
+	size_t size = item->body_size;
 	int rc = report_progress(r, size, e);
 	if (rc)
 		return rc;
-	if (item->missing) {
+	if (item->damaged_count) {
 		note_damage(r, item);
-		return item->kind == JOURNAL_AGAIN ? rollback_replay(job, item->journal, &item->lease, e) : 0;
+		return item->kind == JOURNAL_BATCH_REPLACEMENT ? rollback_replay(job, item->journal, &item->lease, e)
+							       : 0;
 	}
 	r->elapsed = item->elapsed;
 	switch (item->kind) {
 	case JOURNAL_BATCH:
-	case JOURNAL_AGAIN:
-	case JOURNAL_KEPT:
-		return take_batch(r, item, e);
-	case JOURNAL_PINNED:
+	case JOURNAL_BATCH_REPLACEMENT:
+	case JOURNAL_MERGED_BATCH:
+		return replay_batch(r, item, e);
+	case JOURNAL_FINGERPRINT:
 		if (size >= sizeof job->fingerprint)
 			return foreign_record_error(r, "a fingerprint", size, e);
 		memcpy(job->fingerprint, body, size);
@@ -157,48 +159,49 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return 0;
 	case JOURNAL_LOOK:
 	case JOURNAL_OLD_LOOK:
-		rc = (item->kind == JOURNAL_LOOK ? stored_unpack_look : stored_old_look)(body, size, &look, e);
+		rc = (item->kind == JOURNAL_LOOK ? stored_unpack_look : stored_unpack_old_look)(body, size, &look, e);
 		if (rc)
-			return strange_note(r, rc, e);
+			return foreign_note_error(r, rc, e);
 		forecast_add_look(&job->record.looks, &look);
 		job->look_written = look.work;
 		return 0;
 	case JOURNAL_COUNTS:
 	case JOURNAL_OLD_COUNTS:
 		rc = item->kind == JOURNAL_COUNTS ? stored_unpack_counts(body, size, &job->record.counts, e)
-						  : stored_old_counts(body, size, &job->record.counts, e);
-		return rc ? strange_note(r, rc, e) : 0;
+						  : stored_unpack_old_counts(body, size, &job->record.counts, e);
+		return rc ? foreign_note_error(r, rc, e) : 0;
 	default:
 		return foreign_record_error(r, "a record", size, e);
 	}
 }
 
-/* Merges the batches that had to wait for records further on in the file; the others stay in job->late. */
-static int take_late(struct replay *r, struct error *e)
+/* Merges the batches that had to wait for records further on in the file; the others stay in job->late_results. */
+static int replay_late(struct replay *r, struct error *e)
 {
 	struct live_job *job = r->job;
 	size_t kept = 0;
 	int rc = 0;
 	late_sort(job);
 	for (size_t i = 0; i < job->late_count; i++) {
-		struct late_result l = job->late[i];
-		struct journal_item item = {.kind = JOURNAL_BATCH, .at = l.at};
+		struct late_result l = job->late_results[i];
+		struct journal_item item = {.kind = JOURNAL_BATCH, .offset = l.offset};
 		unsigned char *body = NULL;
-		enum replay_place place = rc ? REPLAY_LATE : replay_place(job, &l.key);
-		if (place == REPLAY_FITS && (rc = journal_body(job->journal, l.at, &body, &item.size, e)) == 0) {
+		enum replay_readiness readiness = rc ? REPLAY_LATE : replay_readiness(job, &l.key);
+		if (readiness == REPLAY_READY &&
+		    (rc = journal_read_body(job->journal, l.offset, &body, &item.body_size, e)) == 0) {
 			item.body = body;
-			rc = take_batch(r, &item, e);
+			rc = replay_batch(r, &item, e);
 			mem_free(body);
 		}
-		if (place == REPLAY_LATE)
-			job->late[kept++] = l;
+		if (readiness == REPLAY_LATE)
+			job->late_results[kept++] = l;
 	}
 	job->late_count = kept;
 	return rc;
 }
 
 /* Logs which damaged results are to be computed again; those computed since are merged and not named. */
-static void say_damage(const struct replay *r, const struct journal_found *found)
+static void log_damage(const struct replay *r, const struct journal_damage *found)
 {
 	struct live_job *job = r->job;
 	char text[400] = "";
@@ -206,46 +209,46 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 	uint64_t open = 0;
 	for (size_t i = 0; i < r->damaged_count; i++) {
 		const struct lease_key *k = &r->damaged[i];
-		if (replay_place(job, k) == REPLAY_MERGED)
+		if (replay_readiness(job, k) == REPLAY_MERGED)
 			continue;
-		text_put(&t, "%s%s " LEASE_WORDS, open++ ? ", " : ": ", LEASE_VALUES(k));
+		text_appendf(&t, "%s%s " LEASE_POSITION_FORMAT, open++ ? ", " : ": ", LEASE_VALUES(k));
 	}
 	live_job_log(
 		job, LOG_SPOOL_FAULT,
 		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; leases to be computed again%s\"",
-		(unsigned long long)found->damaged, job->late_count, (unsigned long long)found->lost,
+		(unsigned long long)found->damaged_count, job->late_count, (unsigned long long)found->lost_count,
 		*text ? text : ": none");
 }
 
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e)
 {
 	struct replay r = {.job = job, .progress = p};
-	struct journal_found found;
+	struct journal_damage found;
 	char folder[SPOOL_PATH_MAX];
 	uint64_t generation = 0;
 	spool_job_path(spool, job->id, NULL, folder);
 	int rc = checkpoint_load(spool, job, &generation, report_progress, &r, e);
 	if (rc && rc != -ENOENT)
 		return rc;
-	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
+	rc = journal_open(&job->journal, folder, job->id, generation, replay_record, &r, &found, e);
 	if (rc == -ENOENT) { /* the batches in it can be computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: its results are computed again\"",
 			     folder, (unsigned long long)generation);
 		rc = journal_create(&job->journal, folder, job->id, generation, e);
 	}
 	if (!rc && job->late_count)
-		rc = take_late(&r, e);
+		rc = replay_late(&r, e);
 	if (rc)
 		return rc;
-	if (found.lost)
-		say_damage(&r, &found);
-	journal_clear(folder, generation);
-	job->pinned = *job->fingerprint != 0;
+	if (found.lost_count)
+		log_damage(&r, &found);
+	journal_delete_others(folder, generation);
+	job->fingerprint_journaled = *job->fingerprint != 0;
 	live_job_log(
 		job, LOG_JOB_STATE,
 		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
-		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(job), job->times.elapsed,
+		(unsigned long long)r.batches, (unsigned long long)live_job_complete_rounds(job), job->times.elapsed,
 		(unsigned long long)job->checkpoint_bytes, (unsigned long long)journal_bytes(job->journal),
-		(unsigned long long)found.cut, (unsigned long long)found.damaged);
+		(unsigned long long)found.cut_bytes, (unsigned long long)found.damaged_count);
 	return 0;
 }

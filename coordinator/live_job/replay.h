@@ -14,8 +14,8 @@
 
 /* Progress of a replay, for another thread to watch. */
 struct replay_progress {
-	_Atomic uint64_t read; /* bytes read so far; journals are read once, the checkpoint twice */
-	atomic_bool stop;      /* set by the watching thread: stop soon, with -ECANCELED */
+	_Atomic uint64_t bytes_read; /* bytes read so far; journals are read once, the checkpoint twice */
+	atomic_bool stop_requested;  /* set by the watching thread: stop soon, with -ECANCELED */
 };
 
 /* Takes a second or more. p: NULL: nobody watches. Any thread that owns the live job. After a failure (-EBADMSG:
@@ -23,11 +23,11 @@ struct replay_progress {
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e);
 
 /* Says whether a result can be merged now. */
-enum replay_place {
-	REPLAY_FITS,   /* it can be merged now */
+enum replay_readiness {
+	REPLAY_READY,  /* it can be merged now */
 	REPLAY_MERGED, /* it is merged already */
 	REPLAY_LATE    /* it cannot be merged yet: an earlier result is missing */
 };
-enum replay_place replay_place(const struct live_job *job, const struct lease_key *k);
+enum replay_readiness replay_readiness(const struct live_job *job, const struct lease_key *k);
 
 #endif

@@ -17,23 +17,23 @@ struct checkpoint_head {
 	uint32_t worker_count;
 	double cpu_seconds, bootstrap_cpu_seconds, look_written;
 	struct live_job_times times;
-	struct bootstrap_result lit;
+	struct bootstrap_result bootstrap_result;
 	struct forecast_history looks;
 	struct job_counts counts;
 	char fingerprint[256];
 };
 
 enum {
-	STORED_NOTE_MOST = 1024,    /* limit on the bytes of one estimate of the error ("look"), or of the counters */
-	STORED_HEAD_MOST = 1 << 16, /* limit on the bytes of a checkpoint's head */
+	STORED_NOTE_MAX = 1024,	   /* limit on the bytes of one estimate of the error ("look"), or of the counters */
+	STORED_HEAD_MAX = 1 << 16, /* limit on the bytes of a checkpoint's head */
 	/* Bytes of a head of version 004, after magic number, size of the head and worker_count. */
-	STORED_OLD_HEAD = 4512,
+	STORED_OLD_HEAD_SIZE = 4512,
 };
 
 /* Each returns the number of bytes packed. */
-size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORED_NOTE_MOST]);
-size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MOST]);
-size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MOST]);
+size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORED_NOTE_MAX]);
+size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MAX]);
+size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MAX]);
 
 /* Each returns -EPROTO if the bytes are not such a message or of another version, -ENOMEM if out of memory. */
 int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
@@ -58,8 +58,9 @@ int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoin
  * 4192    64     counters
  * 4256    256    fingerprint, a string
  */
-int stored_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
-int stored_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
-void stored_old_head(const unsigned char bytes[STORED_OLD_HEAD], uint32_t worker_count, struct checkpoint_head *h);
+int stored_unpack_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
+int stored_unpack_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
+void stored_unpack_old_head(const unsigned char bytes[STORED_OLD_HEAD_SIZE], uint32_t worker_count,
+			    struct checkpoint_head *h);
 
 #endif

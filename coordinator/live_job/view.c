@@ -2,7 +2,7 @@
 /*
  * A job as it is displayed: a record, plus values that only a live job has, as a message or JSON.
  *
- * view_of_record starts a view, view_add_status adds the core's values. Users who may see only their own jobs get
+ * view_from_record starts a view, view_add_status adds the core's values. Users who may see only their own jobs get
  * texts without the ids of other owners' jobs (view_hide_others). Unknown numbers are null in JSON and negative in
  * messages. Messages borrow the view's texts and must be sent while the view exists. JSON is NULL if memory runs out.
  */
@@ -19,7 +19,7 @@
 #define IN_RECORD record.
 #define IN_VIEW
 
-void view_of_record(struct job_view *v, const struct job_record *r)
+void view_from_record(struct job_view *v, const struct job_record *r)
 {
 	memset(v, 0, sizeof *v);
 	v->record = *r;
@@ -77,7 +77,7 @@ void view_hide_others(struct job_view *v)
 	memcpy(v->waiting, v->owners_waiting, sizeof v->waiting);
 }
 
-static const char *why_of(const struct job_view *v)
+static const char *displayed_reason(const struct job_view *v)
 {
 	return *v->waiting ? v->waiting : v->record.why;
 }
@@ -90,7 +90,7 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 #define IGNORE(x)
 #define AT(to) out->to = SEND
 #define NOWHERE IGNORE
-#define TEXT(member, size, in, by, key, shown, wire) wire(text_borrow(v->in member));
+#define TEXT(member, size, in, by, key, shown, wire) wire(text_unconst(v->in member));
 #define NUMBER(kind, member, in, by, key, shown, wire) wire(v->in member);
 #define COUNT(member, by, key, shown, wire) wire(r->member);
 #define COUNTER(member, key, wire) wire(r->counts.member);
@@ -101,7 +101,7 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 #undef NUMBER
 #undef COUNT
 #undef COUNTER
-	out->why = text_borrow(why_of(v));
+	out->why = text_unconst(displayed_reason(v));
 	out->ended = record_is_ended(r);
 	out->halving_cpu_seconds = v->halving_cpu.middle;
 	out->halving_seconds = v->halving_seconds.middle;
@@ -111,18 +111,18 @@ void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm
 {
 	const struct forecast_history *h = &v->record.looks;
 	for (uint32_t i = 0; i < h->count; i++) {
-		Farm__Look *l = looks->at[i] = &looks->look[i];
+		Farm__Look *l = looks->pointers[i] = &looks->items[i];
 		farm__look__init(l);
 		FORECAST_COPY_LOOK(l, &h->looks[i]);
 		l->doubtful = h->looks[i].doubtful != 0;
 	}
 	out->n_looks = h->count;
-	out->looks = looks->at;
+	out->looks = looks->pointers;
 }
 
-static json_t *number_or_null(double x, bool known)
+static json_t *number_or_null(double x, bool is_known)
 {
-	return known ? forecast_real(x) : json_null();
+	return is_known ? json_real_or_null(x) : json_null();
 }
 
 /* Adds the estimated error and the cost of halving it. */
@@ -130,11 +130,11 @@ static void add_forecast(json_t *o, const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
 	struct forecast_range error, eta = {v->eta_low, v->eta, v->eta_high};
-	bool known = forecast_error(&r->looks, &error), live = !record_is_ended(r);
-	json_object_set_new(o, "errorNow", known ? forecast_range_to_json(&error) : json_null());
+	bool is_known = forecast_current_error(&r->looks, &error), live = !record_is_ended(r);
+	json_object_set_new(o, "errorNow", is_known ? forecast_range_to_json(&error) : json_null());
 	json_object_set_new(o, "etaRange", live && v->eta >= 0 ? forecast_range_to_json(&eta) : json_null());
 	json_object_set_new(o, "nextHalving",
-			    !known || !live
+			    !is_known || !live
 				    ? json_null()
 				    : json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu),
 						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
@@ -153,9 +153,9 @@ static json_t *lines_to_json(const char *lines)
 static void add_details(json_t *o, const struct job_record *r)
 {
 	json_object_set_new(o, "sceneNotes", lines_to_json(r->scene_notes));
-	json_object_set_new(o, "strategies", record_strategies(r));
+	json_object_set_new(o, "strategies", record_strategies_to_json(r));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
-	json_object_set_new(o, "effects", record_effects(r));
+	json_object_set_new(o, "effects", record_effects_to_json(r));
 	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
@@ -173,14 +173,14 @@ json_t *view_to_json(const struct job_view *v, bool details)
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
 	json_t *o = json_pack("{s:s}", "id", id);
-	if (!o || !fields_show(fields, sizeof fields / sizeof *fields, v, o)) {
+	if (!o || !fields_to_status_json(fields, sizeof fields / sizeof *fields, v, o)) {
 		json_decref(o);
 		return NULL;
 	}
-	json_object_set_new(o, "why", json_string(why_of(v)));
+	json_object_set_new(o, "why", json_string(displayed_reason(v)));
 	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(r)));
 	add_forecast(o, v);
-	json_object_set_new(o, "counts", record_counts(r));
+	json_object_set_new(o, "counts", record_counts_to_json(r));
 	json_object_set_new(o, "agreement", convergence_to_json(&r->convergence));
 	if (details)
 		add_details(o, r);
@@ -192,11 +192,11 @@ json_t *view_peer_to_json(const struct peer_status *p, double now)
 	/* clang-format off */
 	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",
 			 "id", (json_int_t)p->id, "name", p->name, "state", peer_state_name(p->state),
-			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want,
-			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->last_seen,
+			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->wanted_leases,
+			 "leases", (int)p->held_leases, "connected", now - p->joined_at, "heard", now - p->last_seen,
 			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,
 			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures,
-			 "faults", (json_int_t)p->faults, "restarts", (json_int_t)p->restarts, "text", p->text);
+			 "faults", (json_int_t)p->faults, "restarts", (json_int_t)p->restarts, "text", p->last_fault);
 	/* clang-format on */
 }
 
@@ -205,7 +205,7 @@ json_t *view_quarantined_to_json(const struct worker_status *w)
 	/* clang-format off */
 	return json_pack("{s:s s:s s:s s:I s:I s:s}",
 			 "name", w->name, "certificate", w->certificate, "home", w->home,
-			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", w->text);
+			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong_results, "why", w->last_fault);
 	/* clang-format on */
 }
 
@@ -215,5 +215,5 @@ json_t *view_lease_to_json(const struct lease_status *l, const char *worker, dou
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)l->key.job);
 	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind", lease_kind_name(l->key.kind), "group",
 			 (int)l->key.group, "part", (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker",
-			 worker, "age", now - l->sent, "overdue", (int)l->overdue);
+			 worker, "age", now - l->sent_at, "overdue", (int)l->overdue);
 }

@@ -27,7 +27,7 @@ struct job_view {
 };
 
 /* Starts a view with a job's record. */
-void view_of_record(struct job_view *v, const struct job_record *r);
+void view_from_record(struct job_view *v, const struct job_record *r);
 /* Adds the core's values of a live job to a view whose record has the job's names and times already. */
 void view_add_status(struct job_view *v, const struct job_status *s);
 
@@ -36,7 +36,7 @@ void view_hide_others(struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
 struct view_looks {
-	Farm__Look look[FORECAST_LOOKS], *at[FORECAST_LOOKS];
+	Farm__Look items[FORECAST_LOOKS_MAX], *pointers[FORECAST_LOOKS_MAX];
 };
 /* Borrows v's texts and `looks`. */
 void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out);

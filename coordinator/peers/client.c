@@ -32,28 +32,29 @@
 #include <string.h>
 
 /* Limit on the bytes of all submissions that wait for files. */
-enum { CHUNK = 1 << 20, PACE = CHUNK, UPLOADS_MOST = 1 << 28 };
+enum { CHUNK_BYTES = 1 << 20, PACE_BYTES = CHUNK_BYTES, SUBMIT_BYTES_MAX = 1 << 28 };
 
 static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
 {
-	char text[1024] = "", plan[PLAN_TEXT + 200] = "";
+	char text[1024] = "", plan[PLAN_TEXT_MAX + 200] = "";
 	struct blob_hash *hashes = NULL;
 	ProtobufCBinaryData *list = NULL;
 	struct job_view v;
 	text_copy(text, sizeof text, refusal);
 	if (u) {
-		plan_describe(&u->plan, plan, PLAN_TEXT);
+		plan_describe(&u->plan, plan, PLAN_TEXT_MAX);
 		size_t n = strlen(plan);
-		snprintf(plan + n, sizeof plan - n, "%s%s", *u->rule ? "; " : "", u->rule);
+		snprintf(plan + n, sizeof plan - n, "%s%s", *u->epoch_rule ? "; " : "", u->epoch_rule);
 	}
 	if (u && !job) {
 		hashes = mem_alloc(u->missing_count, sizeof *hashes);
 		list = mem_alloc(u->missing_count, sizeof *list);
 	}
-	Farm__SubmitAnswer answer = MESSAGE(submit_answer, .job = job, .refusal = text, .plan = plan,
-					    .submitted = job && jobs_view(p->jobs, job, &v) ? v.record.submitted : 0);
+	Farm__SubmitAnswer answer =
+		MESSAGE(submit_answer, .job = job, .refusal = text, .plan = plan,
+			.submitted = job && jobs_get_view(p->jobs, job, &v) ? v.record.submitted : 0);
 	if (hashes && list) {
-		answer.n_missing = upload_missing(u, hashes);
+		answer.n_missing = upload_missing_hashes(u, hashes);
 		for (size_t i = 0; i < answer.n_missing; i++)
 			list[i] = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
 		answer.missing = list;
@@ -63,55 +64,55 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 	mem_free(list);
 }
 
-void client_upload_abort(struct session *p)
+void client_abort_upload(struct session *p)
 {
 	if (p->upload)
 		upload_free(p->upload);
 	p->upload = NULL;
-	p->peers->upload_bytes -= p->upload_bytes;
-	p->upload_bytes = 0;
-	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
+	p->peers->submit_message_bytes -= p->submit_message_bytes;
+	p->submit_message_bytes = 0;
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER_MAX, 0});
 }
 
 static void refuse_upload(struct session *p, const struct error *e)
 {
 	answer_submit(p, 0, e->text, NULL);
-	client_upload_abort(p);
+	client_abort_upload(p);
 }
 
-static int within_quota(const struct session *p, struct error *e)
+static int check_quota(const struct session *p, struct error *e)
 {
-	if (p->who.role == TLS_OPERATOR)
+	if (p->tls_identity.role == TLS_OPERATOR)
 		return 0;
-	return jobs_within_quota(p->jobs, p->who.name, 0, client_uploading(p), &p->upload->plan,
-				 p->upload->submit.message->submit, e);
+	return jobs_check_quota(p->jobs, p->tls_identity.name, 0, client_uploading_bytes(p), &p->upload->plan,
+				p->upload->submission.message->submit, e);
 }
 
 /* Checks whether the job could be stored if all other jobs were over, since otherwise it would be held forever, and
  * other jobs with it; and whether memory has room for its chain states, supposing that workers send the longest
  * possible. */
-static int fits(const struct session *p, struct error *e)
+static int check_capacity(const struct session *p, struct error *e)
 {
-	uint64_t bytes = canvas_bytes(&p->upload->plan) + upload_bytes(p->upload),
-		 states = chain_states_max(&p->upload->plan);
-	if (states > p->jobs->config.state_bytes)
+	uint64_t bytes = canvas_bytes(&p->upload->plan) + upload_file_bytes(p->upload),
+		 states = chain_states_max_bytes(&p->upload->plan);
+	if (states > p->jobs->config.max_state_bytes)
 		return error_set(e, ENOMEM,
 				 "the states of its %u chains could need %.3g MB of the coordinator's memory; the "
 				 "limit is %.3g MB: fewer --chains, or a smaller --max-depth",
 				 p->upload->plan.chains, 1e-6 * (double)states,
-				 1e-6 * (double)p->jobs->config.state_bytes);
-	int rc = spool_holds(p->jobs->spool, bytes, e);
-	return rc ? rc : room_could_hold(p->jobs, bytes, e);
+				 1e-6 * (double)p->jobs->config.max_state_bytes);
+	int rc = spool_check_capacity(p->jobs->spool, bytes, e);
+	return rc ? rc : room_check_fits(p->jobs, bytes, e);
 }
 
 /* Gives the submission, whose blobs have all arrived, to the core, and answers the client. */
-static void submit(struct session *p)
+static void submit_job(struct session *p)
 {
-	const Farm__Submit *m = p->upload->submit.message->submit;
+	const Farm__Submit *m = p->upload->submission.message->submit;
 	char name[128];
 	struct error e;
 	/* Checked again, because other jobs may have been submitted while its files arrived. */
-	if (within_quota(p, &e)) {
+	if (check_quota(p, &e)) {
 		refuse_upload(p, &e);
 		return;
 	}
@@ -121,99 +122,99 @@ static void submit(struct session *p)
 			   .submit = {.plan = &p->upload->plan,
 				      .name = name,
 				      .priority = m->priority,
-				      .owner = p->who.name,
+				      .owner = p->tls_identity.name,
 				      .mixed = m->mixed,
-				      .verify = trust_share(p->jobs, m)}};
-	struct submission from = {.submit = &p->upload->submit,
-				  .plan = &p->upload->plan,
-				  .rule = p->upload->rule,
-				  .owner = p->who.name,
-				  .address = p->address};
-	int rc = jobs_ask(p->jobs, &ev, &(struct incoming){.submission = &from}, &e);
-	answer_submit(p, rc ? 0 : from.job, e.text, rc ? NULL : p->upload);
-	client_upload_abort(p);
+				      .verify_fraction = trust_verify_fraction(p->jobs, m)}};
+	struct submission submission = {.envelope = &p->upload->submission,
+					.plan = &p->upload->plan,
+					.epoch_rule = p->upload->epoch_rule,
+					.owner = p->tls_identity.name,
+					.address = p->address};
+	int rc = jobs_try_step(p->jobs, &ev, &(struct incoming){.submission = &submission}, &e);
+	answer_submit(p, rc ? 0 : submission.job_id, e.text, rc ? NULL : p->upload);
+	client_abort_upload(p);
 }
 
-static void on_looks(uv_idle_t *h);
+static void on_lookup_idle(uv_idle_t *h);
 
 /* Looks for the submission's files in the store, where existing ones are read first, and asks the client for the
  * missing ones. */
-static void look_for_files(struct session *p)
+static void look_up_files(struct session *p)
 {
 	struct error e;
-	int rc = upload_look(p->upload, p->jobs, &e);
+	int rc = upload_look_up_files(p->upload, p->jobs, &e);
 	if (rc == -EAGAIN)
-		uv_idle_start(&p->peers->looks, on_looks);
+		uv_idle_start(&p->peers->lookup_idle, on_lookup_idle);
 	if (rc == -EAGAIN || rc == -EINPROGRESS)
 		return;
 	if (!rc && p->upload->missing_count == 0) {
-		submit(p);
+		submit_job(p);
 		return;
 	}
-	if (rc || within_quota(p, &e)) {
+	if (rc || check_quota(p, &e)) {
 		refuse_upload(p, &e);
 		return;
 	}
-	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
-	p->upload->pace.paced = jobs_now(p->jobs);
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER_MAX, CHUNK_BYTES});
+	p->upload->pace.progress_at = jobs_now(p->jobs);
 	answer_submit(p, 0, "", p->upload);
 }
 
 /* Continues one submission in each turn of the loop; the submissions take turns. */
-static void on_looks(uv_idle_t *h)
+static void on_lookup_idle(uv_idle_t *h)
 {
 	struct peers *s = h->data;
 	struct session *next = NULL;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->state == SESSION_CLIENT && p->upload && p->upload->looks_later &&
-		    (!next || p->turn < next->turn))
+		if (p->state == SESSION_CLIENT && p->upload && p->upload->lookup_pending &&
+		    (!next || p->turn_number < next->turn_number))
 			next = p;
 	if (!next) {
 		uv_idle_stop(h);
 		return;
 	}
-	next->turn = ++s->requests;
-	look_for_files(next);
+	next->turn_number = ++s->request_total;
+	look_up_files(next);
 }
 
-/* Whether the client has sent less than PACE bytes for twice the time within which a frame must be complete. */
-static bool stands_still(const struct session *p)
+/* Whether the client has sent less than PACE_BYTES bytes for twice the time within which a frame must be complete. */
+static bool has_stalled(const struct session *p)
 {
-	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.paced > 2 * p->jobs->config.stall_seconds;
+	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.progress_at > 2 * p->jobs->config.stall_seconds;
 }
 
 /* Makes room for the files of a submission by refusing another one. The submission that has been idle longest gives
- * way; if none is idle, the latest of those that began after `begun` and have received something. So no submission
+ * way; if none is idle, the latest of those that began after `begun_at` and have received something. So no submission
  * keeps room by waiting, and later submissions take no room from those that are halfway. begun: when the submission
  * in need began; INFINITY if nothing of it has arrived yet, in which case only idle ones give way. Returns false if
  * none gives way. */
-static bool other_gives_way(struct peers *s, const struct session *sender, double begun)
+static bool evict_other_upload(struct peers *s, const struct session *sender, double begun)
 {
-	struct session *still = NULL, *latest = NULL;
+	struct session *stalled = NULL, *latest = NULL;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		const struct upload *u = p == sender ? NULL : p->upload;
 		if (!u)
 			continue;
-		if (stands_still(p) && (!still || u->pace.paced < still->upload->pace.paced))
-			still = p;
-		if (u->received && !u->flush && u->pace.begun > begun) {
+		if (has_stalled(p) && (!stalled || u->pace.progress_at < stalled->upload->pace.progress_at))
+			stalled = p;
+		if (u->received && !u->flush && u->pace.begun_at > begun) {
 			latest = p;
-			begun = u->pace.begun;
+			begun = u->pace.begun_at;
 		}
 	}
 	struct error e;
-	if (still) {
+	if (stalled) {
 		error_set(&e, EBUSY, "its files came too slowly, and others need their room: try again later");
-		refuse_upload(still, &e);
+		refuse_upload(stalled, &e);
 	} else if (latest) {
 		error_set(&e, EBUSY,
 			  "a submission that was begun earlier needs the room of its files: try again later");
 		refuse_upload(latest, &e);
 	}
-	return still || latest;
+	return stalled || latest;
 }
 
-static void take_submit(struct session *p, struct envelope *env)
+static void handle_submit(struct session *p, struct envelope *env)
 {
 	struct error e;
 	if (p->upload) {
@@ -221,9 +222,9 @@ static void take_submit(struct session *p, struct envelope *env)
 		return;
 	}
 	size_t bytes = env->bytes;
-	while (bytes > UPLOADS_MOST - p->peers->upload_bytes && other_gives_way(p->peers, p, INFINITY))
+	while (bytes > SUBMIT_BYTES_MAX - p->peers->submit_message_bytes && evict_other_upload(p->peers, p, INFINITY))
 		continue;
-	if (bytes > UPLOADS_MOST - p->peers->upload_bytes) {
+	if (bytes > SUBMIT_BYTES_MAX - p->peers->submit_message_bytes) {
 		answer_submit(p, 0, "too many submissions are being sent to the coordinator: try again later", NULL);
 		return;
 	}
@@ -232,22 +233,22 @@ static void take_submit(struct session *p, struct envelope *env)
 		answer_submit(p, 0, e.text, NULL);
 		return;
 	}
-	p->upload->pace.begun = jobs_now(p->jobs);
-	p->upload->pace.paced = INFINITY;
-	p->upload_bytes = bytes;
-	p->peers->upload_bytes += bytes;
-	if (fits(p, &e)) {
+	p->upload->pace.begun_at = jobs_now(p->jobs);
+	p->upload->pace.progress_at = INFINITY;
+	p->submit_message_bytes = bytes;
+	p->peers->submit_message_bytes += bytes;
+	if (check_capacity(p, &e)) {
 		refuse_upload(p, &e);
 		return;
 	}
-	p->told = jobs_now(p->jobs);
-	look_for_files(p);
+	p->waiting_heartbeat_at = jobs_now(p->jobs);
+	look_up_files(p);
 }
 
-void client_file_read(struct session *p, const struct blob_hash *h, bool right)
+void client_file_checked(struct session *p, const struct blob_hash *h, bool is_intact)
 {
-	if (p->state == SESSION_CLIENT && p->upload && upload_file_read(p->upload, h, right))
-		look_for_files(p);
+	if (p->state == SESSION_CLIENT && p->upload && upload_file_checked(p->upload, h, is_intact))
+		look_up_files(p);
 }
 
 static void on_flushed(void *user, int rc, const struct error *why)
@@ -257,33 +258,34 @@ static void on_flushed(void *user, int rc, const struct error *why)
 	if (p->state != SESSION_CLIENT || p->jobs->stopping)
 		return;
 	if (!rc && p->upload->missing_count == 0)
-		submit(p);
+		submit_job(p);
 	else if (rc || upload_flush(p->upload, p->jobs->loop, on_flushed, p, &e))
 		refuse_upload(p, &e);
 }
 
-static void keep_pace(const struct session *p)
+static void note_progress(const struct session *p)
 {
 	struct upload *u = p->upload;
-	if (u->received - u->pace.bytes < PACE)
+	if (u->received - u->pace.progress_bytes < PACE_BYTES)
 		return;
-	u->pace.bytes = u->received;
-	u->pace.paced = jobs_now(p->jobs);
+	u->pace.progress_bytes = u->received;
+	u->pace.progress_at = jobs_now(p->jobs);
 }
 
-static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+static void handle_blob_chunk(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
-	if (!p->upload || upload_is_looking(p->upload)) {
+	if (!p->upload || upload_is_looking_up(p->upload)) {
 		session_fault(p, "a blob without a submission");
 		return;
 	}
 	int rc;
 	do
-		rc = upload_add(p->upload, c, payload, size, &e);
-	while (rc == -EFBIG && other_gives_way(p->peers, p, p->upload->writer ? p->upload->pace.begun : INFINITY));
+		rc = upload_add_chunk(p->upload, c, payload, size, &e);
+	while (rc == -EFBIG &&
+	       evict_other_upload(p->peers, p, p->upload->writer ? p->upload->pace.begun_at : INFINITY));
 	if (rc >= 0)
-		keep_pace(p);
+		note_progress(p);
 	if (rc > 0) {
 		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
 			  (unsigned long long)c->size);
@@ -293,10 +295,10 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 		refuse_upload(p, &e);
 }
 
-static void take_list(struct session *p)
+static void handle_job_list(struct session *p)
 {
 	struct job_view *views;
-	size_t count = jobs_views(p->jobs, ENDED_MAX, &views);
+	size_t count = jobs_list_views(p->jobs, ENDED_JOBS_MAX, &views);
 	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
 	Farm__JobListAnswer answer = MESSAGE(job_list_answer, .jobs = list);
 	for (size_t i = 0; status && list && i < count; i++) {
@@ -311,16 +313,16 @@ static void take_list(struct session *p)
 	mem_free(views);
 }
 
-static void take_watch(struct session *p, uint64_t job)
+static void handle_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
-	if (!client_finds_job(p, job, &v)) {
+	if (!client_find_job(p, job, &v)) {
 		session_fault(p, "j%llu: no such job", (unsigned long long)job);
 		return;
 	}
-	p->watched = job;
-	mem_free(p->shown);
-	p->shown = NULL;
+	p->watched_job = job;
+	mem_free(p->shown_status);
+	p->shown_status = NULL;
 	client_tick(p);
 }
 
@@ -329,41 +331,41 @@ void client_tick(struct session *p)
 	struct job_view v;
 	struct view_looks looks;
 	Farm__JobStatus status;
-	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
+	if (!p->watched_job || p->state != SESSION_CLIENT || conn_unsent_bytes(p->conn))
 		return;
-	if (!client_finds_job(p, p->watched, &v)) {
+	if (!client_find_job(p, p->watched_job, &v)) {
 		session_fault(p, "the job is no longer known");
 		return;
 	}
-	if (p->shown && memcmp(p->shown, &v, sizeof v) == 0)
+	if (p->shown_status && memcmp(p->shown_status, &v, sizeof v) == 0)
 		return;
-	if (!p->shown && !(p->shown = mem_alloc(1, sizeof v)))
+	if (!p->shown_status && !(p->shown_status = mem_alloc(1, sizeof v)))
 		return;
-	*p->shown = v;
+	*p->shown_status = v;
 	view_to_wire(&v, &status);
 	view_looks_to_wire(&v, &looks, &status);
 	conn_send(p->conn, ENVELOPE_OF(JOB_STATUS, job_status, &status), NULL, 0);
 	if (record_is_ended(&v.record)) {
-		p->ended.job = p->watched;
-		p->ended.at = jobs_now(p->jobs);
-		p->watched = 0;
+		p->ended_watch.job = p->watched_job;
+		p->ended_watch.told_at = jobs_now(p->jobs);
+		p->watched_job = 0;
 	}
 }
 
-void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+void client_handle_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
 	case FARM__ENVELOPE__BODY_HEARTBEAT:
 		break;
 	case FARM__ENVELOPE__BODY_SUBMIT:
-		take_submit(p, env);
+		handle_submit(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
-		take_blob(p, m->blob_chunk, payload, size);
+		handle_blob_chunk(p, m->blob_chunk, payload, size);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_LIST:
-		take_list(p);
+		handle_job_list(p);
 		break;
 	case FARM__ENVELOPE__BODY_WORKER_LIST:
 		worker_list_send(p);
@@ -372,10 +374,10 @@ void client_message(struct session *p, struct envelope *env, const unsigned char
 		control_cancel(p, m->cancel->job);
 		break;
 	case FARM__ENVELOPE__BODY_CONTROL:
-		control_job(p, m->control);
+		control_apply(p, m->control);
 		break;
 	case FARM__ENVELOPE__BODY_WATCH:
-		take_watch(p, m->watch->job);
+		handle_watch(p, m->watch->job);
 		break;
 	case FARM__ENVELOPE__BODY_FETCH:
 		fetch_begin(p, m->fetch);

@@ -10,10 +10,10 @@
  * others' jobs from the view. */
 bool client_may_see(const struct session *p, struct job_view *v);
 /* Returns false if there is no such job, or the client may not see it. */
-bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v);
+bool client_find_job(const struct session *p, uint64_t job, struct job_view *v);
 /* Sends a Done. refusal: the reason; NULL: the request was fulfilled. text: what was done, or "". */
 void client_send_done(struct session *p, const char *refusal, const char *text);
 /* Returns how many bytes of scene files other connections of the same owner are sending. */
-uint64_t client_uploading(const struct session *p);
+uint64_t client_uploading_bytes(const struct session *p);
 
 #endif

@@ -7,6 +7,6 @@
 
 /* Each order is answered by Done, an extension possibly later. */
 void control_cancel(struct session *p, uint64_t job);
-void control_job(struct session *p, const Farm__Control *c);
+void control_apply(struct session *p, const Farm__Control *c);
 
 #endif

@@ -23,20 +23,20 @@
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client.h"
 #include "coordinator/peers/fetch.h"
-#include "coordinator/peers/held.h"
+#include "coordinator/peers/request_queue.h"
 #include "coordinator/peers/worker.h"
 #include "coordinator/peers/worker_requests.h"
 
 #include <stdio.h>
 #include <string.h>
 
-/* final: reconnecting will not help. said: why the peer is refused, or a note for a peer that is accepted. */
-static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
+/* is_permanent: reconnecting will not help. reason: why the peer is refused, or a note for a peer that is accepted. */
+static void answer_hello(struct session *p, bool accepted, bool is_permanent, const char *reason)
 {
 	char text[256];
-	text_copy(text, sizeof text, said);
+	text_copy(text, sizeof text, reason);
 	conn_send(p->conn,
-		  ENVELOPE(HELLO_ACK, hello_ack, .accepted = accepted, .final = final, .text = text,
+		  ENVELOPE(HELLO_ACK, hello_ack, .accepted = accepted, .final = is_permanent, .text = text,
 			   .version = FARM_VERSION,
 			   .heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds)),
 		  NULL, 0);
@@ -49,26 +49,26 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 }
 
 /* Refuses a peer for a reason that reconnecting does not change. */
-static void refuse_for_good(struct session *p, const char *said)
+static void refuse_for_good(struct session *p, const char *reason)
 {
-	answer_hello(p, false, true, said);
+	answer_hello(p, false, true, reason);
 }
 
 /* Writes notes for a peer that is accepted. */
-static const char *what_to_know(const struct session *p, char *text, size_t size)
+static const char *write_peer_notes(const struct session *p, char *text, size_t size)
 {
 	struct peer_status s;
 	*text = 0;
-	if (recovery_is_on(p->jobs))
+	if (recovery_is_running(p->jobs))
 		text_print(text, size,
 			   "the coordinator is reading its jobs, %u %%: requests wait until it has finished",
-			   (unsigned)(100 * recovery_share(p->jobs)));
-	if (p->joined && farm_peer(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
-		text_print(text, size, "this worker is quarantined and gets no work: %s", s.text);
+			   (unsigned)(100 * recovery_progress(p->jobs)));
+	if (p->known_to_core && farm_peer_status(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
+		text_print(text, size, "this worker is quarantined and gets no work: %s", s.last_fault);
 	return text;
 }
 
-static void join(struct session *p, const Farm__Hello *h)
+static void join_worker(struct session *p, const Farm__Hello *h)
 {
 	char text[256];
 	struct error e;
@@ -78,12 +78,12 @@ static void join(struct session *p, const Farm__Hello *h)
 				    .name = p->name,
 				    .fingerprint = h->fingerprint,
 				    .threads = h->threads,
-				    .certificate = p->who.name,
+				    .certificate = p->tls_identity.name,
 				    .home = h->home,
 				    .restarts = h->restarts}};
-	p->joined = true;
-	if (jobs_ask(p->jobs, &ev, &(struct incoming){0}, &e)) {
-		p->joined = false;
+	p->known_to_core = true;
+	if (jobs_try_step(p->jobs, &ev, &(struct incoming){0}, &e)) {
+		p->known_to_core = false;
 		answer_hello(p, false, false, e.text);
 		return;
 	}
@@ -91,21 +91,22 @@ static void join(struct session *p, const Farm__Hello *h)
 	log_event(
 		LOG_PEER_HELLO,
 		"peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
-		(unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-",
-		*h->home ? h->home : "-", (unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
-	answer_hello(p, true, false, what_to_know(p, text, sizeof text));
+		(unsigned long long)p->id, p->address, log_quote(p->name).text,
+		*p->tls_identity.name ? p->tls_identity.name : "-", *h->home ? h->home : "-",
+		(unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
+	answer_hello(p, true, false, write_peer_notes(p, text, sizeof text));
 }
 
-/* Returns what the peer wants to do but its certificate does not allow; NULL: nothing. Sets p->who. */
+/* Returns what the peer wants to do but its certificate does not allow; NULL: nothing. Sets p->tls_identity. */
 static const char *find_overreach(struct session *p, Farm__Role role, char *text, size_t size)
 {
 	const struct tls_peer *who = conn_peer(p->conn);
 	if (!who)
 		return NULL;
-	p->who = *who;
-	bool may = role == FARM__ROLE__ROLE_WORKER ? who->role == TLS_WORKER
-						   : who->role == TLS_CLIENT || who->role == TLS_OPERATOR;
-	if (may)
+	p->tls_identity = *who;
+	bool is_allowed = role == FARM__ROLE__ROLE_WORKER ? who->role == TLS_WORKER
+							  : who->role == TLS_CLIENT || who->role == TLS_OPERATOR;
+	if (is_allowed)
 		return NULL;
 	snprintf(text, size, "the certificate of %s is a %s's: it cannot %s", who->name, tls_role_name(who->role),
 		 role == FARM__ROLE__ROLE_WORKER ? "take leases" : "submit or manage jobs");
@@ -113,13 +114,13 @@ static const char *find_overreach(struct session *p, Farm__Role role, char *text
 }
 
 /* Whether a home's name is hexadecimal digits, and no longer than the core can store. */
-static bool home_ok(const char *home)
+static bool is_valid_home(const char *home)
 {
 	size_t n = strspn(home, "0123456789abcdef");
-	return !home[n] && n < JOIN_HOME;
+	return !home[n] && n < JOIN_HOME_SIZE;
 }
 
-static void take_hello(struct session *p, const Farm__Hello *h)
+static void handle_hello(struct session *p, const Farm__Hello *h)
 {
 	char text[192];
 	if (h->version != FARM_VERSION) {
@@ -132,82 +133,82 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		refuse_for_good(p, text);
 		return;
 	}
-	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
-	    !home_ok(h->home) || h->threads > 4096) {
+	if (!envelope_text_is_valid(h->name, sizeof p->name - 1) || !envelope_text_is_valid(h->fingerprint, 255) ||
+	    !is_valid_home(h->home) || h->threads > 4096) {
 		refuse_for_good(p, "a name or a number in hello is out of bounds");
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
-	const char *no = find_overreach(p, h->role, text, sizeof text);
-	if (no) {
-		refuse_for_good(p, no);
+	const char *overreach = find_overreach(p, h->role, text, sizeof text);
+	if (overreach) {
+		refuse_for_good(p, overreach);
 		return;
 	}
-	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
-	conn_set_send_limit(p->conn, SESSION_SEND);
-	conn_set_quiet(p->conn, 6 * p->jobs->config.heartbeat_seconds);
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER_MAX, 0});
+	conn_set_send_limit(p->conn, SESSION_SEND_MAX);
+	conn_set_idle_timeout(p->conn, 6 * p->jobs->config.heartbeat_seconds);
 	if (h->role == FARM__ROLE__ROLE_WORKER) {
-		join(p, h);
+		join_worker(p, h);
 	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
 		p->state = SESSION_CLIENT;
-		answer_hello(p, true, false, what_to_know(p, text, sizeof text));
+		answer_hello(p, true, false, write_peer_notes(p, text, sizeof text));
 	} else {
 		refuse_for_good(p, "hello must say whether it is a worker or a client");
 	}
 }
 
 /* Handles a message. May take over the envelope. */
-static void take_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+static void handle_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
-		take_hello(p, env->message->hello);
+		handle_hello(p, env->message->hello);
 	else if (p->state == SESSION_NEW)
 		session_fault(p, "the first message must be hello");
 	else if (p->state == SESSION_WORKER)
-		worker_message(p, env);
+		worker_handle_message(p, env);
 	else if (p->state == SESSION_CLIENT)
-		client_message(p, env, payload, size);
+		client_handle_message(p, env, payload, size);
 }
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	struct session *p = user;
-	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
+	bool has_role = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
 	Farm__Envelope__BodyCase what = env->message->body_case; /* read now, because the envelope may be taken over */
 	double begun = jobs_now(p->jobs);
-	if (known && held_take(p, env))
+	if (has_role && request_queue_defer(p, env))
 		return;
-	take_message(p, env, payload, size);
-	held_end(p, what, begun);
+	handle_message(p, env, payload, size);
+	request_queue_note_handled(p, what, begun);
 }
 
-static void take_held(struct session *p)
+static void handle_queued(struct session *p)
 {
 	struct envelope env;
-	if (!held_next(p, &env))
+	if (!request_queue_pop(p, &env))
 		return;
 	Farm__Envelope__BodyCase what = env.message->body_case;
 	double begun = jobs_now(p->jobs);
-	take_message(p, &env, NULL, 0);
-	held_end(p, what, begun);
+	handle_message(p, &env, NULL, 0);
+	request_queue_note_handled(p, what, begun);
 	envelope_fini(&env);
 }
 
-void conversations_go_on(struct peers *s)
+void conversations_resume(struct peers *s)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		while (p->state == SESSION_WORKER && !STAILQ_EMPTY(&p->held))
-			take_held(p);
+		while (p->state == SESSION_WORKER && !STAILQ_EMPTY(&p->queued_requests))
+			handle_queued(p);
 	conversations_tick(s);
 }
 
 void conversations_tick(struct peers *s)
 {
 	s->request_ms = 0;
-	if (recovery_is_on(s->jobs))
+	if (recovery_is_running(s->jobs))
 		return;
-	for (struct session *p; (p = held_turn(s));)
-		take_held(p);
+	for (struct session *p; (p = request_queue_next_session(s));)
+		handle_queued(p);
 }
 
 static void on_closed(void *user, const char *why)
@@ -215,28 +216,28 @@ static void on_closed(void *user, const char *why)
 	struct session *p = user;
 	struct peers *s = p->peers;
 	if (!p->jobs->stopping)
-		results_let_go(p->jobs, p->id); /* while the session still has a name */
-	peers_delist(s, p);
-	client_upload_abort(p);
+		results_release_peer(p->jobs, p->id); /* while the session still has a name */
+	peers_remove_session(s, p);
+	client_abort_upload(p);
 	fetch_end(p);
 	worker_requests_drop(p);
-	held_drop(p);
-	extend_forget(p->jobs, p->id);
-	s->garbled += conn_garbled(p->conn);
-	log_event(conn_garbled(p->conn)	       ? LOG_PEER_GARBLED
-		  : conn_distrust(p->conn)     ? LOG_PEER_REFUSED
-		  : conn_gave_way(p->conn)     ? LOG_PEER_REFUSED
-		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
-					       : LOG_PEER_ACCEPT,
+	request_queue_drop(p);
+	extend_forget_peer(p->jobs, p->id);
+	s->garbled_count += conn_had_bad_checksum(p->conn);
+	log_event(conn_had_bad_checksum(p->conn)    ? LOG_PEER_GARBLED
+		  : conn_certificate_error(p->conn) ? LOG_PEER_REFUSED
+		  : conn_was_evicted(p->conn)	    ? LOG_PEER_REFUSED
+		  : p->state == SESSION_WORKER	    ? LOG_PEER_CLOSED
+						    : LOG_PEER_ACCEPT,
 		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(why).text);
-	if (p->joined && !p->jobs->stopping) {
+	if (p->known_to_core && !p->jobs->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
 		jobs_step(p->jobs, &ev);
 	}
-	mem_free(p->shown);
+	mem_free(p->shown_status);
 	mem_free(p);
 }
 
 const struct conn_events conversation_events = {
-	.message = on_message, .partial = worker_heard, .drained = worker_requests_go_on, .closed = on_closed};
+	.message = on_message, .partial = worker_note_partial, .drained = worker_requests_resume, .closed = on_closed};

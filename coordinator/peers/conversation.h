@@ -12,7 +12,7 @@ extern const struct conn_events conversation_events; /* their user is the sessio
 
 /* Handles requests that waited for others, as many as there is time for. Call every TICK_MS. */
 void conversations_tick(struct peers *s);
-/* The jobs have been read: handles the requests that waited for that (held.h). */
-void conversations_go_on(struct peers *s);
+/* The jobs have been read: handles the requests that waited for that (request_queue.h). */
+void conversations_resume(struct peers *s);
 
 #endif

@@ -13,10 +13,10 @@
 #include <fcntl.h>
 #include <string.h>
 
-enum { CHUNK = 1 << 20 };
-static const double preview_seconds = 5; /* a preview younger than this is sent again */
+enum { CHUNK_BYTES = 1 << 20 };
+static const double preview_max_age = 5; /* a preview younger than this is sent again */
 
-static const char *file_of(Farm__What what)
+static const char *file_name(Farm__What what)
 {
 	switch (what) {
 	case FARM__WHAT__WHAT_RESULT:
@@ -30,7 +30,7 @@ static const char *file_of(Farm__What what)
 	}
 }
 
-static int cleared(const struct job_record *r, struct error *e)
+static int cleared_error(const struct job_record *r, struct error *e)
 {
 	char day[32];
 	struct tm t;
@@ -47,20 +47,20 @@ void fetch_end(struct session *p)
 		return;
 	disk_close(p->fetch.fd);
 	p->fetch = (struct fetching){0};
-	p->peers->fetches--;
+	p->peers->fetch_count--;
 }
 
 /* Drops the fetch that has been idle longest if there are too many: clients that start and stop must not block those
  * that continue. */
-static void make_room(struct peers *s)
+static void drop_idlest_fetch(struct peers *s)
 {
-	struct session *silent = NULL;
-	if (s->fetches < s->jobs->config.max_fetches)
+	struct session *idlest = NULL;
+	if (s->fetch_count < s->jobs->config.max_fetches)
 		return;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->fetch.job && (!silent || p->fetch.at < silent->fetch.at))
-			silent = p;
-	fetch_end(silent);
+		if (p->fetch.job && (!idlest || p->fetch.sent_at < idlest->fetch.sent_at))
+			idlest = p;
+	fetch_end(idlest);
 }
 
 static int open_file(struct session *p, const Farm__Fetch *f, const char *file, struct error *e)
@@ -79,23 +79,23 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 			disk_close(fd);
 		return rc;
 	}
-	if (st.st_size > CHUNK) /* otherwise the first chunk is the only one */
-		make_room(p->peers);
+	if (st.st_size > CHUNK_BYTES) /* otherwise the first chunk is the only one */
+		drop_idlest_fetch(p->peers);
 	p->fetch = (struct fetching){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
-	p->peers->fetches++;
+	p->peers->fetch_count++;
 	return 0;
 }
 
 static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view *v, struct error *e)
 {
-	const char *file = file_of(f->what);
+	const char *file = file_name(f->what);
 	fetch_end(p);
-	if (!client_finds_job(p, f->job, v))
+	if (!client_find_job(p, f->job, v))
 		return error_set(e, ENOENT, "j%llu: no such job", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "unknown kind of file to fetch");
 	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
-		return cleared(&v->record, e);
+		return cleared_error(&v->record, e);
 	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
 		return error_set(e, ENOENT, "job j%llu is %s: it has no result%s", (unsigned long long)f->job,
 				 v->record.state,
@@ -103,7 +103,7 @@ static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view 
 	return open_file(p, f, file, e);
 }
 
-static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count,
+static int read_chunk(const struct fetching *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count,
 		      struct error *e)
 {
 	if (t->job != f->job || t->what != f->what)
@@ -112,20 +112,20 @@ static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned c
 				 (unsigned long long)f->job);
 	if (f->offset > t->size)
 		return error_set(e, EINVAL, "the file ends before that");
-	uint64_t left = t->size - f->offset;
-	ssize_t n = disk_pread(t->fd, bytes, left < CHUNK ? left : CHUNK, (off_t)f->offset);
-	if (n < 0 || (n == 0 && left))
+	uint64_t remaining = t->size - f->offset;
+	ssize_t n = disk_pread(t->fd, bytes, remaining < CHUNK_BYTES ? remaining : CHUNK_BYTES, (off_t)f->offset);
+	if (n < 0 || (n == 0 && remaining))
 		return error_set(e, n < 0 ? errno : EIO, "%s",
 				 n < 0 ? strerror(errno) : "the file is shorter than it was");
 	*count = (size_t)n;
 	return 0;
 }
 
-static void answer(struct session *p, const Farm__Fetch *f)
+static void answer_fetch(struct session *p, const Farm__Fetch *f)
 {
 	struct job_view v;
 	struct error e = {""};
-	unsigned char *bytes = mem_alloc(CHUNK, 1);
+	unsigned char *bytes = mem_alloc(CHUNK_BYTES, 1);
 	size_t count = 0;
 	Farm__FetchChunk chunk =
 		MESSAGE(fetch_chunk, .job = f->job, .what = f->what, .offset = f->offset, .error = e.text);
@@ -133,10 +133,10 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	if (!rc && !f->offset)
 		chunk.output = v.record.output;
 	if (!rc)
-		rc = read_piece(&p->fetch, f, bytes, &count, &e);
+		rc = read_chunk(&p->fetch, f, bytes, &count, &e);
 	if (!rc)
 		chunk.size = p->fetch.size;
-	p->fetch.at = jobs_now(p->jobs);
+	p->fetch.sent_at = jobs_now(p->jobs);
 	if (rc || f->offset + count == chunk.size)
 		fetch_end(p);
 	conn_send(p->conn, ENVELOPE_OF(FETCH_CHUNK, fetch_chunk, &chunk), bytes, count);
@@ -148,42 +148,42 @@ static void answer(struct session *p, const Farm__Fetch *f)
 static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 {
 	return job && job->canvas && !job->ended &&
-	       (job->preview_made <= 0 || jobs_now(jobs) - job->preview_made > preview_seconds);
+	       (job->preview_made_at <= 0 || jobs_now(jobs) - job->preview_made_at > preview_max_age);
 }
 
-void fetch_previews(struct peers *s, uint64_t id)
+void fetch_serve_previews(struct peers *s, uint64_t id)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
-		struct live_job *job = jobs_find(s->jobs, id);
-		if (p->wants_preview != id || (job && job->busy))
+		struct live_job *job = jobs_find_live(s->jobs, id);
+		if (p->preview_job != id || (job && job->busy))
 			continue;
 		if (is_preview_old(s->jobs, job)) {
 			publish_start(s->jobs, job, PUBLISH_PREVIEW, 0);
 			continue;
 		}
-		p->wants_preview = 0;
-		answer(p, &MESSAGE(fetch, .job = id, .what = FARM__WHAT__WHAT_PREVIEW));
+		p->preview_job = 0;
+		answer_fetch(p, &MESSAGE(fetch, .job = id, .what = FARM__WHAT__WHAT_PREVIEW));
 	}
 }
 
 void fetch_begin(struct session *p, const Farm__Fetch *f)
 {
 	struct job_view v;
-	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !client_finds_job(p, f->job, &v)) {
-		answer(p, f);
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !client_find_job(p, f->job, &v)) {
+		answer_fetch(p, f);
 		return;
 	}
-	p->wants_preview = f->job;
-	fetch_previews(p->peers, f->job);
+	p->preview_job = f->job;
+	fetch_serve_previews(p->peers, f->job);
 }
 
-bool fetch_uses(const struct peers *s, uint64_t job)
+bool fetch_uses_result(const struct peers *s, uint64_t job)
 {
 	static const double fetching_seconds = 60;
-	double since = jobs_now(s->jobs) - fetching_seconds;
+	double cutoff = jobs_now(s->jobs) - fetching_seconds;
 	for (const struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->watched == job || (p->ended.job == job && p->ended.at > since) ||
-		    (p->fetch.job == job && p->fetch.at > since))
+		if (p->watched_job == job || (p->ended_watch.job == job && p->ended_watch.told_at > cutoff) ||
+		    (p->fetch.job == job && p->fetch.sent_at > cutoff))
 			return true;
 	return false;
 }

@@ -18,7 +18,7 @@
 #include "coordinator/peers/client_answers.h"
 #include "coordinator/peers/conversation.h"
 #include "coordinator/peers/fetch.h"
-#include "coordinator/peers/held.h"
+#include "coordinator/peers/request_queue.h"
 #include "coordinator/peers/worker_requests.h"
 #include "coordinator/peers/worker_send.h"
 
@@ -31,7 +31,7 @@ static const struct conn_events refused_events = {.closed = on_refused};
 
 /* Closes the oldest connection that has not said hello: strangers that hold connections and say nothing must not
  * block others. Returns false if there is none. */
-static bool make_room(struct peers *s)
+static bool close_oldest_stranger(struct peers *s)
 {
 	struct session *oldest = NULL;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
@@ -44,53 +44,53 @@ static bool make_room(struct peers *s)
 	return true;
 }
 
-void peers_accept(struct peers *s, struct listener *at)
+void peers_accept(struct peers *s, struct listener *source)
 {
-	struct conn_config config = {{SESSION_HELLO_HEADER, 0},
-				     SESSION_HELLO_SEND,
+	struct conn_config config = {{SESSION_HELLO_HEADER_MAX, 0},
+				     SESSION_HELLO_SEND_MAX,
 				     s->jobs->config.stall_seconds,
 				     s->jobs->config.hello_seconds,
 				     s->tls,
-				     &s->receiving,
-				     &s->sending};
+				     &s->receive_pool,
+				     &s->send_pool};
 	struct error e;
-	bool room = s->session_count < s->jobs->config.max_connections || make_room(s);
-	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
+	bool has_room = s->session_count < s->jobs->config.max_connections || close_oldest_stranger(s);
+	struct session *p = has_room ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;
-	at->caller_waits = false;
+	source->accept_pending = false;
 	if (!p) {
 		log_event(LOG_PEER_REFUSED, "text=\"too many connections\"");
-		if (conn_accept(&c, (uv_stream_t *)&at->tcp, &config, &refused_events, NULL, &e) == 0)
+		if (conn_accept(&c, (uv_stream_t *)&source->tcp, &config, &refused_events, NULL, &e) == 0)
 			conn_close(c, "too many connections");
 		else
-			at->caller_waits = true;
+			source->accept_pending = true;
 		return;
 	}
 	p->peers = s;
 	p->jobs = s->jobs;
-	p->id = ++s->last_peer;
+	p->id = ++s->last_peer_id;
 	STAILQ_INIT(&p->requests);
-	STAILQ_INIT(&p->held);
-	if (conn_accept(&p->conn, (uv_stream_t *)&at->tcp, &config, &conversation_events, p, &e)) {
+	STAILQ_INIT(&p->queued_requests);
+	if (conn_accept(&p->conn, (uv_stream_t *)&source->tcp, &config, &conversation_events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
-		at->caller_waits = true;
+		source->accept_pending = true;
 		mem_free(p);
 		return;
 	}
 	conn_peer_name(p->conn, p->address, sizeof p->address);
-	peers_enlist(s, p);
+	peers_add_session(s, p);
 	log_event(LOG_PEER_ACCEPT, "peer=%llu address=%s", (unsigned long long)p->id, p->address);
 }
 
 void peers_tick(struct peers *s)
 {
 	for (unsigned i = 0; i < s->listener_count; i++)
-		if (s->listeners[i].caller_waits)
+		if (s->listeners[i].accept_pending)
 			peers_accept(s, &s->listeners[i]);
 	conversations_tick(s);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		client_tick(p);
-		held_tick(p);
+		request_queue_tick(p);
 	}
 }
 
@@ -98,87 +98,87 @@ void peers_stop(struct peers *s)
 {
 	for (unsigned i = 0; i < s->listener_count; i++)
 		uv_close((uv_handle_t *)&s->listeners[i].tcp, NULL);
-	uv_close((uv_handle_t *)&s->looks, NULL);
+	uv_close((uv_handle_t *)&s->lookup_idle, NULL);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		conn_close(p->conn, "the coordinator stops");
 }
 
-static const char *name(struct peers *s, uint64_t peer)
+static const char *peer_name(struct peers *s, uint64_t peer)
 {
-	const struct session *p = peers_find(s, peer);
+	const struct session *p = peers_find_session(s, peer);
 	return p ? p->name : NULL;
 }
 
-static void fault(struct peers *s, uint64_t peer, const char *text)
+static void fault_peer(struct peers *s, uint64_t peer, const char *text)
 {
-	struct session *p = peers_find(s, peer);
+	struct session *p = peers_find_session(s, peer);
 	if (p)
 		session_fault(p, "%s", text);
 }
 
 static void dismiss_peer(struct peers *s, uint64_t peer, const char *text)
 {
-	struct session *p = peers_find(s, peer);
+	struct session *p = peers_find_session(s, peer);
 	if (!p)
 		return;
-	p->joined = false;
+	p->known_to_core = false;
 	session_fault(p, "%s", text);
 }
 
-static void extended(struct peers *s, uint64_t peer, const char *refusal, const char *text)
+static void answer_extension(struct peers *s, uint64_t peer, const char *refusal, const char *text)
 {
-	struct session *p = peers_find(s, peer);
+	struct session *p = peers_find_session(s, peer);
 	if (p)
 		client_send_done(p, refusal, text);
 }
 
-static void job_ended(struct peers *s, uint64_t job)
+static void announce_job_end(struct peers *s, uint64_t job)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->state == SESSION_WORKER)
 			worker_send_job_end(p, job);
 }
 
-static void jobs_let_go(struct peers *s)
+static void release_watchers(struct peers *s)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->watched && p->shown && !jobs_find(s->jobs, p->watched))
+		if (p->watched_job && p->shown_status && !jobs_find_live(s->jobs, p->watched_job))
 			client_tick(p);
 }
 
-static void file_read(struct peers *s, const struct blob_hash *h, int rc, const char *text)
+static void announce_file_checked(struct peers *s, const struct blob_hash *h, int rc, const char *text)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
-		worker_requests_file_read(p, h, rc ? text : "");
-		client_file_read(p, h, rc == 0);
+		worker_requests_file_checked(p, h, rc ? text : "");
+		client_file_checked(p, h, rc == 0);
 	}
 }
 
-static uint64_t uploading(struct peers *s, uint64_t peer)
+static uint64_t uploading_bytes(struct peers *s, uint64_t peer)
 {
-	const struct session *p = peers_find(s, peer);
-	return p ? client_uploading(p) : 0;
+	const struct session *p = peers_find_session(s, peer);
+	return p ? client_uploading_bytes(p) : 0;
 }
 
 void peers_init(struct peers *s)
 {
-	uv_idle_init(s->jobs->loop, &s->looks);
-	s->looks.data = s;
-	s->receiving.limit = s->jobs->config.receive_bytes;
-	s->sending.limit = s->jobs->config.send_bytes;
+	uv_idle_init(s->jobs->loop, &s->lookup_idle);
+	s->lookup_idle.data = s;
+	s->receive_pool.max_bytes = s->jobs->config.max_receive_bytes;
+	s->send_pool.max_bytes = s->jobs->config.max_send_bytes;
 	s->jobs->peers = (struct peer_calls){.user = s,
-					     .name = name,
+					     .peer_name = peer_name,
 					     .send_lease = worker_send_lease,
-					     .revoke = worker_send_revoke,
-					     .acknowledge = worker_send_ack,
-					     .fault = fault,
-					     .dismiss = dismiss_peer,
-					     .extended = extended,
-					     .job_ended = job_ended,
-					     .jobs_let_go = jobs_let_go,
-					     .films_free = fetch_previews,
-					     .file_read = file_read,
-					     .jobs_read = conversations_go_on,
-					     .uses_result = fetch_uses,
-					     .uploading = uploading};
+					     .revoke_lease = worker_send_revoke,
+					     .acknowledge_result = worker_send_ack,
+					     .fault_peer = fault_peer,
+					     .dismiss_peer = dismiss_peer,
+					     .answer_extension = answer_extension,
+					     .announce_job_end = announce_job_end,
+					     .release_watchers = release_watchers,
+					     .serve_previews = fetch_serve_previews,
+					     .announce_file_checked = announce_file_checked,
+					     .resume_requests = conversations_resume,
+					     .is_result_in_use = fetch_uses_result,
+					     .uploading_bytes = uploading_bytes};
 }

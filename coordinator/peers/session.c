@@ -6,24 +6,24 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-struct session *peers_find(const struct peers *s, uint64_t id)
+struct session *peers_find_session(const struct peers *s, uint64_t id)
 {
-	for (struct session *p = LIST_FIRST(&s->by_id[id % SESSION_BUCKETS]); p; p = LIST_NEXT(p, alike))
+	for (struct session *p = LIST_FIRST(&s->buckets[id % SESSION_BUCKETS]); p; p = LIST_NEXT(p, bucket_entry))
 		if (p->id == id)
 			return p;
 	return NULL;
 }
 
-void peers_enlist(struct peers *s, struct session *p)
+void peers_add_session(struct peers *s, struct session *p)
 {
-	LIST_INSERT_HEAD(&s->by_id[p->id % SESSION_BUCKETS], p, alike);
+	LIST_INSERT_HEAD(&s->buckets[p->id % SESSION_BUCKETS], p, bucket_entry);
 	LIST_INSERT_HEAD(&s->sessions, p, next);
 	s->session_count++;
 }
 
-void peers_delist(struct peers *s, struct session *p)
+void peers_remove_session(struct peers *s, struct session *p)
 {
-	LIST_REMOVE(p, alike);
+	LIST_REMOVE(p, bucket_entry);
 	LIST_REMOVE(p, next);
 	s->session_count--;
 }

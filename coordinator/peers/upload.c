@@ -3,10 +3,10 @@
  * A submission on its way from its message to the core.
  *
  * upload_new checks it: names and texts, that paths stay inside the scene's folder, sizes against the limits, and the
- * plan. upload_look holds the files that the spool has, each after it has been read and found right. The client is
- * told the hashes of the missing files and sends these, each in order, and upload_add writes them. The pool flushes
- * files that have arrived while more arrive, since a scene may have thousands of small files. A flushed file is
- * stored under its hash and held. When none is missing any more, the job can be submitted.
+ * plan. upload_look_up_files holds the files that the spool has, each after it has been read and found right. The
+ * client is told the hashes of the missing files and sends these, each in order, and upload_add_chunk writes them. The
+ * pool flushes files that have arrived while more arrive, since a scene may have thousands of small files. A flushed
+ * file is stored under its hash and held. When none is missing any more, the job can be submitted.
  *
  * Errors are -EINVAL with a sentence for the client, including bytes with a wrong hash or out of order. upload_free
  * releases all files that are held.
@@ -21,29 +21,29 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
-enum { LOOKS_AT_ONCE = 64 /* files looked for in one turn; about a millisecond, on a disk that answers at once */ };
+enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_BYTES_MAX = 1024 };
+enum { LOOKUPS_PER_TURN = 64 /* files looked for in one turn; about a millisecond, on a disk that answers at once */ };
 /* Limit on the mutations or samples of a lease whose length was requested: some minutes of a thread in usual scenes,
  * an hour if each takes 30 us. Without a limit a mistyped --epoch could keep a farm from all other jobs for days. */
-enum { LEASE_MOST = 1 << 27 };
-static const uint64_t scene_bytes_max = 1ull << 34; /* 16 GiB */
+enum { LEASE_MUTATIONS_MAX = 1 << 27 };
+static const uint64_t max_scene_bytes = 1ull << 34; /* 16 GiB */
 
 struct upload_flush {
 	uv_work_t work;
 	struct upload *upload; /* NULL: it has been freed */
 	struct blob_batch *batch;
 	/* The batch of an upload that has been freed: blobs that have arrived since this flush began; NULL: none. */
-	struct blob_batch *rest;
-	upload_flushed done;
+	struct blob_batch *leftover_batch;
+	upload_flush_callback on_done;
 	void *user;
 	int rc;
 	struct error error;
 };
 
 /* Whether a name is a relative path without "..", so that a scene may refer to it and a worker may look it up. */
-static bool name_ok(const char *name)
+static bool is_valid_name(const char *name)
 {
-	if (!envelope_text_ok(name, NAME_MAX_BYTES) || !*name || *name == '/')
+	if (!envelope_text_is_valid(name, NAME_BYTES_MAX) || !*name || *name == '/')
 		return false;
 	for (const char *part = name; part; part = strchr(part, '/')) {
 		part += *part == '/';
@@ -62,11 +62,11 @@ static int check_files(const Farm__Submit *m, struct error *e)
 		return error_set(e, EINVAL, "a scene has 1 to %d files, not %zu", FILES_MAX, m->n_files);
 	for (size_t i = 0; i < m->n_files; i++) {
 		const Farm__File *f = m->files[i];
-		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
+		if (!is_valid_name(f->name) || f->hash.len != BLOB_HASH_SIZE)
 			return error_set(e, EINVAL, "file %zu of the scene has no valid name or hash", i);
-		if (f->size > scene_bytes_max - total)
+		if (f->size > max_scene_bytes - total)
 			return error_set(e, EINVAL, "the scene's files are larger than %llu bytes",
-					 (unsigned long long)scene_bytes_max);
+					 (unsigned long long)max_scene_bytes);
 		total += f->size;
 		scene = scene || strcmp(f->name, m->scene) == 0;
 	}
@@ -95,11 +95,12 @@ static int check_names(const Farm__Submit *m, struct error *e)
 	return rc;
 }
 
-static int check_text(const char *text, int most, const char *option, struct error *e)
+static int check_text(const char *text, int max_bytes, const char *option, struct error *e)
 {
-	return envelope_text_ok(text, (size_t)most)
+	return envelope_text_is_valid(text, (size_t)max_bytes)
 		       ? 0
-		       : error_set(e, EINVAL, "%s: at most %d bytes of UTF-8 without control characters", option, most);
+		       : error_set(e, EINVAL, "%s: at most %d bytes of UTF-8 without control characters", option,
+				   max_bytes);
 }
 
 static int check_defines(const Farm__Submit *m, struct error *e)
@@ -130,10 +131,11 @@ static int check_notes(const Farm__Submit *m, struct error *e)
 {
 	bool ok = m->n_effects <= EFFECTS_MAX && m->n_notes <= NOTES_MAX;
 	for (size_t i = 0; ok && i < m->n_effects; i++)
-		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256) &&
-		     envelope_text_ok(m->effects[i]->saves, 256);
+		ok = envelope_text_is_valid(m->effects[i]->name, 64) &&
+		     envelope_text_is_valid(m->effects[i]->why, 256) &&
+		     envelope_text_is_valid(m->effects[i]->saves, 256);
 	for (size_t i = 0; ok && i < m->n_notes; i++)
-		ok = envelope_text_ok(m->notes[i], 2048);
+		ok = envelope_text_is_valid(m->notes[i], 2048);
 	return ok ? 0
 		  : error_set(e, EINVAL, "the scene has more than %d effects or %d notes, or one is too long",
 			      EFFECTS_MAX, NOTES_MAX);
@@ -143,7 +145,7 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 {
 	int rc = check_text(m->name, 127, "--name", e);
 	if (!rc)
-		rc = check_text(m->scene, NAME_MAX_BYTES, "the scene's file name", e);
+		rc = check_text(m->scene, NAME_BYTES_MAX, "the scene's file name", e);
 	if (!rc)
 		rc = check_text(m->output, 1023, "-o", e);
 	if (!rc)
@@ -155,8 +157,8 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 	return rc ? rc : check_notes(m, e);
 }
 
-static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size,
-		 struct error *e)
+static int check_submission(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size,
+			    struct error *e)
 {
 	struct plan_request request;
 	int rc = check_texts(m, e);
@@ -164,7 +166,7 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 		rc = check_files(m, e);
 	if (!rc)
 		rc = check_names(m, e);
-	if (!rc && (m->render_width > PLAN_MAX_SIZE || m->render_height > PLAN_MAX_SIZE))
+	if (!rc && (m->render_width > PLAN_SIDE_MAX || m->render_height > PLAN_SIDE_MAX))
 		rc = error_set(e, EINVAL, "a film of %ux%u", m->render_width, m->render_height);
 	if (!rc && !(m->brightest >= 0 && isfinite(m->brightest)))
 		rc = error_set(e, EINVAL, "a brightness of %g", m->brightest);
@@ -179,12 +181,13 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 		return rc;
 	request.bandwidth = bandwidth;
 	rc = plan_make(&request, plan, e);
-	if (!rc && request.epoch && plan_lease_mutations(plan) > LEASE_MOST)
+	if (!rc && request.epoch && plan_lease_mutations(plan) > LEASE_MUTATIONS_MAX)
 		rc = error_set(
 			e, EINVAL,
 			"an epoch of %llu makes leases of %llu mutations or samples, each of which keeps a thread from "
 			"all other jobs; at most %d are allowed: use a shorter --epoch, or more --parts",
-			(unsigned long long)request.epoch, (unsigned long long)plan_lease_mutations(plan), LEASE_MOST);
+			(unsigned long long)request.epoch, (unsigned long long)plan_lease_mutations(plan),
+			LEASE_MUTATIONS_MAX);
 	if (!rc)
 		plan_describe_epoch(&request, plan, rule, rule_size);
 	return rc;
@@ -199,7 +202,7 @@ static int compare_hashes(const void *x, const void *y, void *files)
 /* Sorts the files by hash, once: there may be thousands, and each is looked up when it arrives. */
 static int sort_hashes(struct upload *u, struct error *e)
 {
-	const Farm__Submit *m = u->submit.message->submit;
+	const Farm__Submit *m = u->submission.message->submit;
 	for (uint32_t i = 0; i < m->n_files; i++)
 		u->by_hash[i] = i;
 	qsort_r(u->by_hash, m->n_files, sizeof *u->by_hash, compare_hashes, m->files);
@@ -212,9 +215,9 @@ static int sort_hashes(struct upload *u, struct error *e)
 	return 0;
 }
 
-uint64_t upload_bytes(const struct upload *u)
+uint64_t upload_file_bytes(const struct upload *u)
 {
-	const Farm__Submit *m = u->submit.message->submit;
+	const Farm__Submit *m = u->submission.message->submit;
 	uint64_t bytes = 0;
 	for (size_t i = 0; i < m->n_files; i++) {
 		const Farm__File *f = m->files[u->by_hash[i]], *before = i ? m->files[u->by_hash[i - 1]] : NULL;
@@ -224,9 +227,9 @@ uint64_t upload_bytes(const struct upload *u)
 }
 
 /* Returns the index of the first entry of by_hash that is not below h. */
-static size_t place_of(const struct upload *u, const struct blob_hash *h)
+static size_t lower_bound(const struct upload *u, const struct blob_hash *h)
 {
-	const Farm__Submit *m = u->submit.message->submit;
+	const Farm__Submit *m = u->submission.message->submit;
 	size_t low = 0, high = m->n_files;
 	while (low < high) {
 		size_t middle = low + (high - low) / 2;
@@ -241,31 +244,31 @@ static size_t place_of(const struct upload *u, const struct blob_hash *h)
 /* A blob has been stored: holds it for every file with that content. */
 static void hold_blob(struct upload *u, const struct blob_hash *h)
 {
-	const Farm__Submit *m = u->submit.message->submit;
-	for (size_t at = place_of(u, h); at < m->n_files; at++) {
+	const Farm__Submit *m = u->submission.message->submit;
+	for (size_t at = lower_bound(u, h); at < m->n_files; at++) {
 		uint32_t i = u->by_hash[at];
 		if (memcmp(m->files[i]->hash.data, h->bytes, BLOB_HASH_SIZE) != 0)
 			break;
-		if (!u->held[i])
-			u->missing_count -= u->held[i] = blob_hold(u->blobs, h);
+		if (!u->is_held[i])
+			u->missing_count -= u->is_held[i] = blob_hold(u->blobs, h);
 	}
 }
 
 /* Notes whether the next file to be looked for is in the store and right. */
-static void take_look(struct upload *u, const struct blob_hash *h, bool right)
+static void note_lookup(struct upload *u, const struct blob_hash *h, bool is_intact)
 {
-	u->held[u->looked] = right && blob_hold(u->blobs, h);
-	u->missing_count += !u->held[u->looked++];
+	u->is_held[u->looked_up_count] = is_intact && blob_hold(u->blobs, h);
+	u->missing_count += !u->is_held[u->looked_up_count++];
 }
 
 /* Checks the sizes in the submission: one that differs from its blob's would mislead workers. */
 static int check_sizes(const struct upload *u, struct error *e)
 {
-	const Farm__Submit *m = u->submit.message->submit;
+	const Farm__Submit *m = u->submission.message->submit;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		uint64_t size;
-		if (u->held[i] && (!blob_has(u->blobs, &h, &size) || size != m->files[i]->size))
+		if (u->is_held[i] && (!blob_is_stored(u->blobs, &h, &size) || size != m->files[i]->size))
 			return error_set(e, EINVAL, "%s: its size does not match its content", m->files[i]->name);
 	}
 	return 0;
@@ -278,12 +281,12 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 	struct upload *u = mem_alloc(1, sizeof *u);
 	if (!u)
 		return error_set(e, ENOMEM, "no memory for a submission");
-	int rc = check(m, bandwidth, &u->plan, u->rule, sizeof u->rule, e);
+	int rc = check_submission(m, bandwidth, &u->plan, u->epoch_rule, sizeof u->epoch_rule, e);
 	if (!rc) {
-		u->held = mem_alloc(m->n_files, sizeof *u->held);
-		u->arrived = mem_alloc(m->n_files, sizeof *u->arrived);
+		u->is_held = mem_alloc(m->n_files, sizeof *u->is_held);
+		u->has_arrived = mem_alloc(m->n_files, sizeof *u->has_arrived);
 		u->by_hash = mem_alloc(m->n_files, sizeof *u->by_hash);
-		if (!u->held || !u->arrived || !u->by_hash)
+		if (!u->is_held || !u->has_arrived || !u->by_hash)
 			rc = error_set(e, ENOMEM, "no memory for a submission");
 	}
 	if (rc) {
@@ -291,7 +294,7 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 		return rc;
 	}
 	u->blobs = blobs;
-	u->submit = *submit;
+	u->submission = *submit;
 	memset(submit, 0, sizeof *submit);
 	rc = sort_hashes(u, e);
 	if (rc)
@@ -301,37 +304,37 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 	return rc;
 }
 
-bool upload_is_looking(const struct upload *u)
+bool upload_is_looking_up(const struct upload *u)
 {
-	return u->looked < u->submit.message->submit->n_files;
+	return u->looked_up_count < u->submission.message->submit->n_files;
 }
 
-int upload_look(struct upload *u, struct jobs *jobs, struct error *e)
+int upload_look_up_files(struct upload *u, struct jobs *jobs, struct error *e)
 {
-	const Farm__Submit *m = u->submit.message->submit;
-	u->looks_later = false;
-	for (int i = 0; upload_is_looking(u); i++) {
-		if (i == LOOKS_AT_ONCE) {
-			u->looks_later = true;
+	const Farm__Submit *m = u->submission.message->submit;
+	u->lookup_pending = false;
+	for (int i = 0; upload_is_looking_up(u); i++) {
+		if (i == LOOKUPS_PER_TURN) {
+			u->lookup_pending = true;
 			return -EAGAIN;
 		}
-		struct blob_hash h = file_hash_from_wire(m->files[u->looked]);
-		int rc = blob_has(u->blobs, &h, NULL) ? files_check(jobs, &h, NULL) : -ENOENT;
+		struct blob_hash h = file_hash_from_wire(m->files[u->looked_up_count]);
+		int rc = blob_is_stored(u->blobs, &h, NULL) ? files_check(jobs, &h, NULL) : -ENOENT;
 		if (rc == -EINPROGRESS)
 			return rc;
-		take_look(u, &h, rc == 0);
+		note_lookup(u, &h, rc == 0);
 	}
 	return check_sizes(u, e);
 }
 
-bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right)
+bool upload_file_checked(struct upload *u, const struct blob_hash *h, bool is_intact)
 {
-	if (!upload_is_looking(u))
+	if (!upload_is_looking_up(u))
 		return false;
-	struct blob_hash next = file_hash_from_wire(u->submit.message->submit->files[u->looked]);
+	struct blob_hash next = file_hash_from_wire(u->submission.message->submit->files[u->looked_up_count]);
 	if (!blob_hash_equal(&next, h))
 		return false;
-	take_look(u, h, right);
+	note_lookup(u, h, is_intact);
 	return true;
 }
 
@@ -341,37 +344,38 @@ void upload_free(struct upload *u)
 		blob_write_abort(u->writer);
 	if (u->flush) {
 		u->flush->upload = NULL;
-		u->flush->rest = u->batch;
+		u->flush->leftover_batch = u->batch;
 		/* Stops the flush early, since others wait for a thread of the pool. */
-		blob_batch_give_up(u->flush->batch);
+		blob_batch_cancel(u->flush->batch);
 	} else {
 		blob_batch_free(u->batch);
 	}
-	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
+	const Farm__Submit *m = u->submission.message ? u->submission.message->submit : NULL;
 	for (size_t i = 0; m && i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
-		if (u->held[i])
+		if (u->is_held[i])
 			blob_release(u->blobs, &h);
 	}
-	envelope_fini(&u->submit);
-	mem_free(u->held);
-	mem_free(u->arrived);
+	envelope_fini(&u->submission);
+	mem_free(u->is_held);
+	mem_free(u->has_arrived);
 	mem_free(u->by_hash);
 	mem_free(u);
 }
 
-static const Farm__File *missing_file(const struct upload *u, const struct blob_hash *h)
+static const Farm__File *find_missing_file(const struct upload *u, const struct blob_hash *h)
 {
-	const Farm__Submit *m = u->submit.message->submit;
-	size_t at = place_of(u, h);
+	const Farm__Submit *m = u->submission.message->submit;
+	size_t at = lower_bound(u, h);
 	const Farm__File *f = at < m->n_files ? m->files[u->by_hash[at]] : NULL;
-	return f && !u->held[u->by_hash[at]] && !u->arrived[at] && memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0
+	return f && !u->is_held[u->by_hash[at]] && !u->has_arrived[at] &&
+			       memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0
 		       ? f
 		       : NULL;
 }
 
 /* Adds the blob of the writer, which is complete, to the batch. */
-static int keep_blob(struct upload *u, struct error *e)
+static int add_to_batch(struct upload *u, struct error *e)
 {
 	struct blob_writer *w = u->writer;
 	if (!u->batch && !(u->batch = blob_batch_new(u->blobs)))
@@ -379,11 +383,12 @@ static int keep_blob(struct upload *u, struct error *e)
 	u->writer = NULL;
 	int rc = blob_batch_add(u->batch, w, e);
 	if (!rc)
-		u->arrived[place_of(u, &u->writing)] = true;
+		u->has_arrived[lower_bound(u, &u->writer_hash)] = true;
 	return rc;
 }
 
-int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
+int upload_add_chunk(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size,
+		     struct error *e)
 {
 	struct blob_hash h;
 	int rc = 0;
@@ -391,24 +396,24 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 		return error_set(e, EINVAL, "a blob's name has %zu bytes", c->hash.len);
 	memcpy(h.bytes, c->hash.data, sizeof h.bytes);
 	if (!u->writer) {
-		const Farm__File *f = missing_file(u, &h);
+		const Farm__File *f = find_missing_file(u, &h);
 		if (!f || f->size != c->size)
 			return error_set(e, EINVAL, "a blob that was not requested");
 		rc = blob_write_begin(&u->writer, u->blobs, &h, c->size, e);
-		u->writing = h;
+		u->writer_hash = h;
 	}
-	if (!rc && (!blob_hash_equal(&h, &u->writing) || c->offset != blob_write_at(u->writer)))
+	if (!rc && (!blob_hash_equal(&h, &u->writer_hash) || c->offset != blob_write_offset(u->writer)))
 		rc = error_set(e, EINVAL, "blobs must be sent one after the other and in order");
 	if (!rc && size)
-		rc = blob_write_add(u->writer, payload, size, e);
+		rc = blob_write_append(u->writer, payload, size, e);
 	if (rc)
 		return rc;
 	u->received += size;
-	if (blob_write_at(u->writer) < c->size) {
+	if (blob_write_offset(u->writer) < c->size) {
 		blob_write_pause(u->writer); /* closes the file: thousands of clients may stop midway */
 		return 0;
 	}
-	rc = keep_blob(u, e);
+	rc = add_to_batch(u, e);
 	return rc ? rc : 1;
 }
 
@@ -423,18 +428,18 @@ static void run_flush(uv_work_t *work)
 static void run_discard(uv_work_t *work)
 {
 	struct upload_flush *f = work->data;
-	blob_batch_discard(f->rest);
+	blob_batch_discard(f->leftover_batch);
 }
 
-static void discarded(uv_work_t *work, int status)
+static void on_discarded(uv_work_t *work, int status)
 {
 	(void)status;
 	struct upload_flush *f = work->data;
-	blob_batch_free(f->rest);
+	blob_batch_free(f->leftover_batch);
 	mem_free(f);
 }
 
-static void flush_done(uv_work_t *work, int status)
+static void on_flush_done(uv_work_t *work, int status)
 {
 	(void)status;
 	struct upload_flush *f = work->data;
@@ -442,29 +447,29 @@ static void flush_done(uv_work_t *work, int status)
 	if (u)
 		u->flush = NULL;
 	if (!f->rc) /* also if the upload was freed: the blobs are on the disk, and count */
-		blob_batch_enter(f->batch);
+		blob_batch_commit(f->batch);
 	for (size_t i = 0; u && !f->rc && i < blob_batch_count(f->batch); i++)
 		hold_blob(u, blob_batch_hash(f->batch, i));
 	blob_batch_free(f->batch);
 	/* Thousands of blobs may have arrived in the meantime, so the pool deletes them. */
-	if (f->rest && uv_queue_work(work->loop, work, run_discard, discarded) == 0)
+	if (f->leftover_batch && uv_queue_work(work->loop, work, run_discard, on_discarded) == 0)
 		return;
-	blob_batch_free(f->rest);
+	blob_batch_free(f->leftover_batch);
 	if (u)
-		f->done(f->user, f->rc, &f->error);
+		f->on_done(f->user, f->rc, &f->error);
 	mem_free(f);
 }
 
-int upload_flush(struct upload *u, uv_loop_t *loop, upload_flushed done, void *user, struct error *e)
+int upload_flush(struct upload *u, uv_loop_t *loop, upload_flush_callback done, void *user, struct error *e)
 {
 	if (u->flush || !u->batch)
 		return 0;
 	struct upload_flush *f = mem_alloc(1, sizeof *f);
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for a submission");
-	*f = (struct upload_flush){.upload = u, .batch = u->batch, .done = done, .user = user};
+	*f = (struct upload_flush){.upload = u, .batch = u->batch, .on_done = done, .user = user};
 	f->work.data = f;
-	int rc = uv_queue_work(loop, &f->work, run_flush, flush_done);
+	int rc = uv_queue_work(loop, &f->work, run_flush, on_flush_done);
 	if (rc) {
 		mem_free(f);
 		return error_set(e, -rc, "its files cannot be flushed: %s", uv_strerror(rc));
@@ -474,13 +479,13 @@ int upload_flush(struct upload *u, uv_loop_t *loop, upload_flushed done, void *u
 	return 0;
 }
 
-size_t upload_missing(const struct upload *u, struct blob_hash *hashes)
+size_t upload_missing_hashes(const struct upload *u, struct blob_hash *hashes)
 {
-	const Farm__Submit *m = u->submit.message->submit;
+	const Farm__Submit *m = u->submission.message->submit;
 	size_t count = 0;
 	for (size_t at = 0; at < m->n_files; at++) {
 		struct blob_hash h = file_hash_from_wire(m->files[u->by_hash[at]]);
-		if (!u->held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
+		if (!u->is_held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
 			hashes[count++] = h;
 	}
 	return count;

@@ -14,45 +14,45 @@
 
 #include <string.h>
 
-static void take_lease_failed(struct session *p, struct envelope *env)
+static void handle_lease_failed(struct session *p, struct envelope *env)
 {
 	struct buf nothing = {0};
-	results_take(p->jobs, p->id, env, &nothing);
+	results_handle(p->jobs, p->id, env, &nothing);
 }
 
-static void take_blob_get(struct session *p, const Farm__BlobGet *g)
+static void handle_blob_get(struct session *p, const Farm__BlobGet *g)
 {
-	struct worker_request a = {.blob = true, .number = g->offset};
+	struct worker_request a = {.is_blob = true, .job_or_offset = g->offset};
 	if (g->hash.len != BLOB_HASH_SIZE) {
 		session_fault(p, "a blob's name has %zu bytes", g->hash.len);
 		return;
 	}
 	memcpy(a.hash.bytes, g->hash.data, sizeof a.hash.bytes);
-	worker_requests_take(p, &a);
+	worker_requests_handle(p, &a);
 }
 
-static void take_lease_result(struct session *p, struct envelope *env)
+static void handle_lease_result(struct session *p, struct envelope *env)
 {
 	struct buf payload = conn_take_payload(p->conn);
-	results_take(p->jobs, p->id, env, &payload);
+	results_handle(p->jobs, p->id, env, &payload);
 	buf_fini(&payload);
 }
 
 /* Counts a part of a long message as a sign of life, and sends the worker a heartbeat: its own heartbeats, and with
  * them our answers, are queued behind that message. */
-void worker_heard(void *session)
+void worker_note_partial(void *session)
 {
 	struct session *p = session;
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
-	if (!p->joined || p->state != SESSION_WORKER ||
-	    jobs_now(p->jobs) < p->heard + p->jobs->config.heartbeat_seconds)
+	if (!p->known_to_core || p->state != SESSION_WORKER ||
+	    jobs_now(p->jobs) < p->partial_heartbeat_at + p->jobs->config.heartbeat_seconds)
 		return;
-	p->heard = jobs_now(p->jobs);
+	p->partial_heartbeat_at = jobs_now(p->jobs);
 	conn_send(p->conn, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 	jobs_step(p->jobs, &ev);
 }
 
-void worker_message(struct session *p, struct envelope *env)
+void worker_handle_message(struct session *p, struct envelope *env)
 {
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
 	const Farm__Envelope *m = env->message;
@@ -63,22 +63,22 @@ void worker_message(struct session *p, struct envelope *env)
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_REQUEST:
 		ev.kind = EVENT_REQUEST;
-		ev.want = m->lease_request->want;
+		ev.wanted_leases = m->lease_request->want;
 		jobs_step(p->jobs, &ev);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_RESULT:
 		jobs_step(p->jobs, &ev);
-		if (p->joined)
-			take_lease_result(p, env);
+		if (p->known_to_core)
+			handle_lease_result(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_FAILED:
-		take_lease_failed(p, env);
+		handle_lease_failed(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_GET:
-		worker_requests_take(p, &(struct worker_request){.number = m->job_get->job});
+		worker_requests_handle(p, &(struct worker_request){.job_or_offset = m->job_get->job});
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_GET:
-		take_blob_get(p, m->blob_get);
+		handle_blob_get(p, m->blob_get);
 		break;
 	case FARM__ENVELOPE__BODY_BYE:
 		conn_close(p->conn, "the worker ended the connection");

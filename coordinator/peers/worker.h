@@ -6,7 +6,7 @@
 #include "coordinator/peers/session.h"
 
 /* Handles a message. May take over the envelope. */
-void worker_message(struct session *p, struct envelope *env);
-void worker_heard(void *session); /* call when a part of an incomplete message has arrived */
+void worker_handle_message(struct session *p, struct envelope *env);
+void worker_note_partial(void *session); /* call when a part of an incomplete message has arrived */
 
 #endif

@@ -6,9 +6,9 @@
 #include "common/base/text.h"
 
 /* Whether this client may read what workers say of jobs, its own or not. */
-static bool may_read_faults(const struct session *p)
+static bool can_read_faults(const struct session *p)
 {
-	return p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR;
+	return p->tls_identity.role == TLS_NO_ROLE || p->tls_identity.role == TLS_OPERATOR;
 }
 
 /* Copies the status of each connected worker. false: no memory. */
@@ -19,7 +19,7 @@ static bool copy_workers(const struct session *p, struct list *workers)
 		struct peer_status *w = list_push(workers);
 		if (!w)
 			return false;
-		farm_peer(f, id, w);
+		farm_peer_status(f, id, w);
 	}
 	return true;
 }
@@ -27,24 +27,24 @@ static bool copy_workers(const struct session *p, struct list *workers)
 static void worker_to_wire(const struct peer_status *w, bool with_faults, Farm__WorkerStatus *out)
 {
 	farm__worker_status__init(out);
-	out->name = text_borrow(w->name);
-	out->state = text_borrow(peer_state_name(w->state));
+	out->name = text_unconst(w->name);
+	out->state = text_unconst(peer_state_name(w->state));
 	out->restarts = w->restarts;
 	out->threads = w->threads;
-	out->leases = w->leases;
+	out->leases = w->held_leases;
 	out->merged = w->merged;
 	if (with_faults)
-		out->text = text_borrow(w->text);
+		out->text = text_unconst(w->last_fault);
 }
 
 void worker_list_send(struct session *p)
 {
-	struct list workers = {.size = sizeof(struct peer_status)};
+	struct list workers = {.item_size = sizeof(struct peer_status)};
 	bool complete = copy_workers(p, &workers);
 	struct peer_status *from = workers.items;
 	Farm__WorkerStatus *to = mem_alloc(workers.count, sizeof *to), **refs = mem_alloc(workers.count, sizeof *refs);
 	for (size_t i = 0; to && refs && i < workers.count; i++) {
-		worker_to_wire(&from[i], may_read_faults(p), &to[i]);
+		worker_to_wire(&from[i], can_read_faults(p), &to[i]);
 		refs[i] = &to[i];
 	}
 	if (complete && to && refs)
@@ -55,5 +55,5 @@ void worker_list_send(struct session *p)
 		session_fault(p, "no memory for the list of workers");
 	mem_free(to);
 	mem_free(refs);
-	list_free(&workers);
+	list_fini(&workers);
 }

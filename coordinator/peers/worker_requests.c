@@ -9,65 +9,67 @@
 #include "coordinator/peers/worker_send.h"
 
 enum {
-	CHUNK_LEAST = 1 << 16,
-	CHUNK_MOST = 1 << 20,
-	AHEAD = 1 << 22,	/* another answer is made while fewer bytes than this are unsent */
-	AHEAD_OF_ALL = 1 << 30, /* shared by all connections, since thousands of workers may begin a job at once */
-	REQUESTS_MOST = 512,	/* twice what a worker can need that has leases of as many jobs as it may hold */
+	CHUNK_MIN = 1 << 16,
+	CHUNK_MAX = 1 << 20,
+	SEND_AHEAD_MAX = 1 << 22, /* another answer is made while fewer bytes than this are unsent */
+	SEND_AHEAD_TOTAL_MAX =
+		1 << 30,    /* shared by all connections, since thousands of workers may begin a job at once */
+	REQUESTS_MAX = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
 /* Returns how many bytes may be unsent when the next answer is made. Half of the limit on all unsent bytes is left to
  * other answers. */
 static size_t send_ahead_bytes(const struct session *p)
 {
-	uint64_t half = p->peers->sending.limit / 2, all = half < AHEAD_OF_ALL ? half : AHEAD_OF_ALL;
-	size_t share = all / (p->peers->session_count + 1);
-	return share < AHEAD ? share : AHEAD;
+	uint64_t half = p->peers->send_pool.max_bytes / 2,
+		 total = half < SEND_AHEAD_TOTAL_MAX ? half : SEND_AHEAD_TOTAL_MAX;
+	size_t share = total / (p->peers->session_count + 1);
+	return share < SEND_AHEAD_MAX ? share : SEND_AHEAD_MAX;
 }
 
 static size_t chunk_size(const struct session *p)
 {
 	size_t n = send_ahead_bytes(p);
-	return n < CHUNK_LEAST ? CHUNK_LEAST : n < CHUNK_MOST ? n : CHUNK_MOST;
+	return n < CHUNK_MIN ? CHUNK_MIN : n < CHUNK_MAX ? n : CHUNK_MAX;
 }
 
 static void send_job_info(struct session *p, uint64_t id)
 {
-	const struct live_job *job = jobs_find(p->jobs, id);
+	const struct live_job *job = jobs_find_live(p->jobs, id);
 	if (!job) {
 		worker_send_job_end(p, id);
 		return;
 	}
-	worker_allow_results(p, job);
-	const Farm__Submit *from = live_job_submit(job);
+	worker_raise_payload_limit(p, job);
+	const Farm__Submit *submission = live_job_submission(job);
 	Farm__Plan plan;
 	plan_to_wire(&job->plan, &plan);
 	conn_send(p->conn,
-		  ENVELOPE(JOB_INFO, job_info, .job = id, .name = from->name, .scene = from->scene,
-			   .n_defines = from->n_defines, .defines = from->defines, .render_width = from->render_width,
-			   .render_height = from->render_height, .plan = &plan, .n_files = from->n_files,
-			   .files = from->files),
+		  ENVELOPE(JOB_INFO, job_info, .job = id, .name = submission->name, .scene = submission->scene,
+			   .n_defines = submission->n_defines, .defines = submission->defines,
+			   .render_width = submission->render_width, .render_height = submission->render_height,
+			   .plan = &plan, .n_files = submission->n_files, .files = submission->files),
 		  NULL, 0);
 }
 
 /* refusal: why the file cannot be sent; "": it can be. */
-static void send_piece(struct session *p, const struct worker_request *a, const char *refusal)
+static void send_chunk(struct session *p, const struct worker_request *a, const char *refusal)
 {
 	struct error e;
 	struct blob_hash h = a->hash;
 	uint64_t size = 0;
-	size_t most = chunk_size(p);
-	unsigned char *bytes = mem_alloc(most, 1);
+	size_t max_bytes = chunk_size(p);
+	unsigned char *bytes = mem_alloc(max_bytes, 1);
 	ssize_t n = 0;
 	text_copy(e.text, sizeof e.text, refusal);
 	int fd = *refusal ? -1 : blob_open(p->jobs->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
-		n = disk_pread(fd, bytes, most, a->number <= size ? (off_t)a->number : 0);
-	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
+		n = disk_pread(fd, bytes, max_bytes, a->job_or_offset <= size ? (off_t)a->job_or_offset : 0);
+	if (fd >= 0 && (!bytes || n < 0 || a->job_or_offset > size))
 		error_set(&e, EIO, "the blob cannot be read there");
 	conn_send(p->conn,
-		  ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {sizeof h.bytes, h.bytes}, .offset = a->number, .size = size,
-			   .error = e.text),
+		  ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {sizeof h.bytes, h.bytes}, .offset = a->job_or_offset,
+			   .size = size, .error = e.text),
 		  bytes, *e.text ? 0 : (size_t)n);
 	if (fd >= 0)
 		disk_close(fd);
@@ -76,24 +78,24 @@ static void send_piece(struct session *p, const struct worker_request *a, const 
 
 /* Answers a request. A file is checked before its first piece is sent: returns false while it is being read for that.
  */
-static bool answer(struct session *p, const struct worker_request *a)
+static bool answer_request(struct session *p, const struct worker_request *a)
 {
 	struct error e = {""};
-	if (!a->blob) {
-		send_job_info(p, a->number);
+	if (!a->is_blob) {
+		send_job_info(p, a->job_or_offset);
 		return true;
 	}
-	if (a->number == 0 && files_check(p->jobs, &a->hash, &e) == -EINPROGRESS)
+	if (a->job_or_offset == 0 && files_check(p->jobs, &a->hash, &e) == -EINPROGRESS)
 		return false;
-	send_piece(p, a, e.text);
+	send_chunk(p, a, e.text);
 	return true;
 }
 
-void worker_requests_take(struct session *p, const struct worker_request *a)
+void worker_requests_handle(struct session *p, const struct worker_request *a)
 {
-	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= send_ahead_bytes(p) && answer(p, a))
+	if (STAILQ_EMPTY(&p->requests) && conn_unsent_bytes(p->conn) <= send_ahead_bytes(p) && answer_request(p, a))
 		return;
-	struct worker_request *last = p->request_count < REQUESTS_MOST ? mem_alloc(1, sizeof *last) : NULL;
+	struct worker_request *last = p->request_count < REQUESTS_MAX ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
 		session_fault(p, "%u chunks and jobs were requested and not read: no worker needs so many",
 			      p->request_count);
@@ -112,25 +114,25 @@ static void drop_first(struct session *p)
 	mem_free(a);
 }
 
-void worker_requests_go_on(void *session)
+void worker_requests_resume(void *session)
 {
 	struct session *p = session;
 	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER &&
-	       conn_unsent(p->conn) <= send_ahead_bytes(p) && answer(p, STAILQ_FIRST(&p->requests)))
+	       conn_unsent_bytes(p->conn) <= send_ahead_bytes(p) && answer_request(p, STAILQ_FIRST(&p->requests)))
 		drop_first(p);
 }
 
-void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal)
+void worker_requests_file_checked(struct session *p, const struct blob_hash *h, const char *refusal)
 {
 	const struct worker_request *a = STAILQ_FIRST(&p->requests);
 	if (!a || p->state != SESSION_WORKER)
 		return;
 	/* The file is not checked again, however long the reading took. */
-	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) {
-		send_piece(p, a, refusal);
+	if (a->is_blob && a->job_or_offset == 0 && blob_hash_equal(&a->hash, h)) {
+		send_chunk(p, a, refusal);
 		drop_first(p);
 	}
-	worker_requests_go_on(p);
+	worker_requests_resume(p);
 }
 
 void worker_requests_drop(struct session *p)

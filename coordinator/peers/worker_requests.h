@@ -14,16 +14,16 @@ struct session;
 
 struct worker_request {
 	STAILQ_ENTRY(worker_request) next;
-	bool blob;	 /* a chunk of a blob; otherwise a job */
-	uint64_t number; /* id of the job; offset in the blob */
+	bool is_blob;		/* a chunk of a blob; otherwise a job */
+	uint64_t job_or_offset; /* id of the job; offset in the blob */
 	struct blob_hash hash;
 };
 
 /* Answers a request, which is copied, now or later; disconnects a worker that has asked for too much. */
-void worker_requests_take(struct session *p, const struct worker_request *a);
-void worker_requests_go_on(void *session); /* call when the worker has read everything sent */
+void worker_requests_handle(struct session *p, const struct worker_request *a);
+void worker_requests_resume(void *session); /* call when the worker has read everything sent */
 /* A file has been checked. refusal: why it cannot be sent; "": it can be. */
-void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal);
+void worker_requests_file_checked(struct session *p, const struct blob_hash *h, const char *refusal);
 void worker_requests_drop(struct session *p);
 
 #endif

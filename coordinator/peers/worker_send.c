@@ -3,46 +3,47 @@
 
 #include "common/base/text.h"
 
-void worker_allow_results(struct session *p, const struct live_job *job)
+void worker_raise_payload_limit(struct session *p, const struct live_job *job)
 {
 	uint32_t need = batch_payload_max(&job->plan);
 	if (need > p->payload_limit) {
 		p->payload_limit = need;
-		conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, need});
+		conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER_MAX, need});
 	}
 }
 
 /* Raises the send limit so that as many of the largest leases as the worker wants may wait for it to read. */
-static void allow_lease(struct session *p, size_t size)
+static void raise_send_limit(struct session *p, size_t size)
 {
 	struct peer_status s;
-	if (!farm_peer(p->jobs->farm, p->id, &s) || s.want * size <= p->leases_most)
+	if (!farm_peer_status(p->jobs->farm, p->id, &s) || s.wanted_leases * size <= p->max_lease_bytes)
 		return;
-	p->leases_most = s.want * size;
-	conn_set_send_limit(p->conn, SESSION_SEND + p->leases_most);
+	p->max_lease_bytes = s.wanted_leases * size;
+	conn_set_send_limit(p->conn, SESSION_SEND_MAX + p->max_lease_bytes);
 }
 
-void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
+void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k,
+		       bool from_seeds)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
-	struct session *p = peers_find(s, peer);
+	struct session *p = peers_find_session(s, peer);
 	if (!p)
 		return;
-	worker_allow_results(p, job);
-	if (live_job_pack_lease(job, k, anew, &frame, &size, &e)) {
+	worker_raise_payload_limit(p, job);
+	if (live_job_pack_lease(job, k, from_seeds, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
 		return;
 	}
-	allow_lease(p, size);
+	raise_send_limit(p, size);
 	conn_send_frame(p->conn, frame, size);
 }
 
 void worker_send_revoke(struct peers *s, uint64_t peer, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
-	const struct session *p = peers_find(s, peer);
+	const struct session *p = peers_find_session(s, peer);
 	lease_key_to_wire(k, &key);
 	if (p)
 		conn_send(p->conn, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
@@ -56,7 +57,7 @@ void worker_send_ack(struct peers *s, uint64_t peer, const struct lease_key *k, 
 						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
 	char copy[512];
 	Farm__LeaseKey key;
-	const struct session *p = peers_find(s, peer);
+	const struct session *p = peers_find_session(s, peer);
 	lease_key_to_wire(k, &key);
 	text_copy(copy, sizeof copy, text);
 	if (p)

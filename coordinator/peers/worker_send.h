@@ -10,7 +10,7 @@
 #include "coordinator/peers/session.h"
 
 /* Allows the worker to send results of this job, up to its largest size. */
-void worker_allow_results(struct session *p, const struct live_job *job);
+void worker_raise_payload_limit(struct session *p, const struct live_job *job);
 
 /* Each does nothing if the peer is gone. anew: send seeds instead of chain states. */
 void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k,

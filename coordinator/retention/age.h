@@ -12,23 +12,23 @@
 
 struct age_job {
 	uint64_t id;
-	double order; /* order of the ends; unlike `ended`, it is right even if observed time has started again */
-	double ended; /* observed time of the end in s (age_clock.h) */
+	double end_order; /* order of the ends; unlike `ended`, it is right even if observed time has started again */
+	double ended;	  /* observed time of the end in s (age_clock.h) */
 	/* Bytes of the films, which only serve extensions, and of result, preview and log together. */
-	uint64_t films, result;
-	bool busy;			     /* a client is fetching the result, so it is kept this time */
-	bool no_films, no_result, no_record; /* chosen by age_choose: to be deleted */
+	uint64_t film_bytes, result_bytes;
+	bool is_in_use;				   /* a client is fetching the result, so it is kept this time */
+	bool drop_films, drop_result, drop_record; /* chosen by age_choose_deletions: to be deleted */
 };
 
 struct age_limits {
-	/* Time after a job's end until films and result are deleted; 0: never. The record is kept AGE_RECORD times as
-	 * long. */
-	double seconds;
-	uint64_t bytes; /* limit on the files of all finished jobs together; 0: none */
+	/* Time after a job's end until films and result are deleted; 0: never. The record is kept AGE_RECORD_FACTOR
+	 * times as long. */
+	double max_age_seconds;
+	uint64_t max_bytes; /* limit on the files of all finished jobs together; 0: none */
 };
-enum { AGE_RECORD = 10 };
+enum { AGE_RECORD_FACTOR = 10 };
 
 /* Sorts the jobs by their order, the one that ended first in front, and chooses. now: observed time in s. */
-void age_choose(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
+void age_choose_deletions(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

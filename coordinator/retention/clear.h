@@ -12,7 +12,7 @@
 #include "coordinator/live_job/jobs.h"
 
 void clear_tick(struct jobs *jobs);
-void clear_soon(struct jobs *jobs);  /* call when a job has ended */
-void clear_close(struct jobs *jobs); /* call after the loop has ended */
+void clear_schedule_soon(struct jobs *jobs); /* call when a job has ended */
+void clear_close(struct jobs *jobs);	     /* call after the loop has ended */
 
 #endif

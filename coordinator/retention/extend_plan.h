@@ -17,11 +17,12 @@ struct extension { /* a member that is 0 is not named */
 };
 
 /* The state of the job to be extended. */
-struct extension_from {
-	uint64_t rounds; /* complete rounds */
-	double seconds;	 /* s of the job's time used so far */
-	double error;	 /* relative error as last estimated; NAN: none */
-	bool ended, cut; /* cut: an extension was cancelled, so its bounds no longer apply */
+struct extension_basis {
+	uint64_t rounds;		 /* complete rounds */
+	double seconds;			 /* s of the job's time used so far */
+	double error;			 /* relative error as last estimated; NAN: none */
+	bool ended, extension_cancelled; /* extension_cancelled: an extension was cancelled, so its bounds no longer
+					    apply */
 };
 
 /* Returns -EINVAL with a sentence if no bound is named or a number is invalid. */
@@ -31,7 +32,7 @@ int extend_check(const struct extension *x, struct error *e);
  * Returns -EINVAL with a sentence if extend_check fails, if the job would end at once, or if it would have no bound
  * where one is required. Pure.
  */
-int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from,
+int extend_plan(const struct plan *p, const struct extension *x, const struct extension_basis *from,
 		struct plan_request *asked, struct plan *out, struct error *e);
 
 #endif

@@ -7,14 +7,14 @@
 
 #include <string.h>
 
-bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
+bool keep_wants_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
 {
-	return jobs->config.keep_bytes && job->canvas && strcmp(r->reason, job_end_name(END_BLACK)) != 0 &&
-	       !job->lit.black && canvas_rounds(job->canvas) > 0 &&
+	return jobs->config.retained_film_bytes && job->canvas && strcmp(r->reason, job_end_name(END_BLACK)) != 0 &&
+	       !job->bootstrap_result.black && canvas_complete_rounds(job->canvas) > 0 &&
 	       (strcmp(r->state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
 }
 
-bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes)
+bool keep_film_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes)
 {
 	struct error e;
 	if (spool_film_bytes(jobs->spool, job, 1, bytes, &e) == 0)
@@ -24,62 +24,63 @@ bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes)
 	return false;
 }
 
-void keep_drop(const struct jobs *jobs, uint64_t job)
+void keep_drop_films(const struct jobs *jobs, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
 	struct error e;
-	if (jobs_is_read(jobs, job))
+	if (jobs_is_reading(jobs, job))
 		return;
 	spool_job_path(jobs->spool, job, NULL, path);
-	journal_clear(path, UINT64_MAX);
+	journal_delete_others(path, UINT64_MAX);
 	spool_job_path(jobs->spool, job, "checkpoint", path);
 	disk_unlink(path);
-	if (ledger_drop_submission(jobs->ledger, job, &e))
+	if (ledger_delete_submission(jobs->ledger, job, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
 /* Films that are being read for an extension stay, as do those whose deletion fails; neither counts as deleted. */
-bool keep_drop_all(const struct jobs *jobs)
+bool keep_drop_all_films(const struct jobs *jobs)
 {
 	bool any = false;
-	for (size_t i = 0; i < jobs->ended_count; i++) {
-		uint64_t id = jobs->ended[i].id, before, after;
-		if (!keep_bytes(jobs, id, &before) || !before)
+	for (size_t i = 0; i < jobs->ended_job_count; i++) {
+		uint64_t id = jobs->ended_jobs[i].id, before, after;
+		if (!keep_film_bytes(jobs, id, &before) || !before)
 			continue;
-		keep_drop(jobs, id);
-		any = any || (keep_bytes(jobs, id, &after) && after < before);
+		keep_drop_films(jobs, id);
+		any = any || (keep_film_bytes(jobs, id, &after) && after < before);
 	}
 	return any;
 }
 
-void keep_trim(const struct jobs *jobs)
+void keep_trim_films(const struct jobs *jobs)
 {
-	uint64_t left = jobs->config.keep_bytes;
-	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the job that ended last */
+	uint64_t remaining = jobs->config.retained_film_bytes;
+	for (size_t i = jobs->ended_job_count; i-- > 0;) { /* starting with the job that ended last */
 		uint64_t bytes;
-		if (!keep_bytes(jobs, jobs->ended[i].id, &bytes))
+		if (!keep_film_bytes(jobs, jobs->ended_jobs[i].id, &bytes))
 			continue;
-		if (bytes > left)
-			keep_drop(jobs, jobs->ended[i].id);
+		if (bytes > remaining)
+			keep_drop_films(jobs, jobs->ended_jobs[i].id);
 		else
-			left -= bytes;
+			remaining -= bytes;
 	}
 }
 
 void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 {
-	if (jobs->ended_count == ENDED_MAX) {
-		keep_drop(jobs, jobs->ended[0].id); /* films are counted by this list, which the job leaves */
-		memmove(jobs->ended, jobs->ended + 1, --jobs->ended_count * sizeof *jobs->ended);
+	if (jobs->ended_job_count == ENDED_JOBS_MAX) {
+		keep_drop_films(jobs,
+				jobs->ended_jobs[0].id); /* films are counted by this list, which the job leaves */
+		memmove(jobs->ended_jobs, jobs->ended_jobs + 1, --jobs->ended_job_count * sizeof *jobs->ended_jobs);
 	}
-	jobs->ended[jobs->ended_count++] = *r;
+	jobs->ended_jobs[jobs->ended_job_count++] = *r;
 }
 
 struct job_record *ended_jobs_find(const struct jobs *jobs, uint64_t job)
 {
-	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (jobs->ended[i].id == job)
-			return &jobs->ended[i];
+	for (size_t i = 0; i < jobs->ended_job_count; i++)
+		if (jobs->ended_jobs[i].id == job)
+			return &jobs->ended_jobs[i];
 	return NULL;
 }
 
@@ -87,29 +88,29 @@ void ended_jobs_remove(struct jobs *jobs, uint64_t job)
 {
 	struct job_record *r = ended_jobs_find(jobs, job);
 	if (r)
-		memmove(r, r + 1, (size_t)(jobs->ended + --jobs->ended_count - r) * sizeof *r);
+		memmove(r, r + 1, (size_t)(jobs->ended_jobs + --jobs->ended_job_count - r) * sizeof *r);
 }
 
 int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
-	uint64_t ids[ENDED_MAX]; /* the job that ended last comes first */
+	uint64_t ids[ENDED_JOBS_MAX]; /* the job that ended last comes first */
 	size_t count;
-	int rc = ledger_ended(jobs->ledger, LEDGER_LAST, UINT64_MAX, ids, ENDED_MAX, &count, e);
+	int rc = ledger_list_ended(jobs->ledger, LEDGER_LATEST, UINT64_MAX, ids, ENDED_JOBS_MAX, &count, e);
 	if (rc)
 		return rc;
-	jobs->ended = mem_alloc(ENDED_MAX, sizeof *jobs->ended);
-	if (!jobs->ended)
+	jobs->ended_jobs = mem_alloc(ENDED_JOBS_MAX, sizeof *jobs->ended_jobs);
+	if (!jobs->ended_jobs)
 		return error_set(e, ENOMEM, "no memory for the list of jobs");
 	while (count-- > 0) {
 		struct error fault;
-		rc = ledger_read_record(jobs->ledger, ids[count], &jobs->ended[jobs->ended_count], &fault);
+		rc = ledger_read_record(jobs->ledger, ids[count], &jobs->ended_jobs[jobs->ended_job_count], &fault);
 		if (rc)
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[count],
 				  log_quote(fault.text).text);
 		else
-			jobs->ended_count++;
+			jobs->ended_job_count++;
 	}
-	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(jobs->config.spool).text, jobs->ended_count,
-		  (unsigned long long)ledger_next_id(jobs->ledger));
+	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(jobs->config.spool_folder).text,
+		  jobs->ended_job_count, (unsigned long long)ledger_next_id(jobs->ledger));
 	return 0;
 }

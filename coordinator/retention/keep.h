@@ -10,17 +10,17 @@
 #include "coordinator/live_job/jobs.h"
 
 /* Whether the films of a job that has just ended are to be kept. false: the job cannot be extended. */
-bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r);
+bool keep_wants_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r);
 /* Deletes a job's films and its submission, unless the films are being read. */
-void keep_drop(const struct jobs *jobs, uint64_t job);
+void keep_drop_films(const struct jobs *jobs, uint64_t job);
 /* Returns in *bytes the size of a job's films. Returns false if its folder could not be read, which is logged. */
-bool keep_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes);
-bool keep_drop_all(const struct jobs *jobs); /* deletes the films of all listed jobs; true: some were deleted */
+bool keep_film_bytes(const struct jobs *jobs, uint64_t job, uint64_t *bytes);
+bool keep_drop_all_films(const struct jobs *jobs); /* deletes the films of all listed jobs; true: some were deleted */
 /* Deletes films beyond the limit; call after jobs have ended, and at the start. */
-void keep_trim(const struct jobs *jobs);
+void keep_trim_films(const struct jobs *jobs);
 
-/* Reads the records of the last ENDED_MAX jobs that ended, in the order of their ends. A record that cannot be read
- * is logged and skipped. */
+/* Reads the records of the last ENDED_JOBS_MAX jobs that ended, in the order of their ends. A record that cannot be
+ * read is logged and skipped. */
 int ended_jobs_open(struct jobs *jobs, struct error *e);
 void ended_jobs_add(struct jobs *jobs, const struct job_record *r); /* adds a job that has ended */
 void ended_jobs_remove(struct jobs *jobs, uint64_t job); /* removes a job that continues or has been cleared */

@@ -17,7 +17,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
-#include "common/net/pool.h"
+#include "common/net/uv_pool.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/start.h"
 #include "coordinator/server/limits.h"
@@ -44,7 +44,7 @@ static int write_port(const char *path, unsigned port, struct error *e)
 
 /* Listens at one address. With port 0 it binds to a free port, which `a` contains afterwards. Returns 0 or an error
  * code of libuv. */
-static int listen_at(struct server *s, struct net_addr *a)
+static int listen_at_address(struct server *s, struct net_addr *a)
 {
 	uv_tcp_t *l = &s->peers.listeners[s->peers.listener_count++].tcp;
 	char text[80];
@@ -64,12 +64,12 @@ static int listen_at(struct server *s, struct net_addr *a)
 }
 
 /* Looks up the addresses of the name, and refuses those that need TLS or --insecure. */
-static int find_addresses(const struct server *s, struct net_addrs *l, struct error *e)
+static int resolve_addresses(const struct server *s, struct net_addrs *l, struct error *e)
 {
-	const char *where = s->jobs.config.listen;
-	int rc = net_addrs_resolve(l, where, e);
+	const char *address = s->jobs.config.listen_address;
+	int rc = net_addrs_resolve(l, address, e);
 	for (unsigned i = 0; !rc && i < l->count; i++)
-		rc = net_addr_allow(&l->all[i], where, s->jobs.config.insecure || s->peers.tls, e);
+		rc = net_addr_check_allowed(&l->addrs[i], address, s->jobs.config.insecure || s->peers.tls, e);
 	return rc;
 }
 
@@ -77,37 +77,37 @@ static int find_addresses(const struct server *s, struct net_addrs *l, struct er
  * left out, provided that it has another one. */
 static int start_listening(struct server *s, struct net_addrs *l, struct error *e)
 {
-	const char *where = s->jobs.config.listen;
+	const char *address = s->jobs.config.listen_address;
 	unsigned port = 0;
 	int fault = UV_EADDRNOTAVAIL;
 	for (unsigned i = 0; i < l->count; i++) {
 		if (port)
-			net_addr_set_port(&l->all[i], port);
-		int rc = listen_at(s, &l->all[i]);
+			net_addr_set_port(&l->addrs[i], port);
+		int rc = listen_at_address(s, &l->addrs[i]);
 		if (!rc)
-			port = net_addr_port(&l->all[i]);
+			port = net_addr_port(&l->addrs[i]);
 		else if (rc != UV_EADDRNOTAVAIL && rc != UV_EAFNOSUPPORT)
-			return error_set(e, -rc, "cannot listen at %s: %s", where, uv_strerror(rc));
+			return error_set(e, -rc, "cannot listen at %s: %s", address, uv_strerror(rc));
 		else
 			fault = rc;
 	}
 	if (!port)
-		return error_set(e, -fault, "cannot listen at %s: %s", where, uv_strerror(fault));
+		return error_set(e, -fault, "cannot listen at %s: %s", address, uv_strerror(fault));
 	return s->jobs.config.port_file ? write_port(s->jobs.config.port_file, port, e) : 0;
 }
 
 static int open_tls(struct server *s, struct error *e)
 {
-	int rc = tls_open(&s->peers.tls, s->jobs.config.tls, e);
+	int rc = tls_open(&s->peers.tls, s->jobs.config.tls_folder, e);
 	if (rc)
 		return rc;
 	tls_set_recheck(s->peers.tls, s->jobs.config.tls_check_seconds);
-	const struct tls_peer *self = tls_self(s->peers.tls);
+	const struct tls_peer *self = tls_own_certificate(s->peers.tls);
 	if (self->role == TLS_COORDINATOR)
 		return 0;
 	return error_set(e, EINVAL,
 			 "%s: the certificate of %s is a %s's, and no peer would accept it as a coordinator's",
-			 s->jobs.config.tls, self->name, tls_role_name(self->role));
+			 s->jobs.config.tls_folder, self->name, tls_role_name(self->role));
 }
 
 /* Looks for a changed certificate or revocation list once a second, and logs warnings about their expiry. */
@@ -115,48 +115,48 @@ static void refresh_tls(struct server *s)
 {
 	struct error e;
 	char text[384];
-	if (!s->peers.tls || jobs_now(&s->jobs) < s->tls_next)
+	if (!s->peers.tls || jobs_now(&s->jobs) < s->next_tls_check)
 		return;
-	s->tls_next = jobs_now(&s->jobs) + 1;
+	s->next_tls_check = jobs_now(&s->jobs) + 1;
 	int rc = tls_refresh(s->peers.tls, &e);
 	if (rc > 0)
-		log_event(LOG_TLS_READ, "path=%s", log_quote(s->jobs.config.tls).text);
+		log_event(LOG_TLS_READ, "path=%s", log_quote(s->jobs.config.tls_folder).text);
 	else if (rc < 0)
 		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
-	if (tls_warning_due(s->peers.tls, time(NULL), text, sizeof text))
+	if (tls_expiry_warning_due(s->peers.tls, time(NULL), text, sizeof text))
 		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
-/* Called before the loop polls its sockets. After on_read, which is called behind the poll, everything that had
+/* Called before the loop polls its sockets. After on_after_poll, which is called behind the poll, everything that had
  * arrived by then has been read. */
-static void on_look(uv_prepare_t *h)
+static void on_before_poll(uv_prepare_t *h)
 {
 	struct server *s = h->data;
-	s->looked = jobs_now(&s->jobs);
+	s->polled_at = jobs_now(&s->jobs);
 }
 
-static void on_read(uv_check_t *h)
+static void on_after_poll(uv_check_t *h)
 {
 	struct server *s = h->data;
-	s->jobs.read = s->looked;
+	s->jobs.read_until = s->polled_at;
 }
 
 static void on_tick(uv_timer_t *t)
 {
 	struct server *s = t->data;
-	log_tick();
+	log_report_withheld();
 	refresh_tls(s);
 	peers_tick(&s->peers);
 	status_tick(s->status);
 	jobs_tick(&s->jobs);
-	if (s->watchdog > 0 && jobs_now(&s->jobs) >= s->watchdog_next) {
-		s->watchdog_next = jobs_now(&s->jobs) + s->watchdog / 3;
+	if (s->watchdog_seconds > 0 && jobs_now(&s->jobs) >= s->next_watchdog) {
+		s->next_watchdog = jobs_now(&s->jobs) + s->watchdog_seconds / 3;
 		notify_send("WATCHDOG=1");
 	}
 }
 
 /* Stops accepting work. The loop ends when the running work has ended. */
-static void stop(void *server)
+static void stop_server(void *server)
 {
 	struct server *s = server;
 	if (s->jobs.stopping)
@@ -164,11 +164,11 @@ static void stop(void *server)
 	notify_send("STOPPING=1");
 	jobs_stop(&s->jobs);
 	peers_stop(&s->peers);
-	uv_close((uv_handle_t *)&s->tick, NULL);
-	uv_close((uv_handle_t *)&s->look, NULL);
-	uv_close((uv_handle_t *)&s->check, NULL);
-	uv_close((uv_handle_t *)&s->on_term, NULL);
-	uv_close((uv_handle_t *)&s->on_int, NULL);
+	uv_close((uv_handle_t *)&s->tick_timer, NULL);
+	uv_close((uv_handle_t *)&s->before_poll, NULL);
+	uv_close((uv_handle_t *)&s->after_poll, NULL);
+	uv_close((uv_handle_t *)&s->sigterm_handle, NULL);
+	uv_close((uv_handle_t *)&s->sigint_handle, NULL);
 	status_close(s->status);
 	s->status = NULL;
 }
@@ -176,29 +176,30 @@ static void stop(void *server)
 static void on_signal(uv_signal_t *h, int number)
 {
 	log_event(LOG_STOP, "signal=%d", number);
-	stop(h->data);
+	stop_server(h->data);
 }
 
 static void init_handles(struct server *s)
 {
 	jobs_init(&s->jobs);
 	peers_init(&s->peers);
-	uv_timer_init(&s->loop, &s->tick);
-	uv_prepare_init(&s->loop, &s->look);
-	uv_check_init(&s->loop, &s->check);
-	uv_signal_init(&s->loop, &s->on_term);
-	uv_signal_init(&s->loop, &s->on_int);
-	s->tick.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
-	uv_signal_start(&s->on_term, on_signal, SIGTERM);
-	uv_signal_start(&s->on_int, on_signal, SIGINT);
-	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);
-	uv_prepare_start(&s->look, on_look);
-	uv_check_start(&s->check, on_read);
+	uv_timer_init(&s->loop, &s->tick_timer);
+	uv_prepare_init(&s->loop, &s->before_poll);
+	uv_check_init(&s->loop, &s->after_poll);
+	uv_signal_init(&s->loop, &s->sigterm_handle);
+	uv_signal_init(&s->loop, &s->sigint_handle);
+	s->tick_timer.data = s->before_poll.data = s->after_poll.data = s->sigterm_handle.data = s->sigint_handle.data =
+		s;
+	uv_signal_start(&s->sigterm_handle, on_signal, SIGTERM);
+	uv_signal_start(&s->sigint_handle, on_signal, SIGINT);
+	uv_timer_start(&s->tick_timer, on_tick, TICK_MS, TICK_MS);
+	uv_prepare_start(&s->before_poll, on_before_poll);
+	uv_check_start(&s->after_poll, on_after_poll);
 }
 
 void server_close(struct server *s)
 {
-	stop(s);
+	stop_server(s);
 	uv_run(&s->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&s->loop);
 	assert(closed == 0);
@@ -216,27 +217,27 @@ int server_open(struct server **out, const struct server_config *c, struct error
 	signal(SIGPIPE, SIG_IGN);
 	s->jobs.config = *c;
 	s->jobs.loop = &s->loop;
-	s->jobs.stop = stop;
+	s->jobs.stop = stop_server;
 	s->jobs.stop_user = s;
 	s->peers.jobs = &s->jobs;
-	s->watchdog = notify_watchdog();
+	s->watchdog_seconds = notify_watchdog_seconds();
 	int rc = uv_loop_init(&s->loop);
 	if (rc) {
 		mem_free(s);
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
-	rc = pool_start(&s->loop, e);
+	rc = uv_pool_start(&s->loop, e);
 	init_handles(s);
 	if (!rc)
-		rc = s->jobs.config.tls && *s->jobs.config.tls ? open_tls(s, e) : 0;
+		rc = s->jobs.config.tls_folder && *s->jobs.config.tls_folder ? open_tls(s, e) : 0;
 	struct net_addrs addresses;
 	if (!rc) /* before the spool is created */
-		rc = find_addresses(s, &addresses, e);
+		rc = resolve_addresses(s, &addresses, e);
 	if (!rc)
-		rc = limits_connections(c->max_connections, &s->jobs.config.max_connections, e);
+		rc = limits_reserve_connections(c->max_connections, &s->jobs.config.max_connections, e);
 	if (!rc)
 		rc = jobs_open(&s->jobs, e);
-	int inherited = notify_inherited_unix();
+	int inherited = notify_inherited_socket();
 	if (!rc && (inherited >= 0 || c->status_socket))
 		rc = status_open(&s->status, &s->peers, inherited, c->status_socket, c->status_group, e);
 	if (!rc)
@@ -250,10 +251,10 @@ int server_open(struct server **out, const struct server_config *c, struct error
 
 int server_await_jobs(struct server *s, struct error *e)
 {
-	while (recovery_is_on(&s->jobs) && !s->jobs.stopping)
+	while (recovery_is_running(&s->jobs) && !s->jobs.stopping)
 		uv_run(&s->loop, UV_RUN_ONCE);
-	*e = s->jobs.fault_error;
-	return s->jobs.fault;
+	*e = s->jobs.fatal_error;
+	return s->jobs.fatal_code;
 }
 
 int server_run(const struct server_config *c, struct error *e)
@@ -264,8 +265,8 @@ int server_run(const struct server_config *c, struct error *e)
 		return rc;
 	notify_send("READY=1");
 	uv_run(&s->loop, UV_RUN_DEFAULT);
-	rc = s->jobs.fault;
-	*e = s->jobs.fault_error;
+	rc = s->jobs.fatal_code;
+	*e = s->jobs.fatal_error;
 	server_close(s);
 	return rc;
 }

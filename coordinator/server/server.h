@@ -18,18 +18,18 @@ struct status_socket;
 
 struct server {
 	uv_loop_t loop;
-	uv_timer_t tick;
-	uv_prepare_t look;
-	uv_check_t check;
-	double looked; /* s: when the loop last polled its sockets */
-	uv_signal_t on_term, on_int;
+	uv_timer_t tick_timer;
+	uv_prepare_t before_poll;
+	uv_check_t after_poll;
+	double polled_at; /* s: when the loop last polled its sockets */
+	uv_signal_t sigterm_handle, sigint_handle;
 	struct jobs jobs;
 	struct peers peers;
 	struct status_socket *status;
-	double tls_next; /* next check of the TLS files */
-	double watchdog,
+	double next_tls_check; /* next check of the TLS files */
+	double watchdog_seconds,
 		/* Interval in s of the service manager's watchdog (0: none), and when to notify it next. */
-		watchdog_next;
+		next_watchdog;
 };
 
 /* Starts to listen, and to read the jobs of an earlier run, which the loop continues (recovery.h). */

@@ -27,7 +27,7 @@ json_t *line_error(const char *text)
 }
 
 /* Returns the id in a name such as "j12"; 0: not the name of a job. */
-static uint64_t id_of(const char *name)
+static uint64_t parse_job_name(const char *name)
 {
 	char *end;
 	if (!name || *name != 'j' || name[1] < '0' || name[1] > '9')
@@ -41,8 +41,8 @@ json_t *line_job(struct jobs *jobs, const char *name)
 {
 	char text[64];
 	struct job_view v;
-	uint64_t id = id_of(name);
-	if (!id || !jobs_view(jobs, id, &v)) {
+	uint64_t id = parse_job_name(name);
+	if (!id || !jobs_get_view(jobs, id, &v)) {
 		snprintf(text, sizeof text, "%.32s: no such job", name);
 		return line_error(text);
 	}
@@ -53,21 +53,22 @@ json_t *line_job(struct jobs *jobs, const char *name)
 
 json_t *line_ended(struct jobs *jobs, const char *before)
 {
-	enum { ONE_MORE = LINES_ENDED + 1 }; /* one more than a page, to know whether there is another page */
+	enum { ONE_MORE = LINES_ENDED_MAX + 1 }; /* one more than a page, to know whether there is another page */
 	struct error e;
 	struct job_view v;
 	uint64_t ids[ONE_MORE]; /* in descending order */
 	size_t count;
-	if (ledger_ended(jobs->ledger, LEDGER_BELOW, before ? id_of(before) : UINT64_MAX, ids, ONE_MORE, &count, &e))
+	if (ledger_list_ended(jobs->ledger, LEDGER_BELOW, before ? parse_job_name(before) : UINT64_MAX, ids, ONE_MORE,
+			      &count, &e))
 		return line_error(e.text);
-	bool more = count == ONE_MORE;
-	count -= more;
+	bool has_more = count == ONE_MORE;
+	count -= has_more;
 	json_t *o = line_object("ended"), *list = json_array();
 	for (size_t i = count; i-- > 0;)
-		if (jobs_view(jobs, ids[i], &v))
+		if (jobs_get_view(jobs, ids[i], &v))
 			json_array_append_new(list, view_to_json(&v, false));
 	json_object_set_new(o, "jobs", list);
 	json_object_set_new(o, "before",
-			    more ? json_sprintf("j%llu", (unsigned long long)ids[count - 1]) : json_null());
+			    has_more ? json_sprintf("j%llu", (unsigned long long)ids[count - 1]) : json_null());
 	return o;
 }

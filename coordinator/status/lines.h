@@ -7,12 +7,12 @@
 
 #include <jansson.h>
 
-enum { LINES_ENDED = 50 /* ended jobs in a snapshot, or on one page */ };
+enum { LINES_ENDED_MAX = 50 /* ended jobs in a snapshot, or on one page */ };
 
 json_t *line_object(const char *type); /* an object with schema, type and time */
 json_t *line_error(const char *text);
 json_t *line_job(struct jobs *jobs, const char *name); /* one job with its details, or an error; name: "j12" */
-/* A page: the LINES_ENDED ended jobs with the highest ids below that of `before`, without details; before NULL: the
+/* A page: the LINES_ENDED_MAX ended jobs with the highest ids below that of `before`, without details; before NULL: the
  * first page. */
 json_t *line_ended(struct jobs *jobs, const char *before);
 

@@ -12,7 +12,7 @@
 
 struct snapshot;
 
-struct snapshot *snapshot_take(const struct peers *s); /* NULL: out of memory */
+struct snapshot *snapshot_new(const struct peers *s); /* NULL: out of memory */
 void snapshot_free(struct snapshot *n);
 /* Any thread, one at a time. NULL: out of memory. */
 json_t *snapshot_to_json(const struct snapshot *n);

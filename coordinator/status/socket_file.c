@@ -36,17 +36,17 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 
 /* Gives the socket to the group, through a descriptor of the file that we created, because the name may refer to
  * another file by now. */
-static int give_to_group(const char *path, gid_t group, struct error *e)
+static int set_group(const char *path, gid_t group, struct error *e)
 {
-	char itself[64];
+	char fd_path[64];
 	struct stat st;
 	int fd = open(path, O_PATH | O_NOFOLLOW | O_CLOEXEC);
-	snprintf(itself, sizeof itself, "/proc/self/fd/%d", fd);
-	bool ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
+	snprintf(fd_path, sizeof fd_path, "/proc/self/fd/%d", fd);
+	bool is_ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
 	int rc = 0;
-	if (!ours)
+	if (!is_ours)
 		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was created there", path);
-	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(itself, 0660))
+	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(fd_path, 0660))
 		rc = error_set(e, errno, "%s: the group cannot be set: %s", path, strerror(errno));
 	if (fd >= 0)
 		close(fd);
@@ -89,22 +89,22 @@ int socket_file_open(struct socket_file *f, struct error *e)
 		f->inode = st.st_ino;
 	}
 	if (!rc && f->group)
-		rc = give_to_group(f->path, gid, e);
+		rc = set_group(f->path, gid, e);
 	if (rc && fd >= 0)
 		close(fd);
 	return rc ? rc : fd;
 }
 
-enum socket_file_state socket_file_look(const struct socket_file *f)
+enum socket_file_state socket_file_check(const struct socket_file *f)
 {
 	struct stat st;
 	if (lstat(f->path, &st))
-		return errno == ENOENT ? SOCKET_FILE_GONE : SOCKET_FILE_UNKNOWN;
-	return f->inode && st.st_dev == f->device && st.st_ino == f->inode ? SOCKET_FILE_OURS : SOCKET_FILE_OTHERS;
+		return errno == ENOENT ? SOCKET_FILE_MISSING : SOCKET_FILE_UNKNOWN;
+	return f->inode && st.st_dev == f->device && st.st_ino == f->inode ? SOCKET_FILE_INTACT : SOCKET_FILE_REPLACED;
 }
 
 void socket_file_remove(const struct socket_file *f)
 {
-	if (socket_file_look(f) == SOCKET_FILE_OURS)
+	if (socket_file_check(f) == SOCKET_FILE_INTACT)
 		unlink(f->path);
 }

@@ -21,11 +21,11 @@ struct socket_file {
  * descriptor, or -errno: -EADDRINUSE if another program answers there, -EEXIST if something else is at the path. */
 int socket_file_open(struct socket_file *f, struct error *e);
 enum socket_file_state {
-	SOCKET_FILE_OURS,
-	SOCKET_FILE_GONE,
-	SOCKET_FILE_OTHERS, /* another file is at the path */
-	SOCKET_FILE_UNKNOWN /* the folder cannot be searched */
-} socket_file_look(const struct socket_file *f);
+	SOCKET_FILE_INTACT,
+	SOCKET_FILE_MISSING,
+	SOCKET_FILE_REPLACED, /* another file is at the path */
+	SOCKET_FILE_UNKNOWN   /* the folder cannot be searched */
+} socket_file_check(const struct socket_file *f);
 void socket_file_remove(const struct socket_file *f); /* only if it is still ours */
 
 #endif

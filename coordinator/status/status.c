@@ -31,9 +31,9 @@
 #include <sys/queue.h>
 #include <unistd.h>
 
-enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, KERNEL_BYTES = 100000, BACKLOG = 16 };
+enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_BYTES_MAX = 1 << 20, KERNEL_BUFFER_BYTES = 100000, BACKLOG = 16 };
 
-static const double look_seconds = 1;
+static const double file_check_seconds = 1;
 
 enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
 
@@ -43,11 +43,11 @@ struct reader {
 	uv_pipe_t pipe;
 	unsigned topics;
 	bool closing;
-	bool heard; /* it has been sent its first snapshot; only then are its lines read */
+	bool has_snapshot; /* it has been sent its first snapshot; only then are its lines read */
 	/* Something changed while lines were waiting for this reader: it gets a snapshot once it has read them. */
-	bool behind;
-	size_t unread; /* bytes of answers that wait for this reader */
-	struct send_share share;
+	bool is_behind;
+	size_t unread_bytes; /* bytes of answers that wait for this reader */
+	struct send_share send_share;
 	size_t line_size;
 	char line[LINE_BYTES];
 };
@@ -56,13 +56,13 @@ struct reader {
  * of those may be waiting for a disk, and the status has to be able to say so. */
 struct snapshot_task {
 	uv_thread_t thread;
-	uv_async_t done;
-	bool threaded;
+	uv_async_t done_async;
+	bool has_thread;
 	struct status_socket *socket; /* NULL: the socket has been closed */
 	struct snapshot *snapshot;
-	unsigned changed;		/* topics of which there is news */
-	bool for_some;			/* some reader needs the snapshot */
-	struct shared *whole, *workers; /* their texts; NULL: not needed, or out of memory */
+	unsigned changed_topics;			  /* topics of which there is news */
+	bool snapshot_needed;				  /* some reader needs the snapshot */
+	struct shared_line *snapshot_line, *workers_line; /* their texts; NULL: not needed, or out of memory */
 };
 
 struct status_socket {
@@ -72,54 +72,55 @@ struct status_socket {
 	uv_pipe_t *listener;
 	LIST_HEAD(, reader) readers; /* including those that are being closed */
 	unsigned reader_count;	     /* readers not being closed */
-	bool caller_waits;
+	bool accept_pending;
 	/* NULL: none. Nothing else is published while it is being made. */
-	struct snapshot_task *making;
+	struct snapshot_task *task;
 	/* A tick found a snapshot being made: the next one is made by a tick, before the first snapshots of new
 	 * readers. */
-	bool tick_waits;
-	struct job_view *shown; /* jobs as last sent to subscribers */
+	bool tick_pending;
+	struct job_view *shown_jobs; /* jobs as last sent to subscribers */
 	size_t shown_count;
 	uint64_t shown_changes; /* jobs.changes at the last tick that published */
 	char *path;		/* NULL: the socket was inherited */
 	char *group;		/* group that may connect; NULL: none */
 	struct socket_file file;
-	double looked; /* s of jobs_now: when the file was last checked */
-	bool reported; /* a fault of the file has been logged: it cannot be made anew, or another file is at its path */
+	double file_checked_at; /* s of jobs_now: when the file was last checked */
+	bool fault_reported; /* a fault of the file has been logged: it cannot be made anew, or another file is at its
+				path */
 };
 
 /* A line for several readers, whose text is made once; reference-counted. */
-struct shared {
-	unsigned holders;
+struct shared_line {
+	unsigned reference_count;
 	size_t size;
 	char *text; /* allocated by jansson */
 };
 
 /* Takes over the reference to o. Returns NULL if out of memory. */
-static struct shared *share_text(json_t *o)
+static struct shared_line *shared_line_new(json_t *o)
 {
 	char *text = json_dumps(o, JSON_COMPACT);
-	struct shared *l = text ? mem_alloc(1, sizeof *l) : NULL;
+	struct shared_line *l = text ? mem_alloc(1, sizeof *l) : NULL;
 	json_decref(o);
 	if (l)
-		*l = (struct shared){1, strlen(text), text};
+		*l = (struct shared_line){1, strlen(text), text};
 	else
 		free(text);
 	return l;
 }
 
-static void release(struct shared *l)
+static void shared_line_release(struct shared_line *l)
 {
-	if (!l || --l->holders)
+	if (!l || --l->reference_count)
 		return;
 	free(l->text);
 	mem_free(l);
 }
 
-struct sending {
+struct line_write {
 	uv_write_t request;
-	struct shared *line; /* a reference */
-	bool answer;	     /* an answer to a line of the reader's */
+	struct shared_line *line; /* a reference */
+	bool is_answer;		  /* an answer to a line of the reader's */
 };
 
 static void on_reader_closed(uv_handle_t *h)
@@ -136,23 +137,23 @@ static void drop_reader(struct reader *r)
 		return;
 	r->closing = true;
 	r->socket->reader_count--;
-	send_pool_leave(&r->share);
+	send_pool_close_share(&r->send_share);
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
 }
 
-static size_t bytes_waiting(const struct reader *r)
+static size_t queued_bytes(const struct reader *r)
 {
 	return uv_stream_get_write_queue_size((const uv_stream_t *)&r->pipe);
 }
 
 static uint64_t unsent_bytes(const struct send_share *s)
 {
-	return bytes_waiting((const struct reader *)((const char *)s - offsetof(struct reader, share)));
+	return queued_bytes((const struct reader *)((const char *)s - offsetof(struct reader, send_share)));
 }
 
-static void give_way(struct send_share *s)
+static void drop_for_others(struct send_share *s)
 {
-	drop_reader((struct reader *)((char *)s - offsetof(struct reader, share)));
+	drop_reader((struct reader *)((char *)s - offsetof(struct reader, send_share)));
 }
 
 static uint64_t loop_ms(const struct reader *r)
@@ -162,11 +163,11 @@ static uint64_t loop_ms(const struct reader *r)
 
 static void on_written(uv_write_t *w, int status)
 {
-	struct sending *s = w->data;
+	struct line_write *s = w->data;
 	struct reader *r = w->handle->data;
-	r->unread -= s->answer ? s->line->size : 0;
-	send_pool_sub(&r->share, s->line->size, loop_ms(r));
-	release(s->line);
+	r->unread_bytes -= s->is_answer ? s->line->size : 0;
+	send_pool_subtract(&r->send_share, s->line->size, loop_ms(r));
+	shared_line_release(s->line);
 	mem_free(s);
 	if (status)
 		drop_reader(r);
@@ -174,37 +175,37 @@ static void on_written(uv_write_t *w, int status)
 
 /* Sends a line. At most one tick's lines about changes wait for a reader (see status_tick); the size of waiting
  * answers is bounded here. */
-static void send_line(struct reader *r, struct shared *l, bool answer)
+static void send_line(struct reader *r, struct shared_line *l, bool answer)
 {
-	struct sending *s = l ? mem_alloc(1, sizeof *s) : NULL;
+	struct line_write *s = l ? mem_alloc(1, sizeof *s) : NULL;
 	size_t size = l ? l->size : 0;
-	if (!s || (answer && r->unread > UNREAD_MAX))
+	if (!s || (answer && r->unread_bytes > UNREAD_BYTES_MAX))
 		drop_reader(r);
-	if (r->closing || !send_pool_add(&r->share, size, loop_ms(r))) {
+	if (r->closing || !send_pool_add(&r->send_share, size, loop_ms(r))) {
 		mem_free(s);
 		return;
 	}
-	*s = (struct sending){.line = l, .answer = answer};
-	l->holders++;
-	r->unread += answer ? size : 0;
+	*s = (struct line_write){.line = l, .is_answer = answer};
+	l->reference_count++;
+	r->unread_bytes += answer ? size : 0;
 	s->request.data = s;
 	static char newline[] = "\n";
 	uv_buf_t parts[2] = {uv_buf_init(l->text, (unsigned)size), uv_buf_init(newline, 1)};
 	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
-		send_pool_sub(&r->share, size, loop_ms(r));
-		release(l);
+		send_pool_subtract(&r->send_share, size, loop_ms(r));
+		shared_line_release(l);
 		mem_free(s);
 		drop_reader(r);
 	}
-	send_pool_look(&r->share, loop_ms(r));
+	send_pool_note_progress(&r->send_share, loop_ms(r));
 }
 
 /* Takes over the reference to o. */
 static void send_object(struct reader *r, json_t *o, bool answer)
 {
-	struct shared *l = share_text(o);
+	struct shared_line *l = shared_line_new(o);
 	send_line(r, l, answer);
-	release(l);
+	shared_line_release(l);
 }
 
 static void send_answer(struct reader *r, json_t *o)
@@ -219,23 +220,23 @@ static void set_subscription(struct reader *r, const json_t *list)
 		enum topic topic;
 	} topics[] = {{"jobs", TOPIC_JOBS}, {"workers", TOPIC_WORKERS}, {"snapshot", TOPIC_SNAPSHOT}};
 	unsigned wanted = 0;
-	bool known = true;
+	bool is_known = true;
 	for (size_t i = 0; i < json_array_size(list); i++) {
 		const char *name = json_string_value(json_array_get(list, i));
 		unsigned found = 0;
 		for (size_t k = 0; name && k < sizeof topics / sizeof *topics; k++)
 			if (strcmp(name, topics[k].name) == 0)
 				found = topics[k].topic;
-		known = known && found;
+		is_known = is_known && found;
 		wanted |= found;
 	}
-	if (known)
+	if (is_known)
 		r->topics |= wanted;
 	else
 		send_answer(r, line_error("only jobs, workers and snapshot can be subscribed to"));
 }
 
-static void take_line(struct reader *r, size_t size)
+static void handle_line(struct reader *r, size_t size)
 {
 	json_error_t fault;
 	json_t *o = json_loadb(r->line, size, JSON_REJECT_DUPLICATES, &fault);
@@ -271,7 +272,7 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 	r->line_size += (size_t)count;
 	for (char *end; !r->closing && (end = memchr(r->line, '\n', r->line_size));) {
 		size_t n = (size_t)(end - r->line);
-		take_line(r, n);
+		handle_line(r, n);
 		r->line_size -= n + 1;
 		memmove(r->line, end + 1, r->line_size);
 	}
@@ -279,7 +280,7 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 		drop_reader(r);
 }
 
-static void begin_making(struct status_socket *t, unsigned changed);
+static void start_snapshot(struct status_socket *t, unsigned changed_topics);
 
 static void on_connection(uv_stream_t *listener, int status)
 {
@@ -287,13 +288,14 @@ static void on_connection(uv_stream_t *listener, int status)
 	if (!t)
 		return;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
-	t->caller_waits = !r && !status; /* until it is accepted, it blocks all other readers */
+	t->accept_pending = !r && !status; /* until it is accepted, it blocks all other readers */
 	if (!r)
 		return;
 	uv_pipe_init(listener->loop, &r->pipe, 0);
 	r->pipe.data = r;
 	r->socket = t;
-	r->share = (struct send_share){.pool = &t->peers->sending, .left = unsent_bytes, .give_way = give_way};
+	r->send_share = (struct send_share){
+		.pool = &t->peers->send_pool, .unsent_bytes = unsent_bytes, .evict = drop_for_others};
 	LIST_INSERT_HEAD(&t->readers, r, next);
 	t->reader_count++;
 	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
@@ -301,7 +303,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		return;
 	}
 	/* Some systems would otherwise buffer hundreds of snapshots, which are old when they are read. */
-	int room = KERNEL_BYTES;
+	int room = KERNEL_BUFFER_BYTES;
 	uv_send_buffer_size((uv_handle_t *)&r->pipe, &room);
 	/* The line fits into the kernel's buffer, so it is sent before the reader is dropped. */
 	if (t->reader_count > READERS_MAX) {
@@ -309,109 +311,110 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop_reader(r);
 		return;
 	}
-	r->behind = true;
-	if (!t->tick_waits)
-		begin_making(t, 0);
+	r->is_behind = true;
+	if (!t->tick_pending)
+		start_snapshot(t, 0);
 }
 
-static const struct job_view *shown_before(const struct status_socket *t, uint64_t id)
+static const struct job_view *find_shown_job(const struct status_socket *t, uint64_t id)
 {
 	for (size_t i = 0; i < t->shown_count; i++)
-		if (t->shown[i].record.id == id)
-			return &t->shown[i];
+		if (t->shown_jobs[i].record.id == id)
+			return &t->shown_jobs[i];
 	return NULL;
 }
 
 static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
-	struct shared *l = share_text(o);
+	struct shared_line *l = shared_line_new(o);
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
-		if ((r->topics & topic) && !r->behind)
+		if ((r->topics & topic) && !r->is_behind)
 			send_line(r, l, false);
-	release(l);
+	shared_line_release(l);
 }
 
-static bool wants_snapshot(const struct reader *r, unsigned changed)
+static bool wants_snapshot(const struct reader *r, unsigned changed_topics)
 {
-	return !r->closing && (r->behind ? bytes_waiting(r) == 0 : changed & r->topics & TOPIC_SNAPSHOT);
+	return !r->closing && (r->is_behind ? queued_bytes(r) == 0 : changed_topics & r->topics & TOPIC_SNAPSHOT);
 }
 
-static void run_making(void *making)
+static void run_snapshot_task(void *making)
 {
 	struct snapshot_task *m = making;
-	if (m->for_some)
-		m->whole = share_text(snapshot_to_json(m->snapshot));
-	if (m->changed & TOPIC_WORKERS)
-		m->workers = share_text(snapshot_workers_to_json(m->snapshot));
-	uv_async_send(&m->done);
+	if (m->snapshot_needed)
+		m->snapshot_line = shared_line_new(snapshot_to_json(m->snapshot));
+	if (m->changed_topics & TOPIC_WORKERS)
+		m->workers_line = shared_line_new(snapshot_workers_to_json(m->snapshot));
+	uv_async_send(&m->done_async);
 }
 
-static void on_making_closed(uv_handle_t *h)
+static void on_task_closed(uv_handle_t *h)
 {
 	mem_free(h->data);
 }
 
-static void making_done(uv_async_t *done)
+static void on_snapshot_done(uv_async_t *done)
 {
 	struct snapshot_task *m = done->data;
 	struct status_socket *t = m->socket;
-	if (m->threaded)
+	if (m->has_thread)
 		uv_thread_join(&m->thread);
 	for (struct reader *r = t ? LIST_FIRST(&t->readers) : NULL; r; r = LIST_NEXT(r, next)) {
-		if ((m->changed & r->topics & TOPIC_WORKERS) && !r->behind)
-			send_line(r, m->workers, false);
-		if (!m->for_some || !wants_snapshot(r, m->changed))
+		if ((m->changed_topics & r->topics & TOPIC_WORKERS) && !r->is_behind)
+			send_line(r, m->workers_line, false);
+		if (!m->snapshot_needed || !wants_snapshot(r, m->changed_topics))
 			continue;
-		r->behind = false;
-		send_line(r, m->whole, false);
-		if (!r->heard && !r->closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
+		r->is_behind = false;
+		send_line(r, m->snapshot_line, false);
+		if (!r->has_snapshot && !r->closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
 			drop_reader(r);
-		r->heard = true;
+		r->has_snapshot = true;
 	}
 	if (t)
-		t->making = NULL;
+		t->task = NULL;
 	snapshot_free(m->snapshot);
-	release(m->whole);
-	release(m->workers);
-	uv_close((uv_handle_t *)done, on_making_closed);
+	shared_line_release(m->snapshot_line);
+	shared_line_release(m->workers_line);
+	uv_close((uv_handle_t *)done, on_task_closed);
 }
 
 /* Begins to make a snapshot if a reader needs one: those subscribed to snapshots if something changed, and those that
  * were behind and have read everything. One snapshot serves all, because making it takes tens of milliseconds with a
- * thousand workers. changed: topics of which there is news. */
-static void begin_making(struct status_socket *t, unsigned changed)
+ * thousand workers. changed_topics: topics of which there is news. */
+static void start_snapshot(struct status_socket *t, unsigned changed_topics)
 {
-	bool some = false, workers = false;
+	bool snapshot_needed = false, workers = false;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next)) {
-		some = some || wants_snapshot(r, changed);
-		workers = workers || (!r->behind && changed & r->topics & TOPIC_WORKERS);
+		snapshot_needed = snapshot_needed || wants_snapshot(r, changed_topics);
+		workers = workers || (!r->is_behind && changed_topics & r->topics & TOPIC_WORKERS);
 	}
-	if (t->making || !(some || workers))
+	if (t->task || !(snapshot_needed || workers))
 		return;
 	struct snapshot_task *m = mem_alloc(1, sizeof *m);
-	struct snapshot *n = m ? snapshot_take(t->peers) : NULL;
+	struct snapshot *n = m ? snapshot_new(t->peers) : NULL;
 	if (!n) { /* every reader that should have been sent something is behind now */
 		for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
-			r->behind = r->behind || changed & r->topics;
+			r->is_behind = r->is_behind || changed_topics & r->topics;
 		mem_free(m);
 		return;
 	}
-	*m = (struct snapshot_task){.socket = t, .snapshot = n, .changed = changed, .for_some = some};
-	t->making = m;
-	m->done.data = m;
-	uv_async_init(t->jobs->loop, &m->done, making_done);
-	m->threaded = uv_thread_create(&m->thread, run_making, m) == 0;
-	if (!m->threaded)
-		run_making(m);
+	*m = (struct snapshot_task){
+		.socket = t, .snapshot = n, .changed_topics = changed_topics, .snapshot_needed = snapshot_needed};
+	t->task = m;
+	m->done_async.data = m;
+	uv_async_init(t->jobs->loop, &m->done_async, on_snapshot_done);
+	m->has_thread = uv_thread_create(&m->thread, run_snapshot_task, m) == 0;
+	if (!m->has_thread)
+		run_snapshot_task(m);
 }
 
 /* Sends the jobs that have changed to their subscribers. */
 static void publish_changes(struct status_socket *t)
 {
 	struct job_view *views;
-	size_t count = jobs_views(t->jobs, LINES_ENDED, &views);
+	size_t count = jobs_list_views(t->jobs, LINES_ENDED_MAX, &views);
 	for (size_t i = 0; i < count; i++) {
-		const struct job_view *before = shown_before(t, views[i].record.id);
+		const struct job_view *before = find_shown_job(t, views[i].record.id);
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
 			continue;
 		bool details = !record_is_ended(&views[i].record) || (before && !record_is_ended(&before->record));
@@ -419,8 +422,8 @@ static void publish_changes(struct status_socket *t)
 		json_object_set_new(o, "job", view_to_json(&views[i], details));
 		publish_object(t, TOPIC_JOBS, o);
 	}
-	mem_free(t->shown);
-	t->shown = views;
+	mem_free(t->shown_jobs);
+	t->shown_jobs = views;
 	t->shown_count = count;
 }
 
@@ -462,7 +465,7 @@ static int listen_on(struct status_socket *t, int fd, struct error *e)
 	return fault ? error_set(e, -fault, "%s: %s", what, uv_strerror(fault)) : 0;
 }
 
-static void report(const struct status_socket *t, const char *text)
+static void log_report(const struct status_socket *t, const char *text)
 {
 	log_event(LOG_STATUS_SOCKET, "path=%s text=%s", log_quote(t->path).text, log_quote(text).text);
 }
@@ -470,26 +473,26 @@ static void report(const struct status_socket *t, const char *text)
 /* Logs a fault once, although every check finds it again. */
 static void report_once(struct status_socket *t, const char *text)
 {
-	if (!t->reported)
-		report(t, text);
-	t->reported = true;
+	if (!t->fault_reported)
+		log_report(t, text);
+	t->fault_reported = true;
 }
 
 /* Checks the socket's file. It may be removed while the coordinator runs, by a program that clears old files away or
  * by hand. Nobody could connect then until a restart, so it is made anew; existing connections stay. A file that
  * somebody else has put there is left alone. */
-static void look_for_file(struct status_socket *t)
+static void check_socket_file(struct status_socket *t)
 {
 	struct error e;
-	if (!t->path || jobs_now(t->jobs) < t->looked + look_seconds)
+	if (!t->path || jobs_now(t->jobs) < t->file_checked_at + file_check_seconds)
 		return;
-	t->looked = jobs_now(t->jobs);
-	enum socket_file_state state = socket_file_look(&t->file);
-	if (state == SOCKET_FILE_OTHERS)
+	t->file_checked_at = jobs_now(t->jobs);
+	enum socket_file_state state = socket_file_check(&t->file);
+	if (state == SOCKET_FILE_REPLACED)
 		report_once(t, "another file is where the status socket was: nobody can ask for the status");
-	if (state == SOCKET_FILE_OURS)
-		t->reported = false;
-	if (state != SOCKET_FILE_GONE)
+	if (state == SOCKET_FILE_INTACT)
+		t->fault_reported = false;
+	if (state != SOCKET_FILE_MISSING)
 		return;
 	int fd = socket_file_open(&t->file, &e), rc = fd < 0 ? fd : listen_on(t, fd, &e);
 	if (rc) {
@@ -498,8 +501,8 @@ static void look_for_file(struct status_socket *t)
 		report_once(t, e.text);
 		return;
 	}
-	report(t, "the status socket's file was removed, and has been made anew");
-	t->reported = false;
+	log_report(t, "the status socket's file was removed, and has been made anew");
+	t->fault_reported = false;
 }
 
 void status_tick(struct status_socket *t)
@@ -507,29 +510,29 @@ void status_tick(struct status_socket *t)
 	unsigned topics = 0;
 	if (!t)
 		return;
-	look_for_file(t);
-	if (t->caller_waits && t->listener)
+	check_socket_file(t);
+	if (t->accept_pending && t->listener)
 		on_connection((uv_stream_t *)t->listener, 0);
-	t->tick_waits = t->making;
-	if (t->making) /* changes are looked for after the snapshot has been sent, so that no newer line precedes it */
+	t->tick_pending = t->task;
+	if (t->task) /* changes are looked for after the snapshot has been sent, so that no newer line precedes it */
 		return;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		topics |= r->topics;
-	bool changed = topics && t->shown_changes != t->jobs->changes;
+	bool changed = topics && t->shown_changes != t->jobs->change_count;
 	for (struct reader *r = LIST_FIRST(&t->readers); changed && r; r = LIST_NEXT(r, next))
-		r->behind = r->behind || (r->topics && bytes_waiting(r));
+		r->is_behind = r->is_behind || (r->topics && queued_bytes(r));
 	if (changed)
-		t->shown_changes = t->jobs->changes;
+		t->shown_changes = t->jobs->change_count;
 	if (changed && (topics & TOPIC_JOBS))
 		publish_changes(t);
-	begin_making(t, changed ? topics : 0);
+	start_snapshot(t, changed ? topics : 0);
 }
 
 static void free_socket(struct status_socket *t)
 {
 	if (!t)
 		return;
-	mem_free(t->shown);
+	mem_free(t->shown_jobs);
 	mem_free(t->path);
 	mem_free(t->group);
 	mem_free(t);
@@ -549,7 +552,7 @@ int status_open(struct status_socket **out, struct peers *s, int inherited, cons
 	}
 	t->peers = s;
 	t->jobs = s->jobs;
-	t->looked = jobs_now(s->jobs);
+	t->file_checked_at = jobs_now(s->jobs);
 	t->file = (struct socket_file){.path = t->path, .group = t->group};
 	*out = t;
 	int fd = t->path ? socket_file_open(&t->file, e) : inherited;
@@ -565,8 +568,8 @@ void status_close(struct status_socket *t)
 		LIST_REMOVE(r, next);
 		r->socket = NULL;
 	}
-	if (t->making)
-		t->making->socket = NULL;
+	if (t->task)
+		t->task->socket = NULL;
 	if (t->path)
 		socket_file_remove(&t->file);
 	close_listener(t);

@@ -2,32 +2,37 @@
 /*
  * A clock of observed time, in seconds, from which the ages of finished jobs are computed. During a run of the
  * coordinator and between two runs it advances with the machine's boot-time clock, which nobody can set. Across a
- * reboot only the wall clock knows how much time has passed, and it may be wrong, so no more than age_clock_credit is
- * added. Pure.
+ * reboot only the wall clock knows how much time has passed, and it may be wrong, so no more than age_clock_max_credit
+ * is added. Pure.
  */
 #ifndef COORDINATOR_STORE_AGE_CLOCK_H
 #define COORDINATOR_STORE_AGE_CLOCK_H
 
 #include <stddef.h>
 
-enum { AGE_CLOCK_CREDIT = 86400, AGE_CLOCK_SHARE = 30, AGE_CLOCK_BOOT = 40, AGE_CLOCK_TEXT = 256 };
-
-struct age_clock {
-	double seconds;		   /* observed time at the moment of the other members */
-	double up;		   /* s since the machine was booted, including sleep */
-	double wall;		   /* s since 1970 */
-	char boot[AGE_CLOCK_BOOT]; /* the kernel's identifier of this boot */
+enum {
+	AGE_CLOCK_CREDIT_MAX = 86400,
+	AGE_CLOCK_CREDIT_DIVISOR = 30,
+	AGE_CLOCK_BOOT_ID_SIZE = 40,
+	AGE_CLOCK_TEXT_MAX = 256
 };
 
-/* Sets now->seconds; the other members of `now` have been set by the caller. last: the clock as stored last; NULL:
- * none, and observed time starts at 0. credit: maximum in s to be added across a reboot. */
+struct age_clock {
+	double observed_seconds;	      /* observed time at the moment of the other members */
+	double uptime;			      /* s since the machine was booted, including sleep */
+	double wall_time;		      /* s since 1970 */
+	char boot_id[AGE_CLOCK_BOOT_ID_SIZE]; /* the kernel's identifier of this boot */
+};
+
+/* Sets now->observed_seconds; the other members of `now` have been set by the caller. last: the clock as stored last;
+ * NULL: none, and observed time starts at 0. credit: maximum in s to be added across a reboot. */
 void age_clock_advance(struct age_clock *now, const struct age_clock *last, double credit);
 /* Returns a thirtieth of the time that results are kept, but at most a day, so that no jump of the wall clock can
  * remove a result that is not nearly that old already. keep: s; 0: results are kept forever. */
-double age_clock_credit(double keep);
+double age_clock_max_credit(double keep);
 
 /* Writes the clock as one line with a checksum. Returns the length of the line. */
-size_t age_clock_to_text(const struct age_clock *s, char text[AGE_CLOCK_TEXT]);
+size_t age_clock_to_text(const struct age_clock *s, char text[AGE_CLOCK_TEXT_MAX]);
 int age_clock_from_text(const char *text, size_t size, struct age_clock *s); /* -EBADMSG: damaged, or not such a line */
 
 #endif

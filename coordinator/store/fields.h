@@ -23,10 +23,10 @@ struct field {
 };
 
 /* Stores all fields in o under their keys. Returns -EINVAL if a text is not UTF-8, -ENOMEM if out of memory. */
-int fields_store(const struct field *f, size_t count, const void *from, json_t *o, struct error *e);
+int fields_to_json(const struct field *f, size_t count, const void *from, json_t *o, struct error *e);
 /* Reads all fields from o. A missing field becomes 0, "", or unknown if its kind allows that. */
-void fields_read(const struct field *f, size_t count, void *to, const json_t *o);
-/* Like fields_store(), but writes null for unknown numbers. Returns false on an error. */
-bool fields_show(const struct field *f, size_t count, const void *from, json_t *o);
+void fields_from_json(const struct field *f, size_t count, void *to, const json_t *o);
+/* Like fields_to_json(), but writes null for unknown numbers. Returns false on an error. */
+bool fields_to_status_json(const struct field *f, size_t count, const void *from, json_t *o);
 
 #endif

@@ -26,15 +26,15 @@
 #include <stdint.h>
 
 enum journal_kind {
-	JOURNAL_BATCH = 1,	/* a frame as received: prefix, header, payload */
-	JOURNAL_PINNED = 2,	/* the fingerprint that the job is pinned to */
-	JOURNAL_OLD_LOOK = 3,	/* an estimate, by earlier versions (coordinator/live_job/stored.h) */
-	JOURNAL_OLD_COUNTS = 4, /* totals, by earlier versions */
+	JOURNAL_BATCH = 1,	 /* a frame as received: prefix, header, payload */
+	JOURNAL_FINGERPRINT = 2, /* the fingerprint that the job is pinned to */
+	JOURNAL_OLD_LOOK = 3,	 /* an estimate, by earlier versions (coordinator/live_job/stored.h) */
+	JOURNAL_OLD_COUNTS = 4,	 /* totals, by earlier versions */
 	/* Like JOURNAL_BATCH, but replaces the last record of the same lease, which is taken back together with all
 	 * later records of its (group, part). */
-	JOURNAL_AGAIN = 5,
+	JOURNAL_BATCH_REPLACEMENT = 5,
 	/* Like JOURNAL_BATCH, but merged before the checkpoint; kept because it may have to be taken back. */
-	JOURNAL_KEPT = 6,
+	JOURNAL_MERGED_BATCH = 6,
 	JOURNAL_LOOK = 7,   /* a message Look of proto/stored.proto */
 	JOURNAL_COUNTS = 8, /* totals of the job's counters, not increments */
 };
@@ -46,34 +46,35 @@ int journal_create(struct journal **j, const char *folder, uint64_t job, uint64_
 
 /* A record, or a place where records are missing. */
 struct journal_item {
-	struct journal *journal; /* for journal_body, which can read this record and earlier ones */
+	struct journal *journal; /* for journal_read_body, which can read this record and earlier ones */
 	enum journal_kind kind;
 	double elapsed;		/* as passed to journal_append */
 	struct lease_key lease; /* its kind is 0 for a record that belongs to no lease */
 	const unsigned char *body;
-	size_t size;
-	uint64_t at; /* offset of the record, for journal_body */
+	size_t body_size;
+	uint64_t offset; /* offset of the record, for journal_read_body */
 	/* 0: this is a valid record. Otherwise the number of damaged records: either one whose kind, elapsed and
 	 * lease are known, or several of which nothing is known (their kind is 0). */
-	uint64_t missing;
+	uint64_t damaged_count;
 };
 /* Called for each item in order. A result other than 0 stops the reading with that code. */
-typedef int journal_visit(void *user, const struct journal_item *item, struct error *e);
+typedef int journal_visitor(void *user, const struct journal_item *item, struct error *e);
 
-struct journal_found {
-	uint64_t cut;	  /* bytes of incomplete records at the end */
-	uint64_t damaged; /* number of damaged records in the middle */
-	uint64_t lost;	  /* number of these records that had been durable; the others may never have been complete */
+struct journal_damage {
+	uint64_t cut_bytes;	/* bytes of incomplete records at the end */
+	uint64_t damaged_count; /* number of damaged records in the middle */
+	uint64_t
+		lost_count; /* number of these records that had been durable; the others may never have been complete */
 };
 
 /* Opens an existing journal: visits its valid records, cuts off incomplete ones at the end, and appends behind them.
  * Returns -ENOENT if there is no file; -EBADMSG if it belongs to another job or generation; -EPROTO if it is of
  * another version. After any error, including a read error, the file is unchanged. */
-int journal_open(struct journal **j, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit,
-		 void *user, struct journal_found *found, struct error *e);
+int journal_open(struct journal **j, const char *folder, uint64_t job, uint64_t generation, journal_visitor *visit,
+		 void *user, struct journal_damage *found, struct error *e);
 /* Reads the body of a visited record again; *body is mem_alloc'd. Returns -EBADMSG if it has been damaged since. The
  * loop's thread, or any thread that owns the journal. */
-int journal_body(struct journal *j, uint64_t at, unsigned char **body, size_t *size, struct error *e);
+int journal_read_body(struct journal *j, uint64_t at, unsigned char **body, size_t *size, struct error *e);
 /* Adds a reference. */
 void journal_hold(struct journal *j);
 void journal_release(struct journal *j); /* ends a reference; j may be NULL */
@@ -103,10 +104,10 @@ bool journal_is_bad(const struct journal *j);
  * again, whatever happens through other handles of the old file. Returns -EAGAIN while a flush is running. */
 int journal_renew(struct journal *j, struct error *e);
 /* Whether the file is no longer at its path. */
-bool journal_is_gone(const struct journal *j);
+bool journal_file_is_missing(const struct journal *j);
 /* Makes the journal bad because its file is gone. Its contents can still be read and copied into a new file. */
-void journal_distrust(struct journal *j);
+void journal_mark_bad(struct journal *j);
 /* Declares that all its records are stored elsewhere: journal_sync has nothing left to do, and does not fail. */
-void journal_settle(struct journal *j);
+void journal_mark_settled(struct journal *j);
 
 #endif

@@ -23,17 +23,17 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { PATH_MOST = 4200 };
-enum { WINDOW = 1 << 20 /* bytes searched for a mark at a time */ };
+enum { PATH_SIZE = 4200 };
+enum { WINDOW_SIZE = 1 << 20 /* bytes searched for a mark at a time */ };
 
 /* The digits are the version. They change with every change of a record's format, including the formats of bodies
  * (enum journal_kind, and batches as packed by common/wire). */
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
-void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD])
+void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD_SIZE])
 {
-	memset(bytes, 0, JOURNAL_HEAD);
+	memset(bytes, 0, JOURNAL_HEAD_SIZE);
 	memcpy(bytes, magic, sizeof magic);
 	put64(bytes + 8, h->job);
 	put64(bytes + 16, h->generation);
@@ -41,7 +41,7 @@ void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL
 	put32(bytes + 32, crc32c(0, bytes, 32));
 }
 
-int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_head *h, const char *path,
+int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD_SIZE], struct journal_head *h, const char *path,
 			struct error *e)
 {
 	*h = (struct journal_head){get64(bytes + 8), get64(bytes + 16), get64(bytes + 24)};
@@ -49,18 +49,18 @@ int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_
 	return rc || get32(bytes + 32) == crc32c(0, bytes, 32) ? rc : error_set(e, EBADMSG, "%s: damaged", path);
 }
 
-void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
+void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD_HEAD_SIZE], const struct buf *a,
 			 const struct buf *b)
 {
-	r->size = (uint32_t)(a->size + b->size);
-	r->body_check = crc32c(crc32c(0, a->bytes, a->size), b->bytes, b->size);
-	memset(bytes, 0, JOURNAL_RECORD);
+	r->body_size = (uint32_t)(a->size + b->size);
+	r->body_crc = crc32c(crc32c(0, a->bytes, a->size), b->bytes, b->size);
+	memset(bytes, 0, JOURNAL_RECORD_HEAD_SIZE);
 	memcpy(bytes, mark, sizeof mark);
-	put32(bytes + 4, r->size);
-	put32(bytes + 8, r->body_check);
+	put32(bytes + 4, r->body_size);
+	put32(bytes + 8, r->body_crc);
 	put32(bytes + 12, r->kind);
 	put64(bytes + 16, r->number);
-	put64(bytes + 24, r->stored);
+	put64(bytes + 24, r->durable_before);
 	put_double(bytes + 32, r->elapsed);
 	put32(bytes + 40, r->lease.kind);
 	put32(bytes + 44, r->lease.group);
@@ -71,13 +71,13 @@ void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_R
 }
 
 /* Returns whether the head of the record is valid. */
-static bool unpack_record(const unsigned char bytes[JOURNAL_RECORD], struct journal_record *r)
+static bool unpack_record_head(const unsigned char bytes[JOURNAL_RECORD_HEAD_SIZE], struct journal_record *r)
 {
-	*r = (struct journal_record){.size = get32(bytes + 4),
-				     .body_check = get32(bytes + 8),
+	*r = (struct journal_record){.body_size = get32(bytes + 4),
+				     .body_crc = get32(bytes + 8),
 				     .kind = get32(bytes + 12),
 				     .number = get64(bytes + 16),
-				     .stored = get64(bytes + 24),
+				     .durable_before = get64(bytes + 24),
 				     .elapsed = get_double(bytes + 32),
 				     .lease = {.kind = (enum lease_kind)get32(bytes + 40),
 					       .group = get32(bytes + 44),
@@ -87,43 +87,44 @@ static bool unpack_record(const unsigned char bytes[JOURNAL_RECORD], struct jour
 	return memcmp(bytes, mark, sizeof mark) == 0 && get32(bytes + 76) == crc32c(0, bytes, 76);
 }
 
-int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
+int journal_read_at(int fd, void *bytes, size_t size, uint64_t offset)
 {
 	unsigned char *p = bytes;
 	while (size) {
-		ssize_t n = disk_pread(fd, p, size, (off_t)at);
+		ssize_t n = disk_pread(fd, p, size, (off_t)offset);
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n <= 0)
 			return n < 0 ? -errno : -ENODATA;
 		p += n;
-		at += (uint64_t)n;
+		offset += (uint64_t)n;
 		size -= (size_t)n;
 	}
 	return 0;
 }
 
 /* Reads the head of a record. Returns 1 if it is valid and fits, 0 if not, or -errno. */
-static int read_head(const struct journal_scan *s, uint64_t at, struct journal_record *r)
+static int read_record_head(const struct journal_scan *s, uint64_t offset, struct journal_record *r)
 {
-	unsigned char bytes[JOURNAL_RECORD];
-	if (at > s->end || s->end - at < sizeof bytes)
+	unsigned char bytes[JOURNAL_RECORD_HEAD_SIZE];
+	if (offset > s->end || s->end - offset < sizeof bytes)
 		return 0;
-	int rc = journal_read_at(s->fd, bytes, sizeof bytes, at);
+	int rc = journal_read_at(s->fd, bytes, sizeof bytes, offset);
 	if (rc)
 		return rc == -ENODATA ? 0 : rc;
-	return unpack_record(bytes, r) && r->salt == s->salt && r->number >= s->number &&
-	       r->size <= s->end - at - sizeof bytes;
+	return unpack_record_head(bytes, r) && r->salt == s->salt && r->number >= s->next_number &&
+	       r->body_size <= s->end - offset - sizeof bytes;
 }
 
 /* Reads the body of a record. Returns 1 if it is valid (*body is mem_alloc'd), 0 if not, or -errno. */
-static int read_body(const struct journal_scan *s, uint64_t at, const struct journal_record *r, unsigned char **body)
+static int read_body(const struct journal_scan *s, uint64_t offset, const struct journal_record *r,
+		     unsigned char **body)
 {
-	*body = mem_alloc(r->size, 1);
+	*body = mem_alloc(r->body_size, 1);
 	if (!*body)
 		return -ENOMEM;
-	int rc = journal_read_at(s->fd, *body, r->size, at + JOURNAL_RECORD);
-	if (!rc && r->body_check == crc32c(0, *body, r->size))
+	int rc = journal_read_at(s->fd, *body, r->body_size, offset + JOURNAL_RECORD_HEAD_SIZE);
+	if (!rc && r->body_crc == crc32c(0, *body, r->body_size))
 		return 1;
 	mem_free(*body);
 	*body = NULL;
@@ -131,20 +132,20 @@ static int read_body(const struct journal_scan *s, uint64_t at, const struct jou
 }
 
 /* Moves *at to the first mark at or after it. Returns 1, 0 if there is none, or -errno. */
-static int find_mark(const struct journal_scan *s, uint64_t *at)
+static int find_mark(const struct journal_scan *s, uint64_t *offset)
 {
-	unsigned char *window = mem_alloc(WINDOW, 1);
+	unsigned char *window = mem_alloc(WINDOW_SIZE, 1);
 	int rc = window ? 0 : -ENOMEM;
-	while (!rc && s->end - *at >= JOURNAL_RECORD) {
-		size_t size = s->end - *at < WINDOW ? (size_t)(s->end - *at) : WINDOW;
-		rc = journal_read_at(s->fd, window, size, *at);
+	while (!rc && s->end - *offset >= JOURNAL_RECORD_HEAD_SIZE) {
+		size_t size = s->end - *offset < WINDOW_SIZE ? (size_t)(s->end - *offset) : WINDOW_SIZE;
+		rc = journal_read_at(s->fd, window, size, *offset);
 		const unsigned char *found = rc ? NULL : memmem(window, size, mark, sizeof mark);
 		if (found) {
-			*at += (uint64_t)(found - window);
+			*offset += (uint64_t)(found - window);
 			rc = 1;
 		} else if (!rc) {
 			/* A mark may lie across the edge of the window. */
-			*at += size < WINDOW ? size : size - (sizeof mark - 1);
+			*offset += size < WINDOW_SIZE ? size : size - (sizeof mark - 1);
 		}
 	}
 	mem_free(window);
@@ -153,37 +154,38 @@ static int find_mark(const struct journal_scan *s, uint64_t *at)
 
 void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt)
 {
-	*s = (struct journal_scan){.fd = fd, .at = JOURNAL_HEAD, .end = end, .salt = salt};
+	*s = (struct journal_scan){.fd = fd, .offset = JOURNAL_HEAD_SIZE, .end = end, .salt = salt};
 }
 
 void journal_scan_end(struct journal_scan *s)
 {
-	mem_free(s->found.body);
+	mem_free(s->next.body);
 	*s = (struct journal_scan){.fd = -1};
 }
 
-/* Finds the first valid record at or after s->at and stores it in s->found. Returns 1, 0 if there is none, or -errno.
+/* Finds the first valid record at or after s->offset and stores it in s->next. Returns 1, 0 if there is none, or
+ * -errno.
  */
-static int look_ahead(struct journal_scan *s)
+static int find_next_valid(struct journal_scan *s)
 {
-	struct journal_piece *p = &s->found;
-	uint64_t at = s->at;
+	struct journal_segment *p = &s->next;
+	uint64_t offset = s->offset;
 	for (;;) {
-		*p = (struct journal_piece){.what = JOURNAL_WHOLE, .from = at, .count = 1};
-		int rc = read_head(s, at, &p->record);
+		*p = (struct journal_segment){.kind = JOURNAL_SEGMENT_VALID, .begin = offset, .record_count = 1};
+		int rc = read_record_head(s, offset, &p->record);
 		if (rc > 0) {
-			p->to = at + JOURNAL_RECORD + p->record.size;
-			rc = read_body(s, at, &p->record, &p->body);
+			p->end = offset + JOURNAL_RECORD_HEAD_SIZE + p->record.body_size;
+			rc = read_body(s, offset, &p->record, &p->body);
 			if (rc > 0)
-				s->ahead = true;
+				s->has_next = true;
 			if (rc)
 				return rc;
-			at = p->to;
+			offset = p->end;
 			continue;
 		}
-		at++;
+		offset++;
 		if (!rc)
-			rc = s->end > at ? find_mark(s, &at) : 0;
+			rc = s->end > offset ? find_mark(s, &offset) : 0;
 		if (rc <= 0)
 			return rc;
 	}
@@ -191,87 +193,88 @@ static int look_ahead(struct journal_scan *s)
 
 /* Returns the first piece before the record found: a damaged record whose head is valid, or a stretch without valid
  * heads. */
-static int damage(struct journal_scan *s, struct journal_piece *p)
+static int next_damage(struct journal_scan *s, struct journal_segment *p)
 {
-	uint64_t to = s->found.from, number = s->found.record.number;
-	*p = (struct journal_piece){.what = JOURNAL_UNKNOWN, .from = s->at};
+	uint64_t to = s->next.begin, number = s->next.record.number;
+	*p = (struct journal_segment){.kind = JOURNAL_SEGMENT_UNKNOWN, .begin = s->offset};
 	struct journal_record r;
-	int rc = s->at < to ? read_head(s, s->at, &r) : 0;
+	int rc = s->offset < to ? read_record_head(s, s->offset, &r) : 0;
 	if (rc < 0)
 		return rc;
-	if (rc > 0 && r.number < number && r.size <= to - s->at - JOURNAL_RECORD) {
-		p->count = r.number - s->number;
-		if (p->count == 0) {
-			*p = (struct journal_piece){.what = JOURNAL_DAMAGED,
-						    .from = s->at,
-						    .to = s->at + JOURNAL_RECORD + r.size,
-						    .count = 1,
-						    .record = r};
-			s->at = p->to;
-			s->number++;
+	if (rc > 0 && r.number < number && r.body_size <= to - s->offset - JOURNAL_RECORD_HEAD_SIZE) {
+		p->record_count = r.number - s->next_number;
+		if (p->record_count == 0) {
+			*p = (struct journal_segment){.kind = JOURNAL_SEGMENT_DAMAGED,
+						      .begin = s->offset,
+						      .end = s->offset + JOURNAL_RECORD_HEAD_SIZE + r.body_size,
+						      .record_count = 1,
+						      .record = r};
+			s->offset = p->end;
+			s->next_number++;
 			return 1;
 		}
-		to = s->at;
+		to = s->offset;
 		number = r.number;
 	}
-	p->to = to;
-	p->count = number - s->number;
-	s->at = to;
-	s->number = number;
+	p->end = to;
+	p->record_count = number - s->next_number;
+	s->offset = to;
+	s->next_number = number;
 	return 1;
 }
 
-int journal_scan_next(struct journal_scan *s, struct journal_piece *p)
+int journal_scan_next(struct journal_scan *s, struct journal_segment *p)
 {
-	int rc = s->ahead ? 1 : look_ahead(s);
+	int rc = s->has_next ? 1 : find_next_valid(s);
 	if (rc <= 0)
 		return rc;
-	if (s->at < s->found.from || s->number < s->found.record.number)
-		return damage(s, p);
-	*p = s->found;
-	s->found.body = NULL;
-	s->ahead = false;
-	s->at = p->to;
-	s->number++;
-	s->stored = p->record.stored > s->stored ? p->record.stored : s->stored;
+	if (s->offset < s->next.begin || s->next_number < s->next.record.number)
+		return next_damage(s, p);
+	*p = s->next;
+	s->next.body = NULL;
+	s->has_next = false;
+	s->offset = p->end;
+	s->next_number++;
+	s->durable_count = p->record.durable_before > s->durable_count ? p->record.durable_before : s->durable_count;
 	return 1;
 }
 
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt)
 {
-	unsigned char bytes[JOURNAL_RECORD];
+	unsigned char bytes[JOURNAL_RECORD_HEAD_SIZE];
 	struct journal_record r;
-	int rc =
-		end < JOURNAL_HEAD + JOURNAL_RECORD ? -ENODATA : journal_read_at(fd, bytes, sizeof bytes, JOURNAL_HEAD);
-	if (!rc && (!unpack_record(bytes, &r) || r.number != 0))
+	int rc = end < JOURNAL_HEAD_SIZE + JOURNAL_RECORD_HEAD_SIZE
+			 ? -ENODATA
+			 : journal_read_at(fd, bytes, sizeof bytes, JOURNAL_HEAD_SIZE);
+	if (!rc && (!unpack_record_head(bytes, &r) || r.number != 0))
 		rc = -ENODATA;
 	*salt = rc ? 0 : r.salt;
 	return rc == -ENODATA ? -EBADMSG : rc;
 }
 
-int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
+int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t offset, struct journal_record *r,
 			unsigned char **body)
 {
 	struct journal_scan s = {.fd = fd, .end = end, .salt = salt};
-	int rc = read_head(&s, at, r);
-	return rc > 0 ? read_body(&s, at, r, body) : rc;
+	int rc = read_record_head(&s, offset, r);
+	return rc > 0 ? read_body(&s, offset, r, body) : rc;
 }
 
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e)
 {
-	struct journal_gap *first = list_room(g->first, g->count, sizeof *first);
+	struct journal_gap *first = list_grow_array(g->items, g->count, sizeof *first);
 	if (!first)
 		return error_set(e, ENOMEM, "no memory for a journal");
-	g->first = first;
-	g->first[g->count++] = (struct journal_gap){number, count};
+	g->items = first;
+	g->items[g->count++] = (struct journal_gap){number, count};
 	return 0;
 }
 
-void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost)
+void journal_gaps_count_records(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost)
 {
 	*damaged = *lost = 0;
 	for (size_t i = 0; i < g->count; i++) {
-		const struct journal_gap *n = &g->first[i];
+		const struct journal_gap *n = &g->items[i];
 		uint64_t durable = stored > n->number ? stored - n->number : 0;
 		*damaged += n->count;
 		*lost += durable < n->count ? durable : n->count;
@@ -279,28 +282,28 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 }
 
 /* Whether this is the name of a journal, or of one that was being renewed (journal.G.new). Returns the generation. */
-static bool is_journal(const char *name, uint64_t *generation)
+static bool parse_journal_name(const char *name, uint64_t *generation)
 {
 	unsigned long long n;
-	char again[64];
+	char canonical[64];
 	if (sscanf(name, "journal.%llu", &n) != 1)
 		return false;
-	int length = snprintf(again, sizeof again, "journal.%llu", n);
+	int length = snprintf(canonical, sizeof canonical, "journal.%llu", n);
 	*generation = n;
-	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
+	return strncmp(canonical, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
 }
 
 /* A file that cannot be deleted takes up space until the next call. If the folder does not exist, there is nothing to
  * delete. */
-void journal_clear(const char *folder, uint64_t keep)
+void journal_delete_others(const char *folder, uint64_t keep)
 {
-	char path[PATH_MOST];
+	char path[PATH_SIZE];
 	uint64_t generation;
 	struct disk_list l;
 	struct error e;
 	disk_list_begin(&l, folder);
 	for (const char *name; (name = disk_list_next(&l));) {
-		if (!is_journal(name, &generation) || generation == keep)
+		if (!parse_journal_name(name, &generation) || generation == keep)
 			continue;
 		snprintf(path, sizeof path, "%s/%s", folder, name);
 		disk_unlink(path);
@@ -311,14 +314,14 @@ void journal_clear(const char *folder, uint64_t keep)
 			  log_quote(e.text).text);
 }
 
-int journal_keep_damaged(const char *folder, struct error *e)
+int journal_rename_damaged(const char *folder, struct error *e)
 {
-	char from[PATH_MOST], to[PATH_MOST + 16];
+	char from[PATH_SIZE], to[PATH_SIZE + 16];
 	uint64_t generation;
 	struct disk_list l;
 	disk_list_begin(&l, folder);
 	for (const char *name; (name = disk_list_next(&l));) {
-		if (!is_journal(name, &generation))
+		if (!parse_journal_name(name, &generation))
 			continue;
 		snprintf(from, sizeof from, "%s/%s", folder, name);
 		snprintf(to, sizeof to, "%s.damaged", from);

@@ -44,17 +44,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { JOURNAL_HEAD = 40, JOURNAL_RECORD = 80 }; /* sizes of both heads in bytes */
+enum { JOURNAL_HEAD_SIZE = 40, JOURNAL_RECORD_HEAD_SIZE = 80 }; /* sizes of both heads in bytes */
 
 struct journal_head {
 	uint64_t job, generation, salt;
 };
 
 struct journal_record { /* head of a record */
-	uint32_t size, body_check;
-	uint32_t kind;	 /* enum journal_kind (journal.h) */
-	uint64_t number; /* number of the record in its file, from 0 */
-	uint64_t stored; /* number of records of the file that were durable when this one was written */
+	uint32_t body_size, body_crc;
+	uint32_t kind;		 /* enum journal_kind (journal.h) */
+	uint64_t number;	 /* number of the record in its file, from 0 */
+	uint64_t durable_before; /* number of records of the file that were durable when this one was written */
 	double elapsed;
 	/* Its kind is 0 if the record belongs to no lease; its job is not stored in the record. */
 	struct lease_key lease;
@@ -62,41 +62,41 @@ struct journal_record { /* head of a record */
 };
 
 /* Packs the head of a file. */
-void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD]);
+void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD_SIZE]);
 /* Unpacks the head of a file. Returns -EPROTO if it is of another version, -EBADMSG if it is damaged or no head. */
-int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_head *h, const char *path,
+int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD_SIZE], struct journal_head *h, const char *path,
 			struct error *e);
 /* Packs the head of a record whose body is a followed by b, and computes the checksums. */
-void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
+void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD_HEAD_SIZE], const struct buf *a,
 			 const struct buf *b);
 
 /* A stretch of a file, as found by a scan. */
-struct journal_piece {
+struct journal_segment {
 	enum {
-		JOURNAL_WHOLE,
-		JOURNAL_DAMAGED /* only the head is valid */,
-		JOURNAL_UNKNOWN /* no head is valid */
-	} what;
+		JOURNAL_SEGMENT_VALID,
+		JOURNAL_SEGMENT_DAMAGED /* only the head is valid */,
+		JOURNAL_SEGMENT_UNKNOWN /* no head is valid */
+	} kind;
 	/* Offsets of its first byte and of the byte after it; equal if UNKNOWN and records are only missing. */
-	uint64_t from, to;
-	uint64_t count;		      /* number of records, according to the numbers in heads */
+	uint64_t begin, end;
+	uint64_t record_count;	      /* number of records, according to the numbers in heads */
 	struct journal_record record; /* not set for UNKNOWN */
 	unsigned char *body;	      /* WHOLE: the body, mem_alloc'd */
 };
 
 struct journal_scan {
 	int fd;
-	uint64_t at, end, salt, number; /* number: that of the record expected at `at` */
-	uint64_t stored;		/* records that were durable, according to the last valid head */
-	bool ahead;			/* `found` holds the next valid record */
-	struct journal_piece found;
+	uint64_t offset, end, salt, next_number; /* next_number: that of the record expected at `offset` */
+	uint64_t durable_count;			 /* records that were durable, according to the last valid head */
+	bool has_next;				 /* `next` holds the next valid record */
+	struct journal_segment next;
 };
 
 /* Starts a scan of a file of `end` bytes at its first record. */
 void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt);
-/* Finds the next piece. Returns 1; 0 if there is no valid record at or after s->at; -errno or -ENOMEM, which say
+/* Finds the next piece. Returns 1; 0 if there is no valid record at or after s->offset; -errno or -ENOMEM, which say
  * nothing about the contents of the file. */
-int journal_scan_next(struct journal_scan *s, struct journal_piece *p);
+int journal_scan_next(struct journal_scan *s, struct journal_segment *p);
 void journal_scan_end(struct journal_scan *s);
 /* Reads the record at this offset. Returns 1 if it is valid (*body is mem_alloc'd), 0 if not, or -errno. */
 int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
@@ -109,22 +109,22 @@ int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 struct journal_gaps {
 	struct journal_gap {
 		uint64_t number, count;
-	} * first;
+	} * items;
 	size_t count;
 };
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e);
 /* Counts the records missing in all gaps, and how many of them were durable. stored: number of records of the file
  * that were durable. */
-void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost);
+void journal_gaps_count_records(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost);
 
-/* Reads exactly `size` bytes. Returns -ENODATA if the file ends before that; other errors are I/O errors. */
+/* Reads exactly `body_size` bytes. Returns -ENODATA if the file ends before that; other errors are I/O errors. */
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
 
 /* Deletes the journals in the folder except that of generation `keep`; UINT64_MAX: all. If the folder cannot be
  * listed to its end, some may be left, and that is logged. */
-void journal_clear(const char *folder, uint64_t keep);
+void journal_delete_others(const char *folder, uint64_t keep);
 /* Renames all journals in the folder to journal.G.damaged. Returns -errno if the folder could not be listed to its
  * end. */
-int journal_keep_damaged(const char *folder, struct error *e);
+int journal_rename_damaged(const char *folder, struct error *e);
 
 #endif

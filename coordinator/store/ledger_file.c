@@ -22,24 +22,24 @@ static const char *const migrations[] = {
 	"ALTER TABLE jobs ADD COLUMN record TEXT NOT NULL DEFAULT ''; DROP INDEX IF EXISTS living;"
 	"CREATE TABLE notes (name TEXT PRIMARY KEY, text TEXT NOT NULL, revision INTEGER NOT NULL) STRICT;",
 };
-enum { VERSION = sizeof migrations / sizeof *migrations, PATH_MOST = 4300 };
+enum { VERSION = sizeof migrations / sizeof *migrations, PATH_SIZE = 4300 };
 
-int ledger_file_error(sqlite3 *db, struct error *e)
+int ledger_file_set_error(sqlite3 *db, struct error *e)
 {
 	int code = sqlite3_errcode(db);
-	int as = code == SQLITE_FULL				   ? ENOSPC
-		 : code == SQLITE_NOMEM				   ? ENOMEM
-		 : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG
-								   : EIO;
-	return error_set(e, as, "the database of jobs: %s", sqlite3_errmsg(db));
+	int errno_value = code == SQLITE_FULL				    ? ENOSPC
+			  : code == SQLITE_NOMEM			    ? ENOMEM
+			  : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG
+									    : EIO;
+	return error_set(e, errno_value, "the database of jobs: %s", sqlite3_errmsg(db));
 }
 
 int ledger_file_run(sqlite3 *db, const char *sql, struct error *e)
 {
-	return sqlite3_exec(db, sql, NULL, NULL, NULL) == SQLITE_OK ? 0 : ledger_file_error(db, e);
+	return sqlite3_exec(db, sql, NULL, NULL, NULL) == SQLITE_OK ? 0 : ledger_file_set_error(db, e);
 }
 
-static int set_up(sqlite3 *db, const char *schema, struct error *e)
+static int configure_schema(sqlite3 *db, const char *schema, struct error *e)
 {
 	char sql[200];
 	snprintf(sql, sizeof sql,
@@ -52,11 +52,11 @@ int ledger_file_open(const char *path, sqlite3 **db, struct error *e)
 {
 	int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
 	if (sqlite3_open_v2(path, db, flags, NULL) != SQLITE_OK)
-		return *db ? ledger_file_error(*db, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
+		return *db ? ledger_file_set_error(*db, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
 	/* The lock of the spool excludes other processes; exclusive locking needs no shared memory, so it works on
 	 * any file system. */
 	int rc = ledger_file_run(*db, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA trusted_schema = OFF", e);
-	return rc ? rc : set_up(*db, "main", e);
+	return rc ? rc : configure_schema(*db, "main", e);
 }
 
 int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct error *e)
@@ -64,7 +64,7 @@ int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct
 	char *sql = sqlite3_mprintf("ATTACH %Q AS %s", path, schema);
 	int rc = sql ? ledger_file_run(db, sql, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
 	sqlite3_free(sql);
-	return rc ? rc : set_up(db, schema, e);
+	return rc ? rc : configure_schema(db, schema, e);
 }
 
 /* Returns the first column of the first row as text. */
@@ -73,16 +73,16 @@ static int query_text(sqlite3 *db, const char *sql, char *text, size_t size, str
 	sqlite3_stmt *s = NULL;
 	int rc = sqlite3_prepare_v2(db, sql, -1, &s, NULL) == SQLITE_OK && sqlite3_step(s) == SQLITE_ROW
 			 ? 0
-			 : ledger_file_error(db, e);
-	const void *got = rc ? NULL : sqlite3_column_text(s, 0);
-	text_copy(text, size, got ? got : "");
+			 : ledger_file_set_error(db, e);
+	const void *column = rc ? NULL : sqlite3_column_text(s, 0);
+	text_copy(text, size, column ? column : "");
 	sqlite3_finalize(s);
 	return rc;
 }
 
 static int migrate(sqlite3 *db, struct error *e)
 {
-	char text[32], done[64];
+	char text[32], commit_sql[64];
 	long version = 0;
 	int rc = query_text(db, "PRAGMA user_version", text, sizeof text, e);
 	if (!rc)
@@ -97,11 +97,11 @@ static int migrate(sqlite3 *db, struct error *e)
 	if (version < 0)
 		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %ld",
 				 version);
-	snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", (int)VERSION);
+	snprintf(commit_sql, sizeof commit_sql, "PRAGMA user_version = %d; COMMIT", (int)VERSION);
 	rc = ledger_file_run(db, "BEGIN IMMEDIATE", e);
 	for (; !rc && version < VERSION; version++)
 		rc = ledger_file_run(db, migrations[version], e);
-	return rc ? rc : ledger_file_run(db, done, e);
+	return rc ? rc : ledger_file_run(db, commit_sql, e);
 }
 
 int ledger_file_prepare(const char *path, struct error *e)
@@ -119,13 +119,13 @@ int ledger_file_prepare(const char *path, struct error *e)
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-int ledger_file_keep_damaged(const char *path, struct error *e)
+int ledger_file_rename_damaged(const char *path, struct error *e)
 {
-	static const char *const ends[] = {"", "-wal", "-shm"};
-	char from[PATH_MOST], to[PATH_MOST];
+	static const char *const suffixes[] = {"", "-wal", "-shm"};
+	char from[PATH_SIZE], to[PATH_SIZE];
 	for (int i = 0; i < 3; i++) {
-		text_print(from, sizeof from, "%s%s", path, ends[i]);
-		text_print(to, sizeof to, "%s.damaged%s", path, ends[i]);
+		text_print(from, sizeof from, "%s%s", path, suffixes[i]);
+		text_print(to, sizeof to, "%s.damaged%s", path, suffixes[i]);
 		if (disk_rename(from, to) && errno != ENOENT)
 			return error_file(e, errno, to);
 	}

@@ -11,7 +11,7 @@
  * -EPROTO if a later version wrote it; -ENOSPC, -ENOMEM, -EIO. */
 int ledger_file_prepare(const char *path, struct error *e);
 /* Renames the file to PATH.damaged, together with its WAL. */
-int ledger_file_keep_damaged(const char *path, struct error *e);
+int ledger_file_rename_damaged(const char *path, struct error *e);
 /* Opens the file. *db must be closed even after an error. */
 int ledger_file_open(const char *path, sqlite3 **db, struct error *e);
 /* Attaches the file to db under the name `schema`. */
@@ -19,6 +19,6 @@ int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct
 /* Runs statements that return no rows. */
 int ledger_file_run(sqlite3 *db, const char *sql, struct error *e);
 /* Sets e to SQLite's last error and returns its code as -errno. */
-int ledger_file_error(sqlite3 *db, struct error *e);
+int ledger_file_set_error(sqlite3 *db, struct error *e);
 
 #endif

@@ -10,7 +10,7 @@
 struct ledger_job {
 	uint64_t id;
 	const char *owner, *name, *version; /* version: that of the program that accepted the job */
-	const char *held;		    /* the user who holds it; "": not held. Ignored by ledger_add */
+	const char *holder;		    /* the user who holds it; "": not held. Ignored by ledger_add */
 	const char *record;		    /* JSON (record.h); "": none */
 	uint64_t extended;		    /* number of extensions after its end. Ignored by ledger_add */
 	int priority;
@@ -18,11 +18,11 @@ struct ledger_job {
 	double submitted;			/* seconds since 1970 */
 	const unsigned char *submission, *plan; /* frames, as common/wire packs them; an ended job may have none */
 	size_t submission_size, plan_size;
-	/* The following are ignored by ledger_add and ledger_extend. */
+	/* The following are ignored by ledger_add and ledger_extend_job. */
 	const char *state;
-	double ended;	   /* s since 1970, later than all earlier ends; 0: not ended */
+	double end_time;   /* s since 1970, later than all earlier ends; 0: not ended */
 	uint64_t revision; /* incremented with every change of the row */
-	bool damaged;	   /* set by reading: the checksum does not match, so only id can be relied on */
+	bool is_damaged;   /* set by reading: the checksum does not match, so only id can be relied on */
 };
 
 #endif

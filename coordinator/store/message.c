@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 /* Notes in *out that memory ran out, to distinguish this from a damaged message. */
-static void *alloc(void *out, size_t size)
+static void *allocate(void *out, size_t size)
 {
 	void *p = mem_alloc(size, 1);
 	if (!p)
@@ -23,23 +23,23 @@ static void release(void *out, void *p)
 ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
 				 struct error *e)
 {
-	bool out = false;
-	ProtobufCAllocator memory = {alloc, release, &out};
+	bool out_of_memory = false;
+	ProtobufCAllocator memory = {allocate, release, &out_of_memory};
 	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
-	*rc = m	    ? 0
-	      : out ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
-		    : error_set(e, EPROTO, "%zu bytes are not a %s", size, d->short_name);
+	*rc = m		      ? 0
+	      : out_of_memory ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
+			      : error_set(e, EPROTO, "%zu bytes are not a %s", size, d->short_name);
 	return m;
 }
 
 void message_free(ProtobufCMessage *m)
 {
-	ProtobufCAllocator memory = {alloc, release, NULL};
+	ProtobufCAllocator memory = {allocate, release, NULL};
 	if (m)
 		protobuf_c_message_free_unpacked(m, &memory);
 }
 
-int message_check_known(const ProtobufCMessage *m, struct error *e)
+int message_check_fields(const ProtobufCMessage *m, struct error *e)
 {
 	return m->n_unknown_fields
 		       ? error_set(e, EPROTO, "%s with an unknown field, of another version", m->descriptor->short_name)

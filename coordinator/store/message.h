@@ -13,6 +13,6 @@ ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsi
 				 struct error *e);
 void message_free(ProtobufCMessage *m); /* m may be NULL */
 /* Returns -EPROTO if the message has an unknown field. Checks the message itself, not nested ones. */
-int message_check_known(const ProtobufCMessage *m, struct error *e);
+int message_check_fields(const ProtobufCMessage *m, struct error *e);
 
 #endif

@@ -10,32 +10,33 @@
 #include <string.h>
 
 static const char mark[] = "\ncrc32c=";
-enum { MARK = sizeof mark - 1, DIGITS = 8, LINE = MARK + DIGITS };
+enum { MARK_SIZE = sizeof mark - 1, DIGITS = 8, CHECKSUM_LINE_SIZE = MARK_SIZE + DIGITS };
 
-static uint32_t check(const char *name, const char *text, size_t size)
+static uint32_t note_checksum(const char *name, const char *text, size_t size)
 {
 	return crc32c(crc32c(0, name, strlen(name) + 1), text, size);
 }
 
-char *note_seal(const char *name, const char *text)
+char *note_add_checksum(const char *name, const char *text)
 {
 	size_t size = strlen(text);
-	char *stored = mem_alloc(size + LINE + 1, 1);
+	char *stored = mem_alloc(size + CHECKSUM_LINE_SIZE + 1, 1);
 	if (stored)
-		snprintf(stored, size + LINE + 1, "%s%s%08x", text, mark, check(name, text, size));
+		snprintf(stored, size + CHECKSUM_LINE_SIZE + 1, "%s%s%08x", text, mark,
+			 note_checksum(name, text, size));
 	return stored;
 }
 
 enum note_rank note_rank(const char *name, const char *stored, size_t *size)
 {
-	size_t all = strlen(stored);
-	*size = all;
-	if (all < LINE || memcmp(stored + all - LINE, mark, MARK) != 0)
+	size_t length = strlen(stored);
+	*size = length;
+	if (length < CHECKSUM_LINE_SIZE || memcmp(stored + length - CHECKSUM_LINE_SIZE, mark, MARK_SIZE) != 0)
 		return NOTE_UNCHECKED;
 	char *end;
-	unsigned long sum = strtoul(stored + all - DIGITS, &end, 16);
-	*size = all - LINE;
-	return *end == 0 && sum == check(name, stored, *size) ? NOTE_WHOLE : NOTE_DAMAGED;
+	unsigned long stated = strtoul(stored + length - DIGITS, &end, 16);
+	*size = length - CHECKSUM_LINE_SIZE;
+	return *end == 0 && stated == note_checksum(name, stored, *size) ? NOTE_VALID : NOTE_DAMAGED;
 }
 
 static void rank_in_sql(sqlite3_context *c, int count, sqlite3_value **v)
@@ -50,5 +51,5 @@ int note_register(sqlite3 *db, struct error *e)
 {
 	int rc = sqlite3_create_function(db, "note_rank", 2, SQLITE_UTF8 | SQLITE_DETERMINISTIC, NULL, rank_in_sql,
 					 NULL, NULL);
-	return rc == SQLITE_OK ? 0 : ledger_file_error(db, e);
+	return rc == SQLITE_OK ? 0 : ledger_file_set_error(db, e);
 }

@@ -9,10 +9,10 @@
 #include <sqlite3.h>
 #include <stddef.h>
 
-enum note_rank { NOTE_DAMAGED, NOTE_UNCHECKED, NOTE_WHOLE };
+enum note_rank { NOTE_DAMAGED, NOTE_UNCHECKED, NOTE_VALID };
 
 /* Returns the text to be stored; mem_alloc'd. NULL: out of memory. */
-char *note_seal(const char *name, const char *text);
+char *note_add_checksum(const char *name, const char *text);
 /* Judges a stored note by its checksum; UNCHECKED: it has none. *size: length of the text without the line of the
  * checksum. */
 enum note_rank note_rank(const char *name, const char *stored, size_t *size);

@@ -9,11 +9,11 @@
 
 #include <string.h>
 
-enum { PIECES = 6, OLD_HEAD = 8 * (5 + PIECES) /* bytes of the numbers after the magic number */ };
-static const uint64_t piece_most = 1 << 26;
+enum { PIECE_COUNT = 6, OLD_HEAD_SIZE = 8 * (5 + PIECE_COUNT) /* bytes of the numbers after the magic number */ };
+static const uint64_t max_piece_size = 1 << 26;
 static const char magic[8] = "hsltO003", old_magic[8] = "hsltO002";
 
-int old_spool_text(const char *path, size_t most, char **text, size_t *size, struct error *e)
+int old_spool_read_text(const char *path, size_t max_size, char **text, size_t *size, struct error *e)
 {
 	struct stat st;
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
@@ -23,16 +23,16 @@ int old_spool_text(const char *path, size_t most, char **text, size_t *size, str
 			disk_close(fd);
 		return rc;
 	}
-	size_t there = (size_t)st.st_size;
-	char *bytes = there < most ? mem_alloc(there + 1, 1) : NULL;
+	size_t file_size = (size_t)st.st_size;
+	char *bytes = file_size < max_size ? mem_alloc(file_size + 1, 1) : NULL;
 	ssize_t n = 0;
 	*size = 0;
-	while (bytes && *size < there && (n = disk_read(fd, bytes + *size, there - *size)) > 0)
+	while (bytes && *size < file_size && (n = disk_read(fd, bytes + *size, file_size - *size)) > 0)
 		*size += (size_t)n;
-	int rc = there >= most ? error_set(e, EFBIG, "%s: too long", path)
-		 : !bytes      ? error_set(e, ENOMEM, "no memory to read %s", path)
-		 : n < 0       ? error_file(e, errno, path)
-			       : 0;
+	int rc = file_size >= max_size ? error_set(e, EFBIG, "%s: too long", path)
+		 : !bytes	       ? error_set(e, ENOMEM, "no memory to read %s", path)
+		 : n < 0	       ? error_file(e, errno, path)
+				       : 0;
 	disk_close(fd);
 	if (rc)
 		mem_free(bytes);
@@ -44,27 +44,27 @@ int old_spool_text(const char *path, size_t most, char **text, size_t *size, str
 /* Reads the rest of the file into f->memory, and returns its size. */
 static int read_rest(struct checked_file *in, struct old_row *f, size_t *size, struct error *e)
 {
-	if (in->left > PIECES * piece_most)
+	if (in->remaining > PIECE_COUNT * max_piece_size)
 		return error_set(e, EBADMSG, "%s: damaged", in->path);
-	*size = (size_t)in->left;
+	*size = (size_t)in->remaining;
 	f->memory = mem_alloc(*size, 1);
 	return f->memory ? checked_file_read(in, f->memory, *size, e) : error_set(e, ENOMEM, "no memory for a job");
 }
 
-static int take_row(struct old_row *f, size_t size, const char *path, struct error *e)
+static int parse_row(struct old_row *f, size_t size, const char *path, struct error *e)
 {
 	int rc;
 	f->message = message_unpack(&stored__row__descriptor, f->memory, size, &rc, e);
 	mem_free(f->memory);
 	f->memory = NULL;
-	if (rc || (rc = message_check_known(f->message, e)))
+	if (rc || (rc = message_check_fields(f->message, e)))
 		return error_prefix(e, rc, "%s", path);
 	const Stored__Row *m = (const Stored__Row *)f->message;
 	f->job = (struct ledger_job){.id = m->id,
 				     .owner = m->owner,
 				     .name = m->name,
 				     .version = m->version,
-				     .held = m->held,
+				     .holder = m->held,
 				     .extended = m->extended,
 				     .revision = m->revision,
 				     .priority = m->priority,
@@ -78,30 +78,30 @@ static int take_row(struct old_row *f, size_t size, const char *path, struct err
 }
 
 /* Reads a row of version 002. */
-static int take_old_row(struct old_row *f, size_t size, const char *path, struct error *e)
+static int parse_old_row(struct old_row *f, size_t size, const char *path, struct error *e)
 {
-	const unsigned char *p = f->memory, *piece[PIECES];
-	uint64_t sizes[PIECES], at = OLD_HEAD;
-	bool fits = size >= OLD_HEAD;
-	for (int i = 0; fits && i < PIECES; at += sizes[i++]) {
+	const unsigned char *p = f->memory, *pieces[PIECE_COUNT];
+	uint64_t sizes[PIECE_COUNT], offset = OLD_HEAD_SIZE;
+	bool fits = size >= OLD_HEAD_SIZE;
+	for (int i = 0; fits && i < PIECE_COUNT; offset += sizes[i++]) {
 		sizes[i] = get64(p + 40 + 8 * i);
-		piece[i] = p + at;
-		fits = sizes[i] > 0 && sizes[i] <= size - at && (i >= 4 || piece[i][sizes[i] - 1] == 0);
+		pieces[i] = p + offset;
+		fits = sizes[i] > 0 && sizes[i] <= size - offset && (i >= 4 || pieces[i][sizes[i] - 1] == 0);
 	}
 	if (!fits)
 		return error_set(e, EBADMSG, "%s: damaged", path);
 	f->job = (struct ledger_job){.id = get64(p),
-				     .owner = (const char *)piece[0],
-				     .name = (const char *)piece[1],
-				     .version = (const char *)piece[2],
-				     .held = (const char *)piece[3],
+				     .owner = (const char *)pieces[0],
+				     .name = (const char *)pieces[1],
+				     .version = (const char *)pieces[2],
+				     .holder = (const char *)pieces[3],
 				     .extended = get64(p + 8),
 				     .revision = get64(p + 16),
 				     .priority = (int)get32(p + 32),
 				     .mixed = get32(p + 36) != 0,
 				     .submitted = get_double(p + 24),
-				     .submission = piece[4],
-				     .plan = piece[5],
+				     .submission = pieces[4],
+				     .plan = pieces[5],
 				     .submission_size = sizes[4],
 				     .plan_size = sizes[5]};
 	return 0;
@@ -109,16 +109,16 @@ static int take_old_row(struct old_row *f, size_t size, const char *path, struct
 
 static int read_row(struct checked_file *in, uint64_t job, struct old_row *f, struct error *e)
 {
-	char got[sizeof magic];
+	char file_magic[sizeof magic];
 	size_t size = 0;
-	int rc = checked_file_read(in, got, sizeof got, e);
-	bool older = !rc && memcmp(got, old_magic, sizeof got) == 0;
+	int rc = checked_file_read(in, file_magic, sizeof file_magic, e);
+	bool older = !rc && memcmp(file_magic, old_magic, sizeof file_magic) == 0;
 	if (!rc && !older)
-		rc = spool_check_version(got, magic, in->path, e);
+		rc = spool_check_version(file_magic, magic, in->path, e);
 	if (!rc)
 		rc = read_rest(in, f, &size, e);
 	if (!rc)
-		rc = older ? take_old_row(f, size, in->path, e) : take_row(f, size, in->path, e);
+		rc = older ? parse_old_row(f, size, in->path, e) : parse_row(f, size, in->path, e);
 	if (!rc && (f->job.id != job || !f->job.submission_size || !f->job.plan_size))
 		rc = error_set(e, EBADMSG, "%s: damaged", in->path);
 	f->job.state = "live";
@@ -126,7 +126,7 @@ static int read_row(struct checked_file *in, uint64_t job, struct old_row *f, st
 	return rc;
 }
 
-int old_spool_row(const struct spool *s, uint64_t job, struct old_row *out, struct error *e)
+int old_spool_read_row(const struct spool *s, uint64_t job, struct old_row *out, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;

@@ -27,7 +27,7 @@ enum { SCHEMA = 1 };
 #define IN_VIEW(...)
 #define TEXT(member, size, in, by, key, shown, wire) in(FIELD_TEXT, offsetof(struct job_record, member), size, key)
 #define NUMBER(kind, member, in, by, key, shown, wire) in(FIELD_##kind, offsetof(struct job_record, member), 0, key)
-static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)};
+static const struct field record_fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)};
 #undef IN_RECORD
 #undef IN_VIEW
 #undef TEXT
@@ -36,21 +36,24 @@ static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB
 /* The members of the object "counts". */
 #define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key},
 #define COUNTER(member, key, wire) {FIELD_u64, offsetof(struct job_record, counts.member), 0, key},
-static const struct field counts[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
+static const struct field count_fields[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
 #undef COUNT
 #undef COUNTER
 
-enum { FIELD_COUNT = sizeof fields / sizeof *fields, COUNTS_COUNT = sizeof counts / sizeof *counts };
+enum {
+	RECORD_FIELD_COUNT = sizeof record_fields / sizeof *record_fields,
+	COUNT_FIELD_COUNT = sizeof count_fields / sizeof *count_fields
+};
 
-void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
+void record_set_counters(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share)
 {
 	r->stuck = n->counters[COUNT_STUCK];
 	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
-	memcpy(r->strategy, n->strategy, sizeof r->strategy);
-	strategy_note(p, n, black, r->note, sizeof r->note);
-	strategy_add_beyond(beyond_share, r->note, sizeof r->note);
-	convergence_add_note(&r->convergence, r->note, sizeof r->note);
+	memcpy(r->strategies, n->strategies, sizeof r->strategies);
+	strategy_print_note(p, n, black, r->note, sizeof r->note);
+	strategy_append_beyond(beyond_share, r->note, sizeof r->note);
+	convergence_append_note(&r->convergence, r->note, sizeof r->note);
 }
 
 void record_add_note(struct job_record *r, const char *text)
@@ -62,15 +65,15 @@ void record_add_note(struct job_record *r, const char *text)
 
 void record_add_doubt(struct job_record *r)
 {
-	char text[sizeof r->rel_error_doubt + 96], about[48] = "the error's interval";
+	char text[sizeof r->rel_error_doubt + 96], prefix[48] = "the error's interval";
 	if (r->rel_error_about >= 0)
-		snprintf(about, sizeof about, "the error is about %.3g %%, its interval", 100 * r->rel_error_about);
-	snprintf(text, sizeof text, "%s is not known: %s", about, r->rel_error_doubt);
+		snprintf(prefix, sizeof prefix, "the error is about %.3g %%, its interval", 100 * r->rel_error_about);
+	snprintf(text, sizeof text, "%s is not known: %s", prefix, r->rel_error_doubt);
 	if (*r->rel_error_doubt && !strstr(r->note, text))
 		record_add_note(r, text);
 }
 
-void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner)
+void record_init(struct job_record *r, uint64_t id, const char *name, const char *owner)
 {
 	memset(r, 0, sizeof *r);
 	r->id = id;
@@ -82,53 +85,53 @@ void record_begin(struct job_record *r, uint64_t id, const char *name, const cha
 	r->b = 0;
 }
 
-void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a)
+void record_set_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a)
 {
 	r->convergence = *a;
 	r->b = img->b;
 	memcpy(r->classes, img->classes, sizeof r->classes);
 }
 
-void record_take_error(struct job_record *r, const struct canvas_image *img)
+void record_set_error(struct job_record *r, const struct canvas_image *img)
 {
 	r->rel_error_about = sqrt(img->rel_mse);
 	r->rel_error = img->rel_mse_doubt ? -1 : sqrt(img->rel_mse_upper);
-	stated_error_doubt(img, r->rel_error_doubt, sizeof r->rel_error_doubt);
+	stated_error_print_doubt(img, r->rel_error_doubt, sizeof r->rel_error_doubt);
 }
 
-void record_take_effects(struct job_record *r, json_t *list)
+void record_set_effects(struct job_record *r, json_t *list)
 {
 	size_t n = list ? json_dumpb(list, r->effects, sizeof r->effects - 1, JSON_COMPACT) : 0;
 	r->effects[n < sizeof r->effects ? n : 0] = 0;
 	json_decref(list);
 }
 
-json_t *record_effects(const struct job_record *r)
+json_t *record_effects_to_json(const struct job_record *r)
 {
 	return *r->effects ? json_loads(r->effects, JSON_REJECT_DUPLICATES, NULL) : json_array();
 }
 
-json_t *record_strategies(const struct job_record *r)
+json_t *record_strategies_to_json(const struct job_record *r)
 {
 	struct canvas_counts n = {{0}, {{0}}};
-	memcpy(n.strategy, r->strategy, sizeof n.strategy);
+	memcpy(n.strategies, r->strategies, sizeof n.strategies);
 	return strategy_to_json(r->mixture, &n);
 }
 
 /* Clears a mixture that names more strategies than there are counters for. */
-static void take_strategies(const json_t *o, struct job_record *r)
+static void read_strategies(const json_t *o, struct job_record *r)
 {
 	struct canvas_counts n;
 	if (plan_strategy_count(r->mixture) < 0)
 		memset(r->mixture, 0, sizeof r->mixture);
 	strategy_from_json(json_object_get(o, "strategies"), &n);
-	memcpy(r->strategy, n.strategy, sizeof r->strategy);
+	memcpy(r->strategies, n.strategies, sizeof r->strategies);
 }
 
-json_t *record_counts(const struct job_record *r)
+json_t *record_counts_to_json(const struct job_record *r)
 {
 	json_t *o = json_object();
-	if (fields_store(counts, COUNTS_COUNT, r, o, NULL) == 0)
+	if (fields_to_json(count_fields, COUNT_FIELD_COUNT, r, o, NULL) == 0)
 		return o;
 	json_decref(o);
 	return NULL;
@@ -142,7 +145,7 @@ static int add_to_checksum(const char *piece, size_t size, void *sum)
 
 /* Computes the checksum of the content, independent of formatting, piece by piece without a copy of the text. Returns
  * -ENOMEM. */
-static int checksum(const json_t *o, json_int_t *sum, struct error *e)
+static int compute_checksum(const json_t *o, json_int_t *sum, struct error *e)
 {
 	uint32_t crc = 0;
 	if (json_dump_callback(o, add_to_checksum, &crc, JSON_COMPACT | JSON_SORT_KEYS))
@@ -152,42 +155,42 @@ static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 }
 
 /* A record without a checksum is of an earlier version and passes. */
-static int check(json_t *o, struct error *e)
+static int verify_checksum(json_t *o, struct error *e)
 {
-	const json_t *said = json_object_get(o, "crc32c");
-	json_int_t want = json_integer_value(said), got = 0;
-	if (!said)
+	const json_t *stated = json_object_get(o, "crc32c");
+	json_int_t expected = json_integer_value(stated), actual = 0;
+	if (!stated)
 		return 0;
 	json_object_del(o, "crc32c");
-	int rc = checksum(o, &got, e);
-	return rc ? rc : got == want ? 0 : error_set(e, EBADMSG, "damaged: its checksum does not match");
+	int rc = compute_checksum(o, &actual, e);
+	return rc ? rc : actual == expected ? 0 : error_set(e, EBADMSG, "damaged: its checksum does not match");
 }
 
 int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
 	json_t *o = json_pack("{s:i}", "schema", SCHEMA);
-	int rc = o ? fields_store(fields, FIELD_COUNT, r, o, e) : error_set(e, ENOMEM, "no memory");
+	int rc = o ? fields_to_json(record_fields, RECORD_FIELD_COUNT, r, o, e) : error_set(e, ENOMEM, "no memory");
 	if (rc) {
 		json_decref(o);
 		return error_prefix(e, rc, "the record of job j%llu cannot be written", (unsigned long long)r->id);
 	}
-	o = json_with(o, "counts", record_counts(r));
-	o = json_with(o, "strategies", record_strategies(r));
-	o = json_with(o, "agreement", convergence_to_json(&r->convergence));
-	o = json_with(o, "classes", classes_to_json(r->classes));
-	o = json_with(o, "effects", record_effects(r));
-	o = json_with(o, "looks", forecast_looks_to_json(&r->looks));
+	o = json_object_with(o, "counts", record_counts_to_json(r));
+	o = json_object_with(o, "strategies", record_strategies_to_json(r));
+	o = json_object_with(o, "agreement", convergence_to_json(&r->convergence));
+	o = json_object_with(o, "classes", classes_to_json(r->classes));
+	o = json_object_with(o, "effects", record_effects_to_json(r));
+	o = json_object_with(o, "looks", forecast_looks_to_json(&r->looks));
 	json_int_t sum = 0;
-	if (!o || checksum(o, &sum, e) || !(o = json_with(o, "crc32c", json_integer(sum)))) {
+	if (!o || compute_checksum(o, &sum, e) || !(o = json_object_with(o, "crc32c", json_integer(sum)))) {
 		json_decref(o);
 		return error_set(e, ENOMEM, "no memory for a record");
 	}
 	/* json_dumps would silently lose parts of the text if memory runs out. */
 	size_t size = json_dumpb(o, NULL, 0, JSON_INDENT(2));
 	char *text = size ? mem_alloc(size + 1, 1) : NULL;
-	bool whole = text && json_dumpb(o, text, size, JSON_INDENT(2)) == size;
+	bool complete = text && json_dumpb(o, text, size, JSON_INDENT(2)) == size;
 	json_decref(o);
-	if (whole) {
+	if (complete) {
 		*out = text;
 		return 0;
 	}
@@ -214,19 +217,19 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 		json_decref(o);
 		return rc;
 	}
-	int damaged = check(o, e);
+	int damaged = verify_checksum(o, e);
 	if (damaged) {
 		json_decref(o);
 		return damaged;
 	}
-	fields_read(fields, FIELD_COUNT, r, o);
-	fields_read(counts, COUNTS_COUNT, r, json_object_get(o, "counts"));
-	take_strategies(o, r);
+	fields_from_json(record_fields, RECORD_FIELD_COUNT, r, o);
+	fields_from_json(count_fields, COUNT_FIELD_COUNT, r, json_object_get(o, "counts"));
+	read_strategies(o, r);
 	convergence_from_json(json_object_get(o, "agreement"), &r->convergence);
 	classes_from_json(json_object_get(o, "classes"), r->classes);
 	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 	json_t *effects = json_object_get(o, "effects");
-	record_take_effects(r, json_is_array(effects) ? json_incref(effects) : NULL);
+	record_set_effects(r, json_is_array(effects) ? json_incref(effects) : NULL);
 	json_decref(o);
 	return 0;
 }

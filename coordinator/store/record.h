@@ -20,7 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { RECORD_EFFECTS = 12288 };
+enum { RECORD_EFFECTS_MAX = 12288 };
 
 struct job_record {
 #define IN_RECORD(member) member;
@@ -37,26 +37,26 @@ struct job_record {
 	struct job_counts counts;
 	struct forecast_history looks;
 	/* A JSON array of the effects that the scene needs, with reasons; "": not known, or too long. */
-	char effects[RECORD_EFFECTS];
-	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* counters of the strategies in `mixture` */
-	struct convergence convergence;				/* statistics of the last image */
+	char effects[RECORD_EFFECTS_MAX];
+	uint64_t strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* counters of the strategies in `mixture` */
+	struct convergence convergence;				  /* statistics of the last image */
 	struct path_class_energy classes[PATH_CLASSES];
 };
 
 /* Takes the counters of the merged batches, and notes about them. */
-void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
+void record_set_counters(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share);
 void record_add_note(struct job_record *r, const char *text); /* appends to `note`; "": nothing to add */
 void record_add_doubt(struct job_record *r); /* notes why the interval of the error is unknown, if it is */
-void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
+void record_set_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
 /* Clears the record except for these three. */
-void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner);
+void record_init(struct job_record *r, uint64_t id, const char *name, const char *owner);
 /* Takes the error of an image; img must contain an estimate of it. */
-void record_take_error(struct job_record *r, const struct canvas_image *img);
-void record_take_effects(struct job_record *r, json_t *list); /* takes over the reference; NULL: not known */
-json_t *record_effects(const struct job_record *r);	      /* a new array */
-json_t *record_counts(const struct job_record *r);	      /* a new object "counts" */
-json_t *record_strategies(const struct job_record *r);	      /* a new array, see strategy_to_json */
+void record_set_error(struct job_record *r, const struct canvas_image *img);
+void record_set_effects(struct job_record *r, json_t *list);   /* takes over the reference; NULL: not known */
+json_t *record_effects_to_json(const struct job_record *r);    /* a new array */
+json_t *record_counts_to_json(const struct job_record *r);     /* a new object "counts" */
+json_t *record_strategies_to_json(const struct job_record *r); /* a new array, see strategy_to_json */
 int record_to_json(const struct job_record *r, char **text,
 		   struct error *e); /* *text is mem_alloc'd; -ENOMEM, -EINVAL: a text is not UTF-8 */
 /* Returns -EBADMSG if the text is damaged or no record, -EPROTO if it is of another version. */

@@ -22,11 +22,11 @@
 enum { FOLDER_MAX = SPOOL_PATH_MAX - 128 };
 
 struct spool {
-	char *folder, *blobs, *canvas;
-	int lock;
+	char *folder, *blob_folder, *canvas_folder;
+	int lock_fd;
 };
 
-static char *join(const char *folder, const char *name)
+static char *join_path(const char *folder, const char *name)
 {
 	size_t size = strlen(folder) + strlen(name) + 2;
 	char *path = mem_alloc(size, 1);
@@ -35,40 +35,40 @@ static char *join(const char *folder, const char *name)
 	return path;
 }
 
-static int take_lock(struct spool *s, struct error *e)
+static int acquire_lock(struct spool *s, struct error *e)
 {
-	char *path = join(s->folder, "lock");
+	char *path = join_path(s->folder, "lock");
 	if (!path)
 		return error_set(e, ENOMEM, "no memory for the spool");
-	s->lock = disk_open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+	s->lock_fd = disk_open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
 	int rc = 0;
-	if (s->lock < 0)
+	if (s->lock_fd < 0)
 		rc = error_file(e, errno, path);
-	else if (disk_flock(s->lock, LOCK_EX | LOCK_NB))
+	else if (disk_flock(s->lock_fd, LOCK_EX | LOCK_NB))
 		rc = errno == EWOULDBLOCK ? error_set(e, EBUSY, "%s: another coordinator uses this spool", s->folder)
 					  : error_file(e, errno, path);
 	mem_free(path);
 	return rc;
 }
 
-static bool is_job_folder(const char *name, uint64_t *id)
+static bool parse_job_folder_name(const char *name, uint64_t *id)
 {
-	char again[32];
+	char canonical[32];
 	char *end;
 	if (name[0] != 'j')
 		return false;
 	*id = strtoull(name + 1, &end, 10);
-	snprintf(again, sizeof again, "j%llu", (unsigned long long)*id);
-	return *id && strcmp(again, name) == 0;
+	snprintf(canonical, sizeof canonical, "j%llu", (unsigned long long)*id);
+	return *id && strcmp(canonical, name) == 0;
 }
 
-static int by_id(const void *a, const void *b)
+static int compare_ids(const void *a, const void *b)
 {
 	uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
 	return (x > y) - (x < y);
 }
 
-int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e)
+int spool_list_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	uint64_t id;
@@ -79,11 +79,11 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 	int rc = 0;
 	disk_list_begin(&l, path);
 	for (const char *name; !rc && (name = disk_list_next(&l));) {
-		if (!is_job_folder(name, &id))
+		if (!parse_job_folder_name(name, &id))
 			continue;
-		uint64_t *more = list_room(*ids, *count, sizeof *more);
-		if (more)
-			(*ids = more)[(*count)++] = id;
+		uint64_t *grown = list_grow_array(*ids, *count, sizeof *grown);
+		if (grown)
+			(*ids = grown)[(*count)++] = id;
 		else
 			rc = error_set(e, ENOMEM, "%s: no memory for its list", path);
 	}
@@ -94,7 +94,7 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 		*count = 0;
 	}
 	if (*count)
-		qsort(*ids, *count, sizeof **ids, by_id);
+		qsort(*ids, *count, sizeof **ids, compare_ids);
 	return rc;
 }
 
@@ -105,19 +105,20 @@ int spool_open(struct spool **out, const char *folder, struct error *e)
 	struct spool *s = mem_alloc(1, sizeof *s);
 	if (!s)
 		return error_set(e, ENOMEM, "no memory for the spool");
-	s->lock = -1;
+	s->lock_fd = -1;
 	s->folder = mem_strdup(folder);
-	s->blobs = join(folder, "blobs");
-	s->canvas = join(folder, "canvas");
-	char *jobs = join(folder, "jobs");
-	int rc = !s->folder || !s->blobs || !s->canvas || !jobs ? error_set(e, ENOMEM, "no memory for the spool")
-								: disk_make_folder(folder, e);
+	s->blob_folder = join_path(folder, "blobs");
+	s->canvas_folder = join_path(folder, "canvas");
+	char *jobs = join_path(folder, "jobs");
+	int rc = !s->folder || !s->blob_folder || !s->canvas_folder || !jobs
+			 ? error_set(e, ENOMEM, "no memory for the spool")
+			 : disk_make_folder(folder, e);
 	if (!rc)
-		rc = take_lock(s, e);
+		rc = acquire_lock(s, e);
 	if (!rc)
 		rc = disk_make_folder(jobs, e);
 	if (!rc)
-		rc = disk_make_folder(s->canvas, e);
+		rc = disk_make_folder(s->canvas_folder, e);
 	mem_free(jobs);
 	if (rc)
 		spool_close(s);
@@ -130,45 +131,46 @@ void spool_close(struct spool *s)
 {
 	if (!s)
 		return;
-	if (s->lock >= 0)
-		disk_close(s->lock);
+	if (s->lock_fd >= 0)
+		disk_close(s->lock_fd);
 	mem_free(s->folder);
-	mem_free(s->blobs);
-	mem_free(s->canvas);
+	mem_free(s->blob_folder);
+	mem_free(s->canvas_folder);
 	mem_free(s);
 }
 
-void spool_reserve(const struct spool *s)
+void spool_create_reserve(const struct spool *s)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
 	spool_path(s, "reserve", path);
-	if (disk_stat(path, &st) == 0 ? st.st_size == SPOOL_RESERVE : disk_available(s->folder) < 4 * SPOOL_RESERVE)
+	if (disk_stat(path, &st) == 0 ? st.st_size == SPOOL_RESERVE_BYTES
+				      : disk_available(s->folder) < 4 * SPOOL_RESERVE_BYTES)
 		return;
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
 	if (fd < 0)
 		return;
-	bool made = disk_posix_fallocate(fd, 0, SPOOL_RESERVE) == 0;
+	bool allocated = disk_posix_fallocate(fd, 0, SPOOL_RESERVE_BYTES) == 0;
 	disk_close(fd);
-	if (!made)
+	if (!allocated)
 		disk_unlink(path);
 }
 
-bool spool_use_reserve(const struct spool *s)
+bool spool_release_reserve(const struct spool *s)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(s, "reserve", path);
 	return disk_unlink(path) == 0;
 }
 
-int spool_make_job(const struct spool *s, uint64_t id, struct error *e)
+int spool_create_job_folder(const struct spool *s, uint64_t id, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, NULL, path);
 	return disk_make_folder(path, e);
 }
 
-int spool_holds(const struct spool *s, uint64_t bytes, struct error *e)
+int spool_check_capacity(const struct spool *s, uint64_t bytes, struct error *e)
 {
 	uint64_t capacity = disk_capacity(s->folder);
 	if (!capacity || bytes <= capacity)
@@ -179,14 +181,14 @@ int spool_holds(const struct spool *s, uint64_t bytes, struct error *e)
 			 1e-6 * (double)bytes, 1e-6 * (double)capacity);
 }
 
-const char *spool_blobs(const struct spool *s)
+const char *spool_blob_folder(const struct spool *s)
 {
-	return s->blobs;
+	return s->blob_folder;
 }
 
-const char *spool_canvas(const struct spool *s)
+const char *spool_canvas_folder(const struct spool *s)
 {
-	return s->canvas;
+	return s->canvas_folder;
 }
 
 void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MAX])
@@ -200,7 +202,8 @@ void spool_job_path(const struct spool *s, uint64_t id, const char *file, char p
 		 file ? file : "");
 }
 
-int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e)
+int spool_write_job_file(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size,
+			 struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, file, path);
@@ -211,19 +214,19 @@ int spool_write(const struct spool *s, uint64_t id, const char *file, const void
 	return disk_sync_folder(path, e);
 }
 
-int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e)
+int spool_check_version(const char actual[8], const char expected[8], const char *path, struct error *e)
 {
-	enum { NAME = 5, DIGITS = 3 };
-	bool same = memcmp(got, known, NAME) == 0;
-	for (int i = NAME; i < NAME + DIGITS; i++)
-		same = same && got[i] >= '0' && got[i] <= '9';
+	enum { NAME_SIZE = 5, VERSION_DIGITS = 3 };
+	bool same = memcmp(actual, expected, NAME_SIZE) == 0;
+	for (int i = NAME_SIZE; i < NAME_SIZE + VERSION_DIGITS; i++)
+		same = same && actual[i] >= '0' && actual[i] <= '9';
 	if (!same)
 		return error_set(e, EBADMSG, "%s: damaged", path);
-	if (memcmp(got + NAME, known + NAME, DIGITS) == 0)
+	if (memcmp(actual + NAME_SIZE, expected + NAME_SIZE, VERSION_DIGITS) == 0)
 		return 0;
 	return error_set(e, EPROTO,
 			 "%s has version %.3s, and this coordinator reads version %.3s: another release wrote it", path,
-			 got + NAME, known + NAME);
+			 actual + NAME_SIZE, expected + NAME_SIZE);
 }
 
 int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, uint64_t *bytes, struct error *e)
@@ -249,7 +252,7 @@ int spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints, u
 	return rc == -ENOENT ? 0 : rc; /* without a folder there are no films */
 }
 
-int spool_drop_job(const struct spool *s, uint64_t id, struct error *e)
+int spool_delete_job(const struct spool *s, uint64_t id, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	struct disk_list l;

@@ -21,7 +21,7 @@ struct series {
 	double value[BENCH_SERIES_MAX];
 };
 
-enum bench_target { BENCH_INFORMS, BENCH_AT_LEAST, BENCH_AT_MOST };
+enum bench_target { BENCH_NO_TARGET, BENCH_AT_LEAST, BENCH_AT_MOST };
 
 void series_add(struct series *s, double x);
 double series_median(const struct series *s);
@@ -29,7 +29,7 @@ double series_median(const struct series *s);
 double bench_cpu_seconds(void); /* of this thread */
 
 /* Prints the heading of the rows that follow; the name is also their prefix in the JSON. */
-void bench_group(const char *name, const char *says);
+void bench_group(const char *name, const char *description);
 void bench_row(const char *name, const struct series *s, const char *unit, enum bench_target kind, double target);
 void bench_single(const char *name, double value, const char *unit, enum bench_target kind, double target);
 void bench_skip(const char *why);

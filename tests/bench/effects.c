@@ -19,38 +19,38 @@
 enum { CHAINS = 16, SHORT = 256, LONG = 1280 };
 
 /* Returns the number of instructions of one render; NAN if the program failed. */
-static double instructions(const char *bin, const char *how, unsigned steps)
+static double count_instructions(const char *bin, const char *options, unsigned steps)
 {
-	char line[4096], text[512];
+	char command[4096], text[512];
 	const char *folder = getenv("TMPDIR");
 	snprintf(
-		line, sizeof line,
+		command, sizeof command,
 		"valgrind --tool=callgrind --callgrind-out-file=/dev/null %s/hslt-render -o %s/hslt-bench-effects-%d.exr "
 		"--quiet --threads 1 --chains %d --groups %d --bootstrap 1024 --epoch %d --mutations %u %s 2>&1",
-		bin, folder ? folder : "/tmp", (int)getpid(), CHAINS, CHAINS, SHORT, CHAINS * steps, how);
-	FILE *out = popen(line, "r");
+		bin, folder ? folder : "/tmp", (int)getpid(), CHAINS, CHAINS, SHORT, CHAINS * steps, options);
+	FILE *out = popen(command, "r");
 	double count = NAN;
 	while (out && fgets(text, sizeof text, out)) {
-		const char *at = strstr(text, "Collected :");
-		if (at)
-			count = strtod(at + 11, NULL);
+		const char *match = strstr(text, "Collected :");
+		if (match)
+			count = strtod(match + 11, NULL);
 	}
 	return out && pclose(out) == 0 ? count : NAN;
 }
 
-static double a_mutation(const char *bin, const char *how)
+static double instructions_per_mutation(const char *bin, const char *options)
 {
-	double few = instructions(bin, how, SHORT), many = instructions(bin, how, LONG);
+	double few = count_instructions(bin, options, SHORT), many = count_instructions(bin, options, LONG);
 	if (!isfinite(few) || !isfinite(many)) {
-		fprintf(stderr, "bench: hslt-render %s fails under valgrind\n", how);
+		fprintf(stderr, "bench: hslt-render %s fails under valgrind\n", options);
 		exit(1);
 	}
 	return (many - few) / ((LONG - SHORT) * CHAINS);
 }
 
 static const struct {
-	const char *effect, *on, *off; /* scenes that call for the effect, and that do not */
-	bool may_go;		       /* the effect can be forced off */
+	const char *effect, *with_effect, *without_effect; /* scenes that call for the effect, and that do not */
+	bool can_be_forced_off;				   /* the effect can be forced off */
 } rows[] = {
 	{"colour", BOX COLOURED, BOX, false},
 	{"wavelength", BOX COLOURED, BOX, true},
@@ -60,52 +60,52 @@ static const struct {
 	{"half-vectors", GLASS, BOX, true},
 };
 
-static void add(const char *effect, const char *what, double value, const char *unit)
+static void add_figure(const char *effect, const char *label, double value, const char *unit)
 {
 	char name[96];
-	snprintf(name, sizeof name, "%s, %s", effect, what);
-	bench_single(name, value, unit, BENCH_INFORMS, 0);
+	snprintf(name, sizeof name, "%s, %s", effect, label);
+	bench_single(name, value, unit, BENCH_NO_TARGET, 0);
 }
 
 static void measure_effect(const char *bin, size_t i)
 {
-	char how[512];
+	char options[512];
 	const char *effect = rows[i].effect;
-	double with = a_mutation(bin, rows[i].on);
-	add(effect, "on: the scene as it is", with, "instructions a mutation");
-	if (rows[i].may_go) {
-		snprintf(how, sizeof how, "%s --effects=-%s", rows[i].on, effect);
-		double without = a_mutation(bin, how);
-		add(effect, "on: forced off", without, "instructions a mutation");
-		add(effect, "on: costs", 100 * (with / without - 1), "%");
+	double with = instructions_per_mutation(bin, rows[i].with_effect);
+	add_figure(effect, "on: the scene as it is", with, "instructions a mutation");
+	if (rows[i].can_be_forced_off) {
+		snprintf(options, sizeof options, "%s --effects=-%s", rows[i].with_effect, effect);
+		double without = instructions_per_mutation(bin, options);
+		add_figure(effect, "on: forced off", without, "instructions a mutation");
+		add_figure(effect, "on: costs", 100 * (with / without - 1), "%");
 	}
-	if (!rows[i].off)
+	if (!rows[i].without_effect)
 		return;
-	double off = a_mutation(bin, rows[i].off);
-	snprintf(how, sizeof how, "%s --effects=+%s", rows[i].off, effect);
-	double forced = a_mutation(bin, how);
-	add(effect, "off: the scene as it is", off, "instructions a mutation");
-	add(effect, "off: forced on", forced, "instructions a mutation");
-	add(effect, "off: leaving it out saves", 100 * (1 - off / forced), "%");
+	double off = instructions_per_mutation(bin, rows[i].without_effect);
+	snprintf(options, sizeof options, "%s --effects=+%s", rows[i].without_effect, effect);
+	double forced = instructions_per_mutation(bin, options);
+	add_figure(effect, "off: the scene as it is", off, "instructions a mutation");
+	add_figure(effect, "off: forced on", forced, "instructions a mutation");
+	add_figure(effect, "off: leaving it out saves", 100 * (1 - off / forced), "%");
 }
 
 /* The strategies chosen by the analysis, named by hand: leaving out a strategy must cost what a mixture without it
  * costs. */
-static void by_hand(const char *bin)
+static void measure_hand_made_mixture(const char *bin)
 {
 	static const char mixture[] = " --mutations bidirectional=0.05,rejoin=0.8";
-	char how[512];
-	snprintf(how, sizeof how, "%s%s", BOX, mixture);
-	double chosen = a_mutation(bin, BOX), hand = a_mutation(bin, how);
+	char options[512];
+	snprintf(options, sizeof options, "%s%s", BOX, mixture);
+	double chosen = instructions_per_mutation(bin, BOX), hand = instructions_per_mutation(bin, options);
 	bench_single("strategies left out: against a mixture by hand without them", 100 * fabs(chosen / hand - 1), "%",
 		     BENCH_AT_MOST, 1);
 }
 
 /* Colour, dispersion and aperture off, against a renderer without the branches for them. */
-static void measure_questions(const char *bin)
+static void measure_against_plain(const char *bin)
 {
 	static const struct {
-		const char *name, *how;
+		const char *name, *options;
 	} scenes[] = {
 		{"colour, dispersion, aperture off: grey box, hslt", BOX},
 		{"colour, dispersion, aperture off: grey box, half vectors", BOX " --effects=+half-vectors"},
@@ -121,8 +121,10 @@ static void measure_questions(const char *bin)
 	}
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++)
 		bench_single(scenes[i].name,
-			     100 * (a_mutation(bin, scenes[i].how) / a_mutation(plain, scenes[i].how) - 1), "%",
-			     BENCH_AT_MOST, 1);
+			     100 * (instructions_per_mutation(bin, scenes[i].options) /
+					    instructions_per_mutation(plain, scenes[i].options) -
+				    1),
+			     "%", BENCH_AT_MOST, 1);
 }
 
 void bench_effects(const char *bin)
@@ -132,8 +134,8 @@ void bench_effects(const char *bin)
 		bench_skip("valgrind is not installed");
 		return;
 	}
-	measure_questions(bin);
-	by_hand(bin);
+	measure_against_plain(bin);
+	measure_hand_made_mixture(bin);
 	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
 		measure_effect(bin, i);
 }

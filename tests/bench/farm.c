@@ -17,13 +17,13 @@
 #include <string.h>
 #include <unistd.h>
 
-struct farm {
+struct farm_processes {
 	const char *bin;
 	char folder[64], log[128], address[64];
 	struct process coordinator, worker[2];
 };
 
-static void start_coordinator(struct farm *f)
+static void start_coordinator(struct farm_processes *f)
 {
 	char port_file[128], port[16] = "";
 	snprintf(port_file, sizeof port_file, "%s/port", f->folder);
@@ -45,9 +45,9 @@ static void start_coordinator(struct farm *f)
 	snprintf(f->address, sizeof f->address, "127.0.0.1:%s", port);
 }
 
-static void farm_start(struct farm *f, const char *bin, int workers)
+static void farm_processes_start(struct farm_processes *f, const char *bin, int workers)
 {
-	*f = (struct farm){.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
+	*f = (struct farm_processes){.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
 	process_make_folder(f->folder);
 	snprintf(f->log, sizeof f->log, "%s/log", f->folder);
 	start_coordinator(f);
@@ -57,7 +57,7 @@ static void farm_start(struct farm *f, const char *bin, int workers)
 			      f->folder);
 }
 
-static void farm_stop(struct farm *f)
+static void farm_processes_stop(struct farm_processes *f)
 {
 	for (int i = 0; i < 2; i++)
 		if (f->worker[i].pid)
@@ -66,93 +66,93 @@ static void farm_stop(struct farm *f)
 	process_remove_folder(f->folder);
 }
 
-static void start_submit(const struct farm *f, struct process *p, const char *scene, const char *options)
+static void start_submit(const struct farm_processes *f, struct process *p, const char *scene, const char *options)
 {
 	process_start(p, f->bin, f->log, "hslt-submit --coordinator %s %s -o %s/farm.exr --wait %s", f->address, scene,
 		      f->folder, options);
 }
 
-static void submit(const struct farm *f, const char *scene, const char *options)
+static void submit_and_wait(const struct farm_processes *f, const char *scene, const char *options)
 {
 	struct process p;
 	start_submit(f, &p, scene, options);
 	process_wait(&p);
 }
 
-static void start_render(const struct farm *f, struct process *p, const char *options, int which)
+static void start_render(const struct farm_processes *f, struct process *p, const char *options, int index)
 {
-	process_start(p, f->bin, f->log, "hslt-render %s -o %s/render%d.exr --threads 1 %s", bench_box_file(),
-		      f->folder, which, options);
+	process_start(p, f->bin, f->log, "hslt-render %s -o %s/render%d.exr --threads 1 %s", bench_box_path(),
+		      f->folder, index, options);
 }
 
 /* 32 mutations per pixel, as for a quick preview: longer jobs send less per mutation. */
 enum { MUTATIONS = 1 << 19 };
-#define JOB "--integrator pssmlt --size 128x128 --bootstrap 65536 --mutations 524288"
-#define TWICE "--integrator pssmlt --size 128x128 --bootstrap 131072 --mutations 1048576"
+#define JOB_OPTIONS "--integrator pssmlt --size 128x128 --bootstrap 65536 --mutations 524288"
+#define DOUBLE_JOB_OPTIONS "--integrator pssmlt --size 128x128 --bootstrap 131072 --mutations 1048576"
 
-static void cpu_per_mutation(const char *bin)
+static void measure_cpu_per_mutation(const char *bin)
 {
-	struct farm f;
-	struct series worker = {0}, whole = {0}, alone = {0};
-	farm_start(&f, bin, 1);
-	submit(&f, bench_box_file(), JOB);
+	struct farm_processes f;
+	struct series worker = {0}, both = {0}, render_alone = {0};
+	farm_processes_start(&f, bin, 1);
+	submit_and_wait(&f, bench_box_path(), JOB_OPTIONS);
 	for (int i = 0; i < BENCH_REPEATS; i++) {
 		struct process render;
-		start_render(&f, &render, JOB, 0);
+		start_render(&f, &render, JOB_OPTIONS, 0);
 		process_wait(&render);
 		double w = process_cpu_seconds(&f.worker[0]), c = process_cpu_seconds(&f.coordinator);
-		submit(&f, bench_box_file(), JOB);
+		submit_and_wait(&f, bench_box_path(), JOB_OPTIONS);
 		w = process_cpu_seconds(&f.worker[0]) - w;
 		c = process_cpu_seconds(&f.coordinator) - c;
-		series_add(&alone, 1e6 * render.cpu_seconds / MUTATIONS);
+		series_add(&render_alone, 1e6 * render.cpu_seconds / MUTATIONS);
 		series_add(&worker, w / render.cpu_seconds);
-		series_add(&whole, (w + c) / render.cpu_seconds);
+		series_add(&both, (w + c) / render.cpu_seconds);
 	}
-	bench_row("hslt-render, with its bootstrap", &alone, "us/mutation", BENCH_INFORMS, 0);
-	bench_row("CPU of one worker / hslt-render", &worker, "", BENCH_INFORMS, 0);
-	bench_row("CPU of worker and coordinator / hslt-render", &whole, "", BENCH_AT_MOST, 1.03);
-	farm_stop(&f);
+	bench_row("hslt-render, with its bootstrap", &render_alone, "us/mutation", BENCH_NO_TARGET, 0);
+	bench_row("CPU of one worker / hslt-render", &worker, "", BENCH_NO_TARGET, 0);
+	bench_row("CPU of worker and coordinator / hslt-render", &both, "", BENCH_AT_MOST, 1.03);
+	farm_processes_stop(&f);
 }
 
-static void two_workers(const char *bin)
+static void measure_two_workers(const char *bin)
 {
-	struct farm f;
+	struct farm_processes f;
 	struct series ratio = {0};
-	farm_start(&f, bin, 2);
-	submit(&f, bench_box_file(), JOB);
+	farm_processes_start(&f, bin, 2);
+	submit_and_wait(&f, bench_box_path(), JOB_OPTIONS);
 	for (int i = 0; i < BENCH_REPEATS; i++) {
 		struct process render[2];
-		double begin = wall_seconds();
+		double begin = process_wall_seconds();
 		for (int k = 0; k < 2; k++)
-			start_render(&f, &render[k], JOB, k);
+			start_render(&f, &render[k], JOB_OPTIONS, k);
 		for (int k = 0; k < 2; k++)
 			process_wait(&render[k]);
-		double middle = wall_seconds();
-		submit(&f, bench_box_file(), TWICE);
-		series_add(&ratio, (middle - begin) / (wall_seconds() - middle));
+		double middle = process_wall_seconds();
+		submit_and_wait(&f, bench_box_path(), DOUBLE_JOB_OPTIONS);
+		series_add(&ratio, (middle - begin) / (process_wall_seconds() - middle));
 	}
 	bench_row("two workers / two hslt-render, throughput", &ratio, "", BENCH_AT_LEAST, 0.95);
-	farm_stop(&f);
+	farm_processes_stop(&f);
 }
 
 /* Returns the peak memory of a coordinator that ran one job. */
 static double coordinator_peak(const char *bin, const char *options)
 {
-	struct farm f;
-	farm_start(&f, bin, 1);
-	submit(&f, bench_box_file(), options);
+	struct farm_processes f;
+	farm_processes_start(&f, bin, 1);
+	submit_and_wait(&f, bench_box_path(), options);
 	double peak = process_peak_bytes(&f.coordinator, NULL);
-	farm_stop(&f);
+	farm_processes_stop(&f);
 	return peak;
 }
 
-static void coordinator_memory(const char *bin)
+static void measure_coordinator_memory(const char *bin)
 {
-#define SMALL "--integrator path --size 128x128 --groups 16 --epoch 1 "
+#define SMALL_JOB_OPTIONS "--integrator path --size 128x128 --groups 16 --epoch 1 "
 	/* Three rounds touch all films: for each group the sum of complete rounds, and the two open rounds. */
-	double films = 16 * 3 * 8.0 * 3 * 128 * 128, few = coordinator_peak(bin, SMALL "--spp 48"),
-	       many = coordinator_peak(bin, SMALL "--spp 1536");
-	bench_single("coordinator's peak, 3 rounds of leases", 1e-6 * few, "MB", BENCH_INFORMS, 0);
+	double films = 16 * 3 * 8.0 * 3 * 128 * 128, few = coordinator_peak(bin, SMALL_JOB_OPTIONS "--spp 48"),
+	       many = coordinator_peak(bin, SMALL_JOB_OPTIONS "--spp 1536");
+	bench_single("coordinator's peak, 3 rounds of leases", 1e-6 * few, "MB", BENCH_NO_TARGET, 0);
 	bench_single("coordinator's peak, 96 rounds of leases", 1e-6 * many, "MB", BENCH_AT_MOST,
 		     1e-6 * (100e6 + films));
 	bench_single("growth from 3 to 96 rounds", 1e-6 * (many - few), "MB", BENCH_AT_MOST, 2);
@@ -170,69 +170,71 @@ static double mesh_bytes(const struct world *w)
 	return sum;
 }
 
-static void worker_memory(const char *bin)
+static void measure_worker_memory(const char *bin)
 {
-	struct farm f;
+	struct farm_processes f;
 	char scene[128];
 	struct world *w = bench_world_million();
 	double embree = (double)accel_bytes(w->accel), building = (double)accel_peak_bytes(w->accel),
 	       meshes = mesh_bytes(w);
 	double pixels = (double)w->settings.width * w->settings.height, films = pixels * (24 + 12);
 	world_free(w);
-	farm_start(&f, bin, 1);
+	farm_processes_start(&f, bin, 1);
 	usleep(500000);
 	double idle = process_peak_bytes(&f.worker[0], NULL);
 	bench_write_million(f.folder);
 	snprintf(scene, sizeof scene, "%s/million.xml", f.folder);
 	struct process job;
 	struct series size = {0};
-	double now, peak = 0, own = meshes + films;
+	double current_bytes, peak = 0, mesh_and_film_bytes = meshes + films;
 	start_submit(&f, &job, scene, "--integrator path --spp 192");
 	while (process_is_running(&job)) {
 		usleep(250000);
-		peak = process_peak_bytes(&f.worker[0], &now);
-		series_add(&size, 1e-6 * now);
+		peak = process_peak_bytes(&f.worker[0], &current_bytes);
+		series_add(&size, 1e-6 * current_bytes);
 	}
 	process_wait(&job);
-	bench_single("worker without a job", 1e-6 * idle, "MB", BENCH_INFORMS, 0);
-	bench_row("worker on a million triangles, looked at 4/s", &size, "MB", BENCH_INFORMS, 0);
-	bench_single("its peak, while it built the world", 1e-6 * peak, "MB", BENCH_INFORMS, 0);
-	bench_single("of it: Embree's own", 1e-6 * embree, "MB", BENCH_INFORMS, 0);
-	bench_single("of it: Embree's own while it builds", 1e-6 * building, "MB", BENCH_INFORMS, 0);
-	bench_single("of it: meshes", 1e-6 * meshes, "MB", BENCH_INFORMS, 0);
-	bench_single("of it: a lease's film and tiles", 1e-6 * films, "MB", BENCH_INFORMS, 0);
-	bench_single("size / (Embree + meshes + films)", 1e6 * series_median(&size) / (embree + own), "", BENCH_AT_MOST,
-		     1.2);
-	bench_single("peak / (Embree building + meshes + films)", peak / (building + own), "", BENCH_AT_MOST, 1.2);
-	farm_stop(&f);
+	bench_single("worker without a job", 1e-6 * idle, "MB", BENCH_NO_TARGET, 0);
+	bench_row("worker on a million triangles, looked at 4/s", &size, "MB", BENCH_NO_TARGET, 0);
+	bench_single("its peak, while it built the world", 1e-6 * peak, "MB", BENCH_NO_TARGET, 0);
+	bench_single("of it: Embree's own", 1e-6 * embree, "MB", BENCH_NO_TARGET, 0);
+	bench_single("of it: Embree's own while it builds", 1e-6 * building, "MB", BENCH_NO_TARGET, 0);
+	bench_single("of it: meshes", 1e-6 * meshes, "MB", BENCH_NO_TARGET, 0);
+	bench_single("of it: a lease's film and tiles", 1e-6 * films, "MB", BENCH_NO_TARGET, 0);
+	bench_single("size / (Embree + meshes + films)", 1e6 * series_median(&size) / (embree + mesh_and_film_bytes),
+		     "", BENCH_AT_MOST, 1.2);
+	bench_single("peak / (Embree building + meshes + films)", peak / (building + mesh_and_film_bytes), "",
+		     BENCH_AT_MOST, 1.2);
+	farm_processes_stop(&f);
 }
 
 enum { SENT_CELLS = 930 };
 
 /* Returns the seconds of a submission; *bytes: the bytes that it sent. */
-static double send_scene(const struct farm *f, const struct relay *r, uint16_t port, unsigned seed, double *bytes)
+static double send_scene(const struct farm_processes *f, const struct relay *r, uint16_t port, unsigned seed,
+			 double *bytes)
 {
 	struct process p;
-	uint64_t before = relay_sent(r);
+	uint64_t before = relay_sent_bytes(r);
 	process_start(
 		&p, f->bin, f->log,
 		"hslt-submit --coordinator 127.0.0.1:%u %s/wavy.xml -o %s/sent.exr --integrator path --spp 1 --seed %u",
 		port, f->folder, f->folder, seed);
 	process_wait(&p);
-	*bytes = (double)(relay_sent(r) - before);
+	*bytes = (double)(relay_sent_bytes(r) - before);
 	return p.cpu_seconds;
 }
 
 /* Submits without any worker, so that nothing is rendered. */
-static void send_once(const char *bin)
+static void measure_sending(const char *bin)
 {
 	static const char xml[] =
 		"<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='ply'>"
 		"<string name='filename' value='wavy.ply'/></shape></scene>";
-	struct farm f;
+	struct farm_processes f;
 	uint16_t port;
-	farm_start(&f, bin, 0);
-	struct bench_file ply = bench_wavy_ply(SENT_CELLS);
+	farm_processes_start(&f, bin, 0);
+	struct bench_file ply = bench_make_wavy_ply(SENT_CELLS);
 	double size = (double)(ply.size + sizeof xml - 1), first, second;
 	bench_write_file(f.folder, "wavy.ply", ply.bytes, ply.size);
 	bench_write_file(f.folder, "wavy.xml", xml, sizeof xml - 1);
@@ -240,12 +242,12 @@ static void send_once(const char *bin)
 	struct relay *r = relay_start((uint16_t)atoi(strchr(f.address, ':') + 1), &port);
 	double cpu_first = send_scene(&f, r, port, 1, &first), cpu_second = send_scene(&f, r, port, 2, &second);
 	relay_stop(r);
-	bench_single("scene with a mesh: its files", 1e-6 * size, "MB", BENCH_INFORMS, 0);
+	bench_single("scene with a mesh: its files", 1e-6 * size, "MB", BENCH_NO_TARGET, 0);
 	bench_single("first submission: bytes sent / bytes of files", first / size, "", BENCH_AT_MOST, 1.01);
 	bench_single("second submission: bytes sent", second, "bytes", BENCH_AT_MOST, 10000);
-	bench_single("second / first", second / first, "", BENCH_INFORMS, 0);
-	bench_single("CPU of hslt-submit: second / first", cpu_second / cpu_first, "", BENCH_INFORMS, 0);
-	farm_stop(&f);
+	bench_single("second / first", second / first, "", BENCH_NO_TARGET, 0);
+	bench_single("CPU of hslt-submit: second / first", cpu_second / cpu_first, "", BENCH_NO_TARGET, 0);
+	farm_processes_stop(&f);
 }
 
 /* Returns whether all programs are there; names the missing one. */
@@ -253,7 +255,7 @@ static bool has_programs(const char *bin)
 {
 	static const char *const needed[] = {"hslt-coordinator", "hslt-worker", "hslt-submit", "hslt-render"};
 	for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
-		if (!process_exists(bin, needed[i])) {
+		if (!process_program_exists(bin, needed[i])) {
 			char why[128];
 			snprintf(why, sizeof why, "%s is not built", needed[i]);
 			bench_skip(why);
@@ -266,7 +268,7 @@ void bench_sending(const char *bin)
 {
 	bench_group("sending", "hslt-submit and hslt-coordinator on loopback: a scene submitted twice");
 	if (has_programs(bin))
-		send_once(bin);
+		measure_sending(bin);
 }
 
 void bench_farm(const char *bin)
@@ -274,8 +276,8 @@ void bench_farm(const char *bin)
 	bench_group("farm", "real processes on loopback, pssmlt");
 	if (!has_programs(bin))
 		return;
-	cpu_per_mutation(bin);
-	two_workers(bin);
+	measure_cpu_per_mutation(bin);
+	measure_two_workers(bin);
 }
 
 void bench_memory(const char *bin)
@@ -283,6 +285,6 @@ void bench_memory(const char *bin)
 	bench_group("memory", "resident sizes of real processes");
 	if (!has_programs(bin))
 		return;
-	coordinator_memory(bin);
-	worker_memory(bin);
+	measure_coordinator_memory(bin);
+	measure_worker_memory(bin);
 }

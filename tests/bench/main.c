@@ -14,8 +14,8 @@
 volatile double bench_sink;
 
 static json_t *rows, *skipped;
-static const char *group = "";
-static unsigned missed;
+static const char *current_group = "";
+static unsigned missed_targets;
 
 void series_add(struct series *s, double x)
 {
@@ -29,7 +29,7 @@ static int ascending(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static struct series sorted(const struct series *s)
+static struct series sorted_series(const struct series *s)
 {
 	struct series t = *s;
 	qsort(t.value, t.count, sizeof *t.value, ascending);
@@ -38,7 +38,7 @@ static struct series sorted(const struct series *s)
 
 double series_median(const struct series *s)
 {
-	struct series t = sorted(s);
+	struct series t = sorted_series(s);
 	return 0.5 * (t.value[(t.count - 1) / 2] + t.value[t.count / 2]);
 }
 
@@ -47,29 +47,29 @@ double bench_cpu_seconds(void)
 	return clock_thread_seconds();
 }
 
-void bench_group(const char *name, const char *says)
+void bench_group(const char *name, const char *description)
 {
-	group = name;
-	printf("\n%s: %s\n", name, says);
+	current_group = name;
+	printf("\n%s: %s\n", name, description);
 	fflush(stdout);
 }
 
 void bench_row(const char *name, const struct series *s, const char *unit, enum bench_target kind, double target)
 {
 	static const char *const sign[] = {"", ">=", "<="};
-	struct series t = sorted(s);
-	unsigned out = t.count >= 10 ? 1 : 0;
-	double m = series_median(s), low = t.value[out], high = t.value[t.count - 1 - out];
-	bool met = kind == BENCH_INFORMS || (kind == BENCH_AT_LEAST ? m >= target : m <= target);
-	missed += !met;
+	struct series t = sorted_series(s);
+	unsigned trimmed = t.count >= 10 ? 1 : 0;
+	double m = series_median(s), low = t.value[trimmed], high = t.value[t.count - 1 - trimmed];
+	bool met = kind == BENCH_NO_TARGET || (kind == BENCH_AT_LEAST ? m >= target : m <= target);
+	missed_targets += !met;
 	printf("  %-44s %10.4g  [%.4g, %.4g] %s", name, m, low, high, unit);
-	if (kind != BENCH_INFORMS)
+	if (kind != BENCH_NO_TARGET)
 		printf("   (target %s %g: %s)", sign[kind], target, met ? "met" : "MISSED");
 	printf("\n");
 	fflush(stdout);
-	json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:i, s:s}", "group", group, "name", name, "median", m, "low",
-				low, "high", high, "repeats", (int)t.count, "unit", unit);
-	if (kind != BENCH_INFORMS) {
+	json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:i, s:s}", "group", current_group, "name", name, "median",
+				m, "low", low, "high", high, "repeats", (int)t.count, "unit", unit);
+	if (kind != BENCH_NO_TARGET) {
 		json_object_set_new(row, "target", json_real(target));
 		json_object_set_new(row, "bound", json_string(sign[kind]));
 		json_object_set_new(row, "met", json_boolean(met));
@@ -86,7 +86,7 @@ void bench_single(const char *name, double value, const char *unit, enum bench_t
 void bench_skip(const char *why)
 {
 	printf("  skipped: %s\n", why);
-	json_array_append_new(skipped, json_pack("{s:s, s:s}", "group", group, "why", why));
+	json_array_append_new(skipped, json_pack("{s:s, s:s}", "group", current_group, "why", why));
 }
 
 void bench_die(const struct error *e)
@@ -109,7 +109,7 @@ void *bench_alloc(size_t count, size_t size)
 static const struct {
 	const char *name;
 	void (*run)(const char *bin);
-	bool when_named; /* runs only when named */
+	bool only_when_named; /* runs only when named */
 } benches[] = {
 	{"rays", bench_rays, false},	   {"hslt", bench_hslt, false},	      {"equal-time", bench_equal_time, true},
 	{"tiles", bench_tiles, false},	   {"parts", bench_parts, false},     {"farm", bench_farm, false},
@@ -117,12 +117,12 @@ static const struct {
 	{"sharing", bench_sharing, false}, {"sending", bench_sending, false},
 };
 
-static bool is_chosen(const char *name, bool when_named, char **names, int count)
+static bool is_selected(const char *name, bool only_when_named, char **names, int count)
 {
 	for (int i = 0; i < count; i++)
 		if (strcmp(names[i], name) == 0)
 			return true;
-	return count == 0 && !when_named;
+	return count == 0 && !only_when_named;
 }
 
 int main(int argc, char **argv)
@@ -138,9 +138,9 @@ int main(int argc, char **argv)
 	rows = json_array();
 	skipped = json_array();
 	for (size_t k = 0; k < sizeof benches / sizeof *benches; k++)
-		if (is_chosen(benches[k].name, benches[k].when_named, argv + i, argc - i))
+		if (is_selected(benches[k].name, benches[k].only_when_named, argv + i, argc - i))
 			benches[k].run(bin);
-	printf("\n%u target%s missed\n", missed, missed == 1 ? "" : "s");
+	printf("\n%u target%s missed\n", missed_targets, missed_targets == 1 ? "" : "s");
 	json_t *all = json_pack("{s:i, s:o, s:o}", "schema", 1, "rows", rows, "skipped", skipped);
 	if (json && json_dump_file(all, json, JSON_INDENT(1) | JSON_REAL_PRECISION(6))) {
 		fprintf(stderr, "bench: %s cannot be written\n", json);

@@ -13,7 +13,7 @@
 
 enum { CALLS = 1 << 14, POINTS = 1 << 10 };
 
-struct setting {
+struct part_inputs {
 	struct wavelengths wl[POINTS];
 	double u[POINTS][4];
 	vec3 wo[POINTS], wi[POINTS]; /* in the upper hemisphere */
@@ -21,7 +21,7 @@ struct setting {
 	void *film;
 };
 
-static void prepare(struct setting *s)
+static void fill_inputs(struct part_inputs *s)
 {
 	for (uint64_t i = 0; i < POINTS; i++) {
 		double a[4];
@@ -34,7 +34,8 @@ static void prepare(struct setting *s)
 	}
 }
 
-static void time_part(const char *name, const struct setting *s, double (*part)(const struct setting *s, unsigned i))
+static void time_part(const char *name, const struct part_inputs *s,
+		      double (*part)(const struct part_inputs *s, unsigned i))
 {
 	struct series ns = {0};
 	for (int r = 0; r < 2 + BENCH_REPEATS; r++) {
@@ -46,74 +47,74 @@ static void time_part(const char *name, const struct setting *s, double (*part)(
 		if (r >= 2)
 			series_add(&ns, 1e9 * seconds / CALLS);
 	}
-	bench_row(name, &ns, "ns", BENCH_INFORMS, 0);
+	bench_row(name, &ns, "ns", BENCH_NO_TARGET, 0);
 }
 
-static double random_block(const struct setting *s, unsigned i)
+static double random_block(const struct part_inputs *s, unsigned i)
 {
 	(void)s;
-	double out[SAMPLER_BLOCK];
-	sampler_fill(7, RNG_PATH, i, 3, SIDE_CAMERA, 2, out);
+	double out[SAMPLER_BLOCK_SIZE];
+	sampler_fill_block(7, RNG_PATH, i, 3, SIDE_CAMERA, 2, out);
 	return out[0] + out[7];
 }
 
-static double small_step(const struct setting *s, unsigned i)
+static double small_step(const struct part_inputs *s, unsigned i)
 {
 	return pss_small_step(s->u[i][0], s->u[i][1]);
 }
 
-static double reflectance(const struct setting *s, unsigned i)
+static double reflectance(const struct part_inputs *s, unsigned i)
 {
 	return color_eval(s->subject, &s->wl[i]).v[1];
 }
 
-static double texture_rgb(const struct setting *s, unsigned i)
+static double texture_rgb(const struct part_inputs *s, unsigned i)
 {
 	return color_eval_rgb_reflectance(s->u[i], &s->wl[i]).v[1];
 }
 
-static double to_xyz(const struct setting *s, unsigned i)
+static double to_xyz(const struct part_inputs *s, unsigned i)
 {
 	double xyz[3];
-	spectrum_to_xyz(spectrum_of(s->u[i][0]), &s->wl[i], xyz);
+	spectrum_to_xyz(spectrum_constant(s->u[i][0]), &s->wl[i], xyz);
 	return xyz[1];
 }
 
-static double time_splat(const struct setting *s, unsigned i)
+static double splat_on_film(const struct part_inputs *s, unsigned i)
 {
 	struct splat at = {64 * s->u[i][0], 64 * s->u[i][1], {1, 1, 1}};
 	film_sums_splat(s->film, &at, 1);
 	return 0;
 }
 
-static struct bsdf_point point_of(const struct setting *s, unsigned i)
+static struct bsdf_point make_bsdf_point(const struct part_inputs *s, unsigned i)
 {
-	return (struct bsdf_point){.where = {.u = s->u[i][0], .v = s->u[i][1]}, .w = &s->wl[i]};
+	return (struct bsdf_point){.texture_point = {.u = s->u[i][0], .v = s->u[i][1]}, .wavelengths = &s->wl[i]};
 }
 
-static double bsdf_eval(const struct setting *s, unsigned i)
+static double bsdf_eval(const struct part_inputs *s, unsigned i)
 {
 	const struct bsdf *b = s->subject;
-	struct bsdf_point p = point_of(s, i);
+	struct bsdf_point p = make_bsdf_point(s, i);
 	return b->ops->eval(b, &p, s->wo[i], s->wi[i]).v[0];
 }
 
-static double bsdf_pdf(const struct setting *s, unsigned i)
+static double bsdf_pdf(const struct part_inputs *s, unsigned i)
 {
 	const struct bsdf *b = s->subject;
-	struct bsdf_point p = point_of(s, i);
+	struct bsdf_point p = make_bsdf_point(s, i);
 	return b->ops->pdf_solid(b, &p, s->wo[i], s->wi[i]);
 }
 
-static double bsdf_sampled(const struct setting *s, unsigned i)
+static double bsdf_sample_pdf(const struct part_inputs *s, unsigned i)
 {
 	const struct bsdf *b = s->subject;
-	struct bsdf_point p = point_of(s, i);
+	struct bsdf_point p = make_bsdf_point(s, i);
 	struct bsdf_sample out;
 	return b->ops->sample(b, &p, s->wo[i], s->u[i], &out) ? out.pdf : 0;
 }
 
-static void time_film(struct setting *s, const char *name, enum filter_kind kind, double radius)
+static void time_film(struct part_inputs *s, const char *name, enum filter_kind kind, double radius)
 {
 	struct plan p = {.width = 64, .height = 64, .crop_width = 64, .crop_height = 64};
 	struct scene_settings set = {.filter = kind, .filter_radius = radius, .filter_stddev = 0.5};
@@ -122,11 +123,11 @@ static void time_film(struct setting *s, const char *name, enum filter_kind kind
 	if (film_sums_init(&sums, &p, &set, &e))
 		bench_die(&e);
 	s->film = &sums;
-	time_part(name, s, time_splat);
+	time_part(name, s, splat_on_film);
 	film_sums_fini(&sums);
 }
 
-static void time_color(struct setting *s)
+static void time_color(struct part_inputs *s)
 {
 	struct error e;
 	struct color c;
@@ -143,7 +144,7 @@ static void time_color(struct setting *s)
 	time_part("spectrum to XYZ", s, to_xyz);
 }
 
-static void time_bsdf(struct setting *s, const char *text)
+static void time_bsdf(struct part_inputs *s, const char *text)
 {
 	struct arena arena = {.limit = 1 << 20};
 	struct bsdf_build build = {.arena = &arena, .dialect_3 = true};
@@ -158,15 +159,15 @@ static void time_bsdf(struct setting *s, const char *text)
 	snprintf(name, sizeof name, "%.36s: pdf", text);
 	time_part(name, s, bsdf_pdf);
 	snprintf(name, sizeof name, "%.36s: sample", text);
-	time_part(name, s, bsdf_sampled);
+	time_part(name, s, bsdf_sample_pdf);
 	arena_fini(&arena);
 }
 
 void bench_parts(const char *bin)
 {
 	(void)bin;
-	static struct setting s;
-	prepare(&s);
+	static struct part_inputs s;
+	fill_inputs(&s);
 	bench_group("parts", "nanoseconds a call, inputs in cache");
 	time_part("block of 8 random numbers", &s, random_block);
 	time_part("small step of one number", &s, small_step);

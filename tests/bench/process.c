@@ -13,29 +13,29 @@
 #include <unistd.h>
 
 enum { RUNNING_MAX = 16 };
-static pid_t running[RUNNING_MAX];
+static pid_t running_pids[RUNNING_MAX];
 
-static void end_all(void)
+static void kill_all(void)
 {
 	for (int i = 0; i < RUNNING_MAX; i++)
-		if (running[i])
-			kill(running[i], SIGKILL);
+		if (running_pids[i])
+			kill(running_pids[i], SIGKILL);
 }
 
 static void replace_running(pid_t before, pid_t after)
 {
 	static bool registered;
 	if (!registered)
-		atexit(end_all);
+		atexit(kill_all);
 	registered = true;
 	for (int i = 0; i < RUNNING_MAX; i++)
-		if (running[i] == before) {
-			running[i] = after;
+		if (running_pids[i] == before) {
+			running_pids[i] = after;
 			return;
 		}
 }
 
-bool process_exists(const char *bin, const char *name)
+bool process_program_exists(const char *bin, const char *name)
 {
 	char path[4096];
 	snprintf(path, sizeof path, "%s/%s", bin, name);
@@ -44,13 +44,13 @@ bool process_exists(const char *bin, const char *name)
 
 void process_start(struct process *p, const char *bin, const char *log, const char *format, ...)
 {
-	char line[8192], path[4096], *arg[PROCESS_ARGS + 1], *rest = line;
+	char line[8192], path[4096], *arg[PROCESS_ARGS_MAX + 1], *rest = line;
 	va_list ap;
 	va_start(ap, format);
 	vsnprintf(line, sizeof line, format, ap);
 	va_end(ap);
 	int n = 0;
-	for (char *word; n < PROCESS_ARGS && (word = strtok_r(n ? NULL : line, " ", &rest));)
+	for (char *word; n < PROCESS_ARGS_MAX && (word = strtok_r(n ? NULL : line, " ", &rest));)
 		arg[n++] = word;
 	arg[n] = NULL;
 	snprintf(path, sizeof path, "%s/%s", bin, arg[0]);
@@ -81,14 +81,14 @@ static void wait_for_end(struct process *p)
 	p->pid = 0;
 	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
 			 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
-	p->code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+	p->exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
 void process_wait(struct process *p)
 {
 	wait_for_end(p);
-	if (p->code != 0) {
-		fprintf(stderr, "bench: a program ended with %d\n", p->code);
+	if (p->exit_code != 0) {
+		fprintf(stderr, "bench: a program ended with %d\n", p->exit_code);
 		exit(1);
 	}
 }
@@ -106,7 +106,7 @@ bool process_is_running(const struct process *p)
 }
 
 /* A worker renders in a child of the process that was started (worker/daemon/supervise.h). */
-static size_t with_children(pid_t pid, pid_t all[16])
+static size_t list_with_children(pid_t pid, pid_t pids[16])
 {
 	char path[64];
 	size_t count = 1;
@@ -116,35 +116,35 @@ static size_t with_children(pid_t pid, pid_t all[16])
 		perror("bench: list of children");
 		exit(1);
 	}
-	all[0] = pid;
+	pids[0] = pid;
 	for (int child; count < 16 && fscanf(f, "%d", &child) == 1;)
-		all[count++] = child;
+		pids[count++] = child;
 	fclose(f);
 	return count;
 }
 
 double process_cpu_seconds(const struct process *p)
 {
-	pid_t all[16];
+	pid_t pids[16];
 	double sum = 0;
-	for (size_t i = 0, n = with_children(p->pid, all); i < n; i++) {
+	for (size_t i = 0, n = list_with_children(p->pid, pids); i < n; i++) {
 		clockid_t clock;
 		struct timespec t = {0, 0};
-		if (clock_getcpuclockid(all[i], &clock) == 0)
+		if (clock_getcpuclockid(pids[i], &clock) == 0)
 			clock_gettime(clock, &t);
 		sum += (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 	}
 	return sum;
 }
 
-double process_peak_bytes(const struct process *p, double *now)
+double process_peak_bytes(const struct process *p, double *current)
 {
-	pid_t all[16];
+	pid_t pids[16];
 	double peak = 0, resident = 0;
-	for (size_t i = 0, n = with_children(p->pid, all); i < n; i++) {
+	for (size_t i = 0, n = list_with_children(p->pid, pids); i < n; i++) {
 		char path[64], line[256];
 		double kilobytes;
-		snprintf(path, sizeof path, "/proc/%d/status", (int)all[i]);
+		snprintf(path, sizeof path, "/proc/%d/status", (int)pids[i]);
 		FILE *f = fopen(path, "r");
 		while (f && fgets(line, sizeof line, f))
 			if (sscanf(line, "VmHWM: %lf", &kilobytes) == 1)
@@ -154,8 +154,8 @@ double process_peak_bytes(const struct process *p, double *now)
 		if (f)
 			fclose(f);
 	}
-	if (now)
-		*now = 1024 * resident;
+	if (current)
+		*current = 1024 * resident;
 	return 1024 * peak;
 }
 
@@ -173,7 +173,7 @@ double process_wait_peak(struct process *p)
 	return peak;
 }
 
-double wall_seconds(void)
+double process_wall_seconds(void)
 {
 	struct timespec t;
 	clock_gettime(CLOCK_MONOTONIC, &t);

@@ -8,16 +8,16 @@
 #include <stddef.h>
 #include <sys/types.h>
 
-enum { PROCESS_ARGS = 32 };
+enum { PROCESS_ARGS_MAX = 32 };
 
 struct process {
 	pid_t pid;	    /* 0: the process has ended */
 	double cpu_seconds; /* of a process that has ended */
-	int code;
+	int exit_code;
 };
 
 /* Returns whether BIN/name exists. */
-bool process_exists(const char *bin, const char *name);
+bool process_program_exists(const char *bin, const char *name);
 /* Starts a program. line: its name in BIN and its arguments, separated by spaces; its output goes to LOG. */
 __attribute__((format(printf, 4, 5))) void process_start(struct process *p, const char *bin, const char *log,
 							 const char *format, ...);
@@ -30,10 +30,10 @@ void process_stop(struct process *p); /* sends SIGTERM and waits */
 bool process_is_running(const struct process *p);
 /* CPU seconds so far of a running process and its children. */
 double process_cpu_seconds(const struct process *p);
-double process_peak_bytes(const struct process *p, double *now); /* peak of resident memory; *now: the present value, if
-								  * not NULL */
+double process_peak_bytes(const struct process *p, double *current); /* peak of resident memory; *now: the present
+								      * value, if not NULL */
 
-double wall_seconds(void);
+double process_wall_seconds(void);
 
 /* folder: ends with XXXXXX, which is replaced by the name of a new folder. */
 void process_make_folder(char *folder);

@@ -17,7 +17,7 @@ struct relay {
 	int listener;
 	uint16_t target;
 	pthread_t thread;
-	atomic_ullong sent;
+	atomic_ullong sent_bytes;
 };
 
 static struct sockaddr_in loopback(uint16_t port)
@@ -53,7 +53,7 @@ static void serve_connection(struct relay *r, int client, int coordinator)
 				if (n == 0)
 					return;
 				if (k == 0)
-					atomic_fetch_add(&r->sent, n);
+					atomic_fetch_add(&r->sent_bytes, n);
 			}
 	}
 }
@@ -88,9 +88,9 @@ struct relay *relay_start(uint16_t target, uint16_t *port)
 	return r;
 }
 
-uint64_t relay_sent(const struct relay *r)
+uint64_t relay_sent_bytes(const struct relay *r)
 {
-	return atomic_load(&r->sent);
+	return atomic_load(&r->sent_bytes);
 }
 
 void relay_stop(struct relay *r)

@@ -13,7 +13,7 @@ struct relay;
 /* Starts the relay; *port becomes its port. */
 struct relay *relay_start(uint16_t target, uint16_t *port);
 /* Returns the bytes that clients have sent on all connections so far. */
-uint64_t relay_sent(const struct relay *r);
+uint64_t relay_sent_bytes(const struct relay *r);
 void relay_stop(struct relay *r); /* call it after the last connection has ended */
 
 #endif

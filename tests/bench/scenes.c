@@ -18,54 +18,54 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { FLOOR_CELLS = 500, BALL_CELLS = 500, LINE = 96 };
-enum { VERTEX_FLOATS = 8, FACE_BYTES = 1 + 3 * 4, HEADER_MAX = 512 };
+enum { FLOOR_CELLS = 500, BALL_CELLS = 500, LINE_BYTES_MAX = 96 };
+enum { VERTEX_FLOATS = 8, FACE_BYTES = 1 + 3 * 4, HEADER_BYTES_MAX = 512 };
 
-struct text {
+struct text_buffer {
 	char *bytes;
-	size_t size, room;
+	size_t size, capacity;
 };
 
-static void text_new(struct text *t, size_t lines)
+static void text_buffer_init(struct text_buffer *t, size_t lines)
 {
-	*t = (struct text){.bytes = bench_alloc(lines, LINE), .room = lines * LINE};
+	*t = (struct text_buffer){.bytes = bench_alloc(lines, LINE_BYTES_MAX), .capacity = lines * LINE_BYTES_MAX};
 }
 
-__attribute__((format(printf, 2, 3))) static void text_line(struct text *t, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void text_buffer_append(struct text_buffer *t, const char *format, ...)
 {
 	va_list ap;
 	va_start(ap, format);
-	t->size += (size_t)vsnprintf(t->bytes + t->size, t->room - t->size, format, ap);
+	t->size += (size_t)vsnprintf(t->bytes + t->size, t->capacity - t->size, format, ap);
 	va_end(ap);
 }
 
 /* Appends a grid of (cells + 1) x (cells + 1) vertices of a surface over the unit square, with two triangles per cell.
  */
-static void grid(struct text *t, int cells, void (*surface)(double u, double v, double p[3]))
+static void append_grid(struct text_buffer *t, int cells, void (*surface)(double u, double v, double p[3]))
 {
 	int side = cells + 1;
-	text_new(t, (size_t)side * (size_t)side + 2 * (size_t)cells * (size_t)cells);
+	text_buffer_init(t, (size_t)side * (size_t)side + 2 * (size_t)cells * (size_t)cells);
 	for (int j = 0; j < side; j++)
 		for (int i = 0; i < side; i++) {
 			double p[3];
 			surface((double)i / cells, (double)j / cells, p);
-			text_line(t, "v %.7g %.7g %.7g\n", p[0], p[1], p[2]);
+			text_buffer_append(t, "v %.7g %.7g %.7g\n", p[0], p[1], p[2]);
 		}
 	for (int j = 0; j < cells; j++)
 		for (int i = 0; i < cells; i++) {
 			int a = j * side + i + 1, b = a + 1, c = a + side, d = c + 1;
-			text_line(t, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
+			text_buffer_append(t, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
 		}
 }
 
-static void hills(double u, double v, double p[3])
+static void hill_surface(double u, double v, double p[3])
 {
 	p[0] = 4 * u - 2;
 	p[2] = 2 - 4 * v;
 	p[1] = -1.9 + 0.08 * sin(31 * u) * cos(27 * v) + 0.01 * sin(411 * u + 3 * sin(97 * v)) * sin(377 * v);
 }
 
-static void ball(double u, double v, double p[3])
+static void ball_surface(double u, double v, double p[3])
 {
 	double phi = 2 * M_PI * u, theta = M_PI * (0.002 + 0.996 * v);
 	double r = 0.8 + 0.03 * sin(14 * theta) * cos(12 * phi) + 0.004 * sin(90 * theta) * sin(80 * phi);
@@ -93,8 +93,8 @@ static const char million_xml[] =
 	"<string name='distribution' value='ggx'/><float name='alpha' value='0.2'/></bsdf></shape>" LAMP("-1")
 		LAMP("1") "</scene>";
 
-static struct world *build_with(const struct asset_source *assets, const char *file, const struct render_options *o,
-				const struct scene_define *defines, uint32_t define_count)
+static struct world *build_world(const struct asset_source *assets, const char *file, const struct render_options *o,
+				 const struct scene_define *defines, uint32_t define_count)
 {
 	struct error e;
 	struct scene s;
@@ -109,24 +109,25 @@ static struct world *build_with(const struct asset_source *assets, const char *f
 	return w;
 }
 
-struct world *bench_world_of(const struct asset_source *assets, const char *file, const struct render_options *o)
+struct world *bench_world_from_assets(const struct asset_source *assets, const char *file,
+				      const struct render_options *o)
 {
-	return build_with(assets, file, o, NULL, 0);
+	return build_world(assets, file, o, NULL, 0);
 }
 
 struct world *bench_world_million(void)
 {
-	struct text floor, round;
-	grid(&floor, FLOOR_CELLS, hills);
-	grid(&round, BALL_CELLS, ball);
+	struct text_buffer floor, dented_ball;
+	append_grid(&floor, FLOOR_CELLS, hill_surface);
+	append_grid(&dented_ball, BALL_CELLS, ball_surface);
 	const struct memory_file files[] = {{"million.xml", million_xml, sizeof million_xml - 1},
 					    {"hills.obj", floor.bytes, floor.size},
-					    {"ball.obj", round.bytes, round.size},
+					    {"ball.obj", dented_ball.bytes, dented_ball.size},
 					    {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
-	struct world *w = bench_world_of(&assets, "million.xml", NULL);
+	struct world *w = bench_world_from_assets(&assets, "million.xml", NULL);
 	mem_free(floor.bytes);
-	mem_free(round.bytes);
+	mem_free(dented_ball.bytes);
 	return w;
 }
 
@@ -143,17 +144,17 @@ void bench_write_file(const char *folder, const char *name, const void *bytes, s
 
 void bench_write_million(const char *folder)
 {
-	struct text t;
+	struct text_buffer t;
 	bench_write_file(folder, "million.xml", million_xml, sizeof million_xml - 1);
-	grid(&t, FLOOR_CELLS, hills);
+	append_grid(&t, FLOOR_CELLS, hill_surface);
 	bench_write_file(folder, "hills.obj", t.bytes, t.size);
 	mem_free(t.bytes);
-	grid(&t, BALL_CELLS, ball);
+	append_grid(&t, BALL_CELLS, ball_surface);
 	bench_write_file(folder, "ball.obj", t.bytes, t.size);
 	mem_free(t.bytes);
 }
 
-static void put_face(struct bench_file *f, uint32_t a, uint32_t b, uint32_t c)
+static void append_face(struct bench_file *f, uint32_t a, uint32_t b, uint32_t c)
 {
 	const uint32_t corner[3] = {a, b, c};
 	f->bytes[f->size++] = 3;
@@ -161,12 +162,12 @@ static void put_face(struct bench_file *f, uint32_t a, uint32_t b, uint32_t c)
 		put32(f->bytes + f->size, corner[k]);
 }
 
-struct bench_file bench_wavy_ply(uint32_t cells)
+struct bench_file bench_make_wavy_ply(uint32_t cells)
 {
 	uint32_t side = cells + 1;
 	size_t vertices = (size_t)side * side, faces = 2 * (size_t)cells * cells;
-	struct bench_file f = {bench_alloc(HEADER_MAX + vertices * VERTEX_FLOATS * 4 + faces * FACE_BYTES, 1), 0};
-	f.size = (size_t)snprintf((char *)f.bytes, HEADER_MAX,
+	struct bench_file f = {bench_alloc(HEADER_BYTES_MAX + vertices * VERTEX_FLOATS * 4 + faces * FACE_BYTES, 1), 0};
+	f.size = (size_t)snprintf((char *)f.bytes, HEADER_BYTES_MAX,
 				  "ply\nformat binary_little_endian 1.0\nelement vertex %zu\n"
 				  "property float x\nproperty float y\nproperty float z\n"
 				  "property float nx\nproperty float ny\nproperty float nz\n"
@@ -183,13 +184,13 @@ struct bench_file bench_wavy_ply(uint32_t cells)
 	for (uint32_t j = 0; j < cells; j++)
 		for (uint32_t i = 0; i < cells; i++) {
 			uint32_t a = j * side + i;
-			put_face(&f, a, a + 1, a + side + 1);
-			put_face(&f, a, a + side + 1, a + side);
+			append_face(&f, a, a + 1, a + side + 1);
+			append_face(&f, a, a + side + 1, a + side);
 		}
 	return f;
 }
 
-const char *bench_box_file(void)
+const char *bench_box_path(void)
 {
 	static char path[4096];
 	const char *scenes = getenv("HSLT_SCENES");
@@ -204,14 +205,14 @@ const char *bench_box_file(void)
 struct world *bench_world_box(const char **name)
 {
 	char folder[4096];
-	snprintf(folder, sizeof folder, "%s", bench_box_file());
+	snprintf(folder, sizeof folder, "%s", bench_box_path());
 	char *slash = strrchr(folder, '/');
 	*slash = 0;
 	*name = strstr(folder, "cornell-box") ? "cornell-box"
 					      : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
-	struct asset_source assets = asset_folder(folder);
+	struct asset_source assets = asset_source_for_folder(folder);
 	struct render_options small = {.width = 160, .height = 160};
-	return bench_world_of(&assets, slash + 1, &small);
+	return bench_world_from_assets(&assets, slash + 1, &small);
 }
 
 struct world *bench_world(const char *path, bool shipped, const struct render_options *o)
@@ -225,13 +226,13 @@ struct world *bench_world(const char *path, bool shipped, const struct render_op
 		return NULL;
 	char *slash = strrchr(folder, '/');
 	*slash = 0;
-	struct asset_source assets = asset_folder(folder);
-	return bench_world_of(&assets, slash + 1, o);
+	struct asset_source assets = asset_source_for_folder(folder);
+	return bench_world_from_assets(&assets, slash + 1, o);
 }
 
 struct world *bench_world_displaced(void)
 {
 	static const struct scene_define levels[] = {{"ground", "9"}, {"ball", "8"}};
-	struct asset_source assets = asset_folder("tests/scenes/displaced");
-	return build_with(&assets, "scene.xml", NULL, levels, 2);
+	struct asset_source assets = asset_source_for_folder("tests/scenes/displaced");
+	return build_world(&assets, "scene.xml", NULL, levels, 2);
 }

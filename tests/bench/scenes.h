@@ -17,17 +17,18 @@ struct bench_file {
 	unsigned char *bytes;
 	size_t size;
 };
-struct bench_file bench_wavy_ply(uint32_t cells);
+struct bench_file bench_make_wavy_ply(uint32_t cells);
 /* Returns `cornell-box` from the folder that HSLT_SCENES names, else the box of tests/scenes. */
 struct world *bench_world_box(const char **name);
 /* Returns folder and file of that scene. */
-const char *bench_box_file(void);
+const char *bench_box_path(void);
 /* Returns a scene of the project if `shipped`, else of the folder that HSLT_SCENES names; NULL: HSLT_SCENES is not set,
  * or there is no such file. o may be NULL. */
 struct world *bench_world(const char *path, bool shipped, const struct render_options *o);
 /* Returns tests/scenes/displaced with a million triangles. */
 struct world *bench_world_displaced(void);
 /* Returns the world of one file among the assets. o may be NULL. */
-struct world *bench_world_of(const struct asset_source *assets, const char *file, const struct render_options *o);
+struct world *bench_world_from_assets(const struct asset_source *assets, const char *file,
+				      const struct render_options *o);
 
 #endif

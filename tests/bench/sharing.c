@@ -18,12 +18,12 @@
 enum { IMAGE_SIDE = 2048, MATERIALS = 64, FILES = 2 };
 enum { CELLS = 100, INSTANCES = 10000, COPIES = 32 };
 
-struct place {
+struct scene_folder {
 	const char *bin;
 	char folder[64], log[80];
 };
 
-static FILE *scene_begin(const struct place *p, const char *name)
+static FILE *write_scene_begin(const struct scene_folder *p, const char *name)
 {
 	char path[128];
 	snprintf(path, sizeof path, "%s/%s", p->folder, name);
@@ -36,7 +36,7 @@ static FILE *scene_begin(const struct place *p, const char *name)
 	return f;
 }
 
-static void scene_end(FILE *f)
+static void write_scene_end(FILE *f)
 {
 	fprintf(f, "</scene>\n");
 	if (fclose(f)) {
@@ -45,7 +45,7 @@ static void scene_end(FILE *f)
 	}
 }
 
-static void put_place(FILE *f, int i)
+static void write_transform(FILE *f, int i)
 {
 	fprintf(f, "<transform name='to_world'><translate x='%d' y='%d' z='9'/></transform>", 3 * (i % 100),
 		3 * (i / 100));
@@ -53,9 +53,9 @@ static void put_place(FILE *f, int i)
 
 /* Writes MATERIALS rectangles with a material each, which use the images p0.png, p1.png, ... in turn; with images 0,
  * all of them share one material. */
-static void write_textured(const struct place *p, const char *name, int images)
+static void write_textured(const struct scene_folder *p, const char *name, int images)
 {
-	FILE *f = scene_begin(p, name);
+	FILE *f = write_scene_begin(p, name);
 	static const char bsdf[] = "<bsdf type='diffuse' id='b%d'><texture type='bitmap' name='reflectance'><string "
 				   "name='filename' value='p%d.png'/></texture></bsdf>\n";
 	if (images == 0)
@@ -64,14 +64,14 @@ static void write_textured(const struct place *p, const char *name, int images)
 		if (images > 0)
 			fprintf(f, bsdf, i, i % images);
 		fprintf(f, "<shape type='rectangle'>");
-		put_place(f, i);
+		write_transform(f, i);
 		fprintf(f, "<ref id='b%d'/></shape>\n", images > 0 ? i : 0);
 	}
-	scene_end(f);
+	write_scene_end(f);
 }
 
 /* Writes gradients with noise, which cost as much to decode as a photograph. */
-static void write_images(const struct place *p)
+static void write_images(const struct scene_folder *p)
 {
 	unsigned char *rgb = bench_alloc((size_t)IMAGE_SIDE * IMAGE_SIDE, 3), *png;
 	uint32_t noise = 1;
@@ -92,39 +92,39 @@ static void write_images(const struct place *p)
 	mem_free(rgb);
 }
 
-static void write_instances(const struct place *p, const char *name, int count)
+static void write_instances(const struct scene_folder *p, const char *name, int count)
 {
-	FILE *f = scene_begin(p, name);
+	FILE *f = write_scene_begin(p, name);
 	fprintf(f, "<shape type='shapegroup' id='g'><shape type='ply'><string name='filename' value='m.ply'/></shape>"
 		   "</shape>\n");
 	for (int i = 0; i < count; i++) {
 		fprintf(f, "<shape type='instance'><ref id='g'/>");
-		put_place(f, i);
+		write_transform(f, i);
 		fprintf(f, "</shape>\n");
 	}
-	scene_end(f);
+	write_scene_end(f);
 }
 
-static void write_copies(const struct place *p, const char *name, int count)
+static void write_copies(const struct scene_folder *p, const char *name, int count)
 {
-	FILE *f = scene_begin(p, name);
+	FILE *f = write_scene_begin(p, name);
 	for (int i = 0; i < count; i++) {
 		fprintf(f, "<shape type='ply'><string name='filename' value='m.ply'/>");
-		put_place(f, i);
+		write_transform(f, i);
 		fprintf(f, "</shape>\n");
 	}
-	scene_end(f);
+	write_scene_end(f);
 }
 
-static double load_seconds(const struct place *p, const char *name)
+static double load_seconds(const struct scene_folder *p, const char *name)
 {
-	struct asset_source assets = asset_folder(p->folder);
+	struct asset_source assets = asset_source_for_folder(p->folder);
 	double begin = bench_cpu_seconds();
-	world_free(bench_world_of(&assets, name, NULL));
+	world_free(bench_world_from_assets(&assets, name, NULL));
 	return bench_cpu_seconds() - begin;
 }
 
-static double peak_megabytes(const struct place *p, const char *name)
+static double peak_megabytes(const struct scene_folder *p, const char *name)
 {
 	struct process render;
 	process_start(&render, p->bin, p->log,
@@ -133,7 +133,7 @@ static double peak_megabytes(const struct place *p, const char *name)
 	return 1e-6 * process_wait_peak(&render);
 }
 
-static void share_textures(const struct place *p, double empty)
+static void measure_shared_textures(const struct scene_folder *p, double empty)
 {
 	write_images(p);
 	write_textured(p, "one.xml", 0);
@@ -150,19 +150,19 @@ static void share_textures(const struct place *p, double empty)
 		series_add(&files, different / base);
 	}
 	double memory = peak_megabytes(p, "one.xml") - empty;
-	bench_row("a 2048x2048 PNG, one material", &one, "s", BENCH_INFORMS, 0);
+	bench_row("a 2048x2048 PNG, one material", &one, "s", BENCH_NO_TARGET, 0);
 	bench_row("... 64 materials that name it / one", &many, "", BENCH_AT_MOST, 1.1);
-	bench_row("... 64 that name two such files / one", &files, "", BENCH_INFORMS, 0);
-	bench_single("its memory, one material", memory, "MB", BENCH_INFORMS, 0);
+	bench_row("... 64 that name two such files / one", &files, "", BENCH_NO_TARGET, 0);
+	bench_single("its memory, one material", memory, "MB", BENCH_NO_TARGET, 0);
 	bench_single("... 64 materials that name it / one", (peak_megabytes(p, "many.xml") - empty) / memory, "",
 		     BENCH_AT_MOST, 1.1);
 	bench_single("... 64 that name two such files / one", (peak_megabytes(p, "files.xml") - empty) / memory, "",
-		     BENCH_INFORMS, 0);
+		     BENCH_NO_TARGET, 0);
 }
 
-static void share_instances(const struct place *p, double empty)
+static void measure_shared_instances(const struct scene_folder *p, double empty)
 {
-	struct bench_file ply = bench_wavy_ply(CELLS);
+	struct bench_file ply = bench_make_wavy_ply(CELLS);
 	bench_write_file(p->folder, "m.ply", ply.bytes, ply.size);
 	mem_free(ply.bytes);
 	write_instances(p, "instance.xml", 1);
@@ -180,30 +180,30 @@ static void share_instances(const struct place *p, double empty)
 	}
 	double one = peak_megabytes(p, "instance.xml") - empty, all = peak_megabytes(p, "instances.xml") - empty,
 	       copies = peak_megabytes(p, "copies.xml") - empty;
-	bench_row("a mesh of 20,000 triangles, one instance", &single, "s", BENCH_INFORMS, 0);
-	bench_row("... 10,000 instances", &many, "s", BENCH_INFORMS, 0);
+	bench_row("a mesh of 20,000 triangles, one instance", &single, "s", BENCH_NO_TARGET, 0);
+	bench_row("... 10,000 instances", &many, "s", BENCH_NO_TARGET, 0);
 	bench_row("time of an instance / of a copy (of 32)", &share, "", BENCH_AT_MOST, 0.01);
-	bench_single("memory, one instance", one, "MB", BENCH_INFORMS, 0);
-	bench_single("... 10,000 instances", all, "MB", BENCH_INFORMS, 0);
+	bench_single("memory, one instance", one, "MB", BENCH_NO_TARGET, 0);
+	bench_single("... 10,000 instances", all, "MB", BENCH_NO_TARGET, 0);
 	bench_single("memory of an instance / of a copy (of 32)",
 		     (all - one) / (INSTANCES - 1) / ((copies - one) / (COPIES - 1)), "", BENCH_AT_MOST, 0.01);
 }
 
 void bench_sharing(const char *bin)
 {
-	struct place p = {.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
+	struct scene_folder p = {.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
 	bench_group("sharing", "what a scene names often is loaded once");
-	if (!process_exists(bin, "hslt-render")) {
+	if (!process_program_exists(bin, "hslt-render")) {
 		bench_skip("hslt-render is not built");
 		return;
 	}
 	process_make_folder(p.folder);
 	snprintf(p.log, sizeof p.log, "%s/log", p.folder);
-	FILE *f = scene_begin(&p, "empty.xml");
+	FILE *f = write_scene_begin(&p, "empty.xml");
 	fprintf(f, "<shape type='rectangle'/>\n");
-	scene_end(f);
+	write_scene_end(f);
 	double empty = peak_megabytes(&p, "empty.xml");
-	share_textures(&p, empty);
-	share_instances(&p, empty);
+	measure_shared_textures(&p, empty);
+	measure_shared_instances(&p, empty);
 	process_remove_folder(p.folder);
 }

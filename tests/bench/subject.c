@@ -21,7 +21,7 @@
 
 enum { RAYS_MAX = 1 << 19, CHAINS = 64, BOOTSTRAP = 4096 };
 
-struct subject_scene {
+struct subject_embree {
 	RTCDevice device;
 	RTCScene scene;
 	struct RTCRayHit ray[];
@@ -30,8 +30,8 @@ struct subject_scene {
 static void run_lease(const struct subject *s, const struct lease_key *k, struct batch *b)
 {
 	struct error e;
-	enum lease_end end;
-	if (render_lease(s->w, &s->plan, k, s->in.seeds ? &s->in : NULL, NULL, &end, b, &e))
+	enum lease_outcome end;
+	if (render_lease(s->w, &s->plan, k, s->input.seeds ? &s->input : NULL, NULL, &end, b, &e))
 		bench_die(&e);
 }
 
@@ -44,7 +44,7 @@ uint64_t subject_render(const struct subject *s)
 {
 	struct batch b;
 	subject_run(s, &b);
-	uint64_t rays = batch_rays(b.counters);
+	uint64_t rays = batch_ray_count(b.counters);
 	batch_fini(&b);
 	return rays;
 }
@@ -74,13 +74,13 @@ static void choose_mutations(struct subject *s, const char *mutations)
 	struct render_summary summary;
 	struct error e;
 	world_summary(s->w, &summary);
-	if (render_mutations(mutations, &summary, s->plan.mutations, &e))
+	if (render_canonical_mutations(mutations, &summary, s->plan.mutations, &e))
 		bench_die(&e);
 }
 
-void subject_make(struct subject *s, struct world *w, const char *integrator, const char *mutations)
+void subject_init(struct subject *s, struct world *w, const char *integrator, const char *mutations)
 {
-	const struct render_integrator *i = render_integrator_find(integrator);
+	const struct integrator_properties *i = render_integrator_find(integrator);
 	const struct scene_settings *set = &w->settings;
 	*s = (struct subject){.w = w, .key = {1, LEASE_RENDER, 0, 0, 0}};
 	s->plan = (struct plan){.kind = i->kind,
@@ -103,7 +103,7 @@ void subject_make(struct subject *s, struct world *w, const char *integrator, co
 		s->plan.chains = CHAINS;
 		s->plan.epoch = 64;
 		s->seeds = bench_alloc(CHAINS, sizeof *s->seeds);
-		s->in = (struct lease_input){.chain_count = CHAINS, .seeds = s->seeds};
+		s->input = (struct lease_input){.chain_count = CHAINS, .seeds = s->seeds};
 		make_seeds(s);
 	}
 	uint64_t rays = subject_render(s), factor = RAYS_MAX / (rays + rays / 50 + 1);
@@ -151,32 +151,32 @@ static void add_triangles(RTCDevice device, RTCScene scene, const struct geom_sh
 	attach_geometry(scene, g);
 }
 
-static void make_raw_scene(const struct world *w, struct subject_scene *raw)
+static void make_embree_scene(const struct world *w, struct subject_embree *embree)
 {
-	raw->device = new_device();
-	raw->scene = new_scene(raw->device);
+	embree->device = new_device();
+	embree->scene = new_scene(embree->device);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
 		if (g->is_sphere)
-			add_sphere(raw->device, raw->scene, g->center, g->radius);
+			add_sphere(embree->device, embree->scene, g->center, g->radius);
 		else
-			add_triangles(raw->device, raw->scene, g);
+			add_triangles(embree->device, embree->scene, g);
 	}
-	rtcCommitScene(raw->scene);
+	rtcCommitScene(embree->scene);
 }
 
-double subject_build_raw(const struct world *w)
+double subject_build_embree(const struct world *w)
 {
-	struct subject_scene raw;
+	struct subject_embree embree;
 	double begin = bench_cpu_seconds();
-	make_raw_scene(w, &raw);
+	make_embree_scene(w, &embree);
 	double seconds = bench_cpu_seconds() - begin;
-	rtcReleaseScene(raw.scene);
-	rtcReleaseDevice(raw.device);
+	rtcReleaseScene(embree.scene);
+	rtcReleaseDevice(embree.device);
 	return seconds;
 }
 
-static struct RTCRayHit raw_ray(vec3 o, vec3 d, double t_min, double t_max)
+static struct RTCRayHit make_embree_ray(vec3 o, vec3 d, double t_min, double t_max)
 {
 	struct RTCRayHit h = {.ray = {.org_x = (float)o.x,
 				      .org_y = (float)o.y,
@@ -191,11 +191,11 @@ static struct RTCRayHit raw_ray(vec3 o, vec3 d, double t_min, double t_max)
 	return h;
 }
 
-static struct RTCRayHit raw_from_recorded(const struct recorded_ray *r)
+static struct RTCRayHit embree_ray_from_recorded(const struct recorded_ray *r)
 {
 	vec3 o = r->from.p, d = r->kind == RAY_SEGMENT ? vec3_sub(r->to.p, o) : r->d;
 	double start = 0x1p-20, reach = r->kind == RAY_SEGMENT ? 1 - 0x1p-16 : (double)FLT_MAX;
-	return raw_ray(o, d, fmax(r->t_min, start), r->kind == RAY_CLOSEST ? fmin(r->t_max, reach) : reach);
+	return make_embree_ray(o, d, fmax(r->t_min, start), r->kind == RAY_CLOSEST ? fmin(r->t_max, reach) : reach);
 }
 
 void subject_record(struct subject *s)
@@ -203,26 +203,26 @@ void subject_record(struct subject *s)
 	s->rays = bench_alloc(RAYS_MAX, sizeof *s->rays);
 	record_start(s->rays, RAYS_MAX);
 	subject_render(s);
-	s->count = record_stop();
-	s->raw = bench_alloc(1, sizeof *s->raw + s->count * sizeof s->raw->ray[0]);
-	make_raw_scene(s->w, s->raw);
-	for (size_t i = 0; i < s->count; i++)
-		s->raw->ray[i] = raw_from_recorded(&s->rays[i]);
+	s->ray_count = record_stop();
+	s->embree = bench_alloc(1, sizeof *s->embree + s->ray_count * sizeof s->embree->ray[0]);
+	make_embree_scene(s->w, s->embree);
+	for (size_t i = 0; i < s->ray_count; i++)
+		s->embree->ray[i] = embree_ray_from_recorded(&s->rays[i]);
 }
 
-double subject_replay_raw(const struct subject *s)
+double subject_replay_embree(const struct subject *s)
 {
 	embree_context context;
 	EMBREE_INIT_CONTEXT(&context);
 	size_t hits = 0;
 	double begin = bench_cpu_seconds();
-	for (size_t i = 0; i < s->count; i++) {
-		struct RTCRayHit h = s->raw->ray[i];
+	for (size_t i = 0; i < s->ray_count; i++) {
+		struct RTCRayHit h = s->embree->ray[i];
 		if (s->rays[i].kind == RAY_CLOSEST) {
-			embree_intersect(s->raw->scene, &context, &h);
+			embree_intersect(s->embree->scene, &context, &h);
 			hits += h.hit.geomID != RTC_INVALID_GEOMETRY_ID;
 		} else {
-			embree_occluded(s->raw->scene, &context, &h.ray);
+			embree_occluded(s->embree->scene, &context, &h.ray);
 			hits += h.ray.tfar < 0;
 		}
 	}
@@ -231,14 +231,14 @@ double subject_replay_raw(const struct subject *s)
 	return seconds;
 }
 
-double subject_replay_door(const struct subject *s)
+double subject_replay_accel(const struct subject *s)
 {
 	const struct accel *a = s->w->accel;
 	struct ray_hit hit;
 	size_t hits = 0;
 	double begin = bench_cpu_seconds();
 	bool watched = fptrap_watch();
-	for (size_t i = 0; i < s->count; i++) {
+	for (size_t i = 0; i < s->ray_count; i++) {
 		const struct recorded_ray *r = &s->rays[i];
 		if (r->kind == RAY_CLOSEST)
 			hits += accel_closest(a, &r->from, r->d, r->t_min, r->t_max, &hit);
@@ -253,27 +253,27 @@ double subject_replay_door(const struct subject *s)
 	return seconds;
 }
 
-void subject_release(struct subject *s)
+void subject_fini(struct subject *s)
 {
-	if (s->raw) {
-		rtcReleaseScene(s->raw->scene);
-		rtcReleaseDevice(s->raw->device);
+	if (s->embree) {
+		rtcReleaseScene(s->embree->scene);
+		rtcReleaseDevice(s->embree->device);
 	}
-	mem_free(s->raw);
+	mem_free(s->embree);
 	mem_free(s->rays);
 	mem_free(s->seeds);
 }
 
 /* The plane and the spheres of three-spheres.xml; rays start anywhere between them, in any direction. */
-struct small {
+struct small_scene {
 	RTCDevice device;
 	RTCScene scene;
 	struct RTCRayHit ray[1 << 16];
 };
 
-static struct small *make_small(void)
+static struct small_scene *make_small_scene(void)
 {
-	struct small *s = bench_alloc(1, sizeof *s);
+	struct small_scene *s = bench_alloc(1, sizeof *s);
 	s->device = new_device();
 	s->scene = new_scene(s->device);
 	static float corner[5][3] = {{-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}};
@@ -288,17 +288,17 @@ static struct small *make_small(void)
 		rng_uniform4(0, RNG_TEST, i, 0, 0, u);
 		rng_uniform4(0, RNG_TEST, i, 1, 0, v);
 		double z = 2 * v[0] - 1, r = sqrt(1 - z * z), phi = 2 * M_PI * v[1];
-		s->ray[i] = raw_ray((vec3){8 * u[0] - 4, 4 * u[1] - 2, 0.05 + 4 * u[2]},
-				    (vec3){r * cos(phi), r * sin(phi), z}, 0, (double)FLT_MAX);
+		s->ray[i] = make_embree_ray((vec3){8 * u[0] - 4, 4 * u[1] - 2, 0.05 + 4 * u[2]},
+					    (vec3){r * cos(phi), r * sin(phi), z}, 0, (double)FLT_MAX);
 	}
 	return s;
 }
 
 double subject_million_rays(void)
 {
-	static struct small *s;
+	static struct small_scene *s;
 	if (!s)
-		s = make_small();
+		s = make_small_scene();
 	embree_context context;
 	EMBREE_INIT_CONTEXT(&context);
 	size_t hits = 0;

@@ -8,16 +8,16 @@
 #include <stdlib.h>
 #include <time.h>
 
-typedef bool monitor(void *, double);
+typedef bool progress_function(void *, double);
 
-static monitor *told;
-static void *told_user;
+static progress_function *progress_monitor;
+static void *progress_user;
 
-void rtcSetSceneProgressMonitorFunction(void *scene, monitor *f, void *user)
+void rtcSetSceneProgressMonitorFunction(void *scene, progress_function *f, void *user)
 {
-	void (*next)(void *, monitor *, void *) = dlsym(RTLD_NEXT, "rtcSetSceneProgressMonitorFunction");
-	told = f;
-	told_user = user;
+	void (*next)(void *, progress_function *, void *) = dlsym(RTLD_NEXT, "rtcSetSceneProgressMonitorFunction");
+	progress_monitor = f;
+	progress_user = user;
 	next(scene, f, user);
 }
 
@@ -25,10 +25,10 @@ void rtcCommitScene(void *scene)
 {
 	void (*next)(void *) = dlsym(RTLD_NEXT, "rtcCommitScene");
 	fputs("building\n", stderr);
-	for (double left = atof(getenv("HSLT_BUILD")); left > 0; left -= 0.1) {
+	for (double remaining = atof(getenv("HSLT_BUILD")); remaining > 0; remaining -= 0.1) {
 		nanosleep(&(struct timespec){0, 100000000}, NULL);
-		if (told && getenv("HSLT_BUILD_TICKS"))
-			told(told_user, 0);
+		if (progress_monitor && getenv("HSLT_BUILD_TICKS"))
+			progress_monitor(progress_user, 0);
 	}
 	next(scene);
 }

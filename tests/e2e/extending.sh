@@ -33,7 +33,7 @@ cat >"$TREE/worker/render/bsdf/half.c" <<'TEXT'
 static spectrum half_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p;
-	return spectrum_of(wo.z > 0 && wi.z > 0 ? 0.5 / WARP_PI : 0);
+	return spectrum_constant(wo.z > 0 && wi.z > 0 ? 0.5 / WARP_PI : 0);
 }
 
 static double half_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -59,7 +59,7 @@ static int half_create(struct bsdf *b, const struct scene_node *n, const struct 
 	(void)n, (void)build, (void)e;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha_mean = 1;
+	b->mean_alpha = 1;
 	return 0;
 }
 

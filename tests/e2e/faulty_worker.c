@@ -29,11 +29,11 @@
 #include <unistd.h>
 
 int __real_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
-			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
-			struct error *e);
+			const struct lease_input *in, const atomic_bool *stop, enum lease_outcome *end,
+			struct batch *out, struct error *e);
 int __wrap_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
-			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
-			struct error *e);
+			const struct lease_input *in, const atomic_bool *stop, enum lease_outcome *end,
+			struct batch *out, struct error *e);
 int __real_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size,
 		      struct error *e);
 int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size,
@@ -43,12 +43,12 @@ void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
 
 enum fault { LIE, LARGE, SPOIL, REPEAT, CRASH, HANG, SLOW, FAULTS };
 
-static const char *const names[FAULTS] = {"lie", "large", "spoil", "repeat", "crash", "hang", "slow"};
-static unsigned long every[FAULTS]; /* 0: not this fault */
-static atomic_ulong begun;
-static _Thread_local unsigned long lease; /* of this thread, counted from 1 */
+static const char *const fault_names[FAULTS] = {"lie", "large", "spoil", "repeat", "crash", "hang", "slow"};
+static unsigned long fault_intervals[FAULTS]; /* 0: not this fault */
+static atomic_ulong leases_begun;
+static _Thread_local unsigned long lease_number; /* of this thread, counted from 1 */
 
-static void usage(const char *wrong)
+static void exit_with_usage(const char *wrong)
 {
 	fprintf(stderr,
 		"faulty_worker: HSLT_FAULTS: '%s' is none of lie=N large=N spoil=N repeat crash=N hang=N slow=N\n",
@@ -62,13 +62,14 @@ static void read_fault(const char *text)
 	size_t length = equals ? (size_t)(equals - text) : strlen(text);
 	char *end = NULL;
 	for (int i = 0; i < FAULTS; i++) {
-		if (strlen(names[i]) != length || strncmp(names[i], text, length) != 0 || !equals != (i == REPEAT))
+		if (strlen(fault_names[i]) != length || strncmp(fault_names[i], text, length) != 0 ||
+		    !equals != (i == REPEAT))
 			continue;
-		every[i] = equals ? strtoul(equals + 1, &end, 10) : 1;
-		if (every[i] && (!end || !*end))
+		fault_intervals[i] = equals ? strtoul(equals + 1, &end, 10) : 1;
+		if (fault_intervals[i] && (!end || !*end))
 			return;
 	}
-	usage(text);
+	exit_with_usage(text);
 }
 
 /* Runs before main, which reads the options of hslt-worker. */
@@ -77,36 +78,37 @@ __attribute__((constructor)) static void read_faults(void)
 	const char *list = getenv("HSLT_FAULTS");
 	char text[256];
 	if (!list || !*list || strlen(list) >= sizeof text)
-		usage(list ? list : "");
+		exit_with_usage(list ? list : "");
 	memcpy(text, list, strlen(list) + 1);
-	for (char *rest = text, *one; (one = strsep(&rest, ","));)
-		read_fault(one);
+	for (char *rest = text, *item; (item = strsep(&rest, ","));)
+		read_fault(item);
 }
 
 static bool is_due(enum fault f)
 {
-	return every[f] && (lease - 1) % every[f] == 0;
+	return fault_intervals[f] && (lease_number - 1) % fault_intervals[f] == 0;
 }
 
-static void sleep_unless_stopped(double seconds, const atomic_bool *stop)
+static void sleep_until_stopped(double seconds, const atomic_bool *stop)
 {
-	for (double until = clock_seconds() + seconds; clock_seconds() < until && !atomic_load(stop); liveness_tick())
+	for (double deadline = clock_seconds() + seconds; clock_seconds() < deadline && !atomic_load(stop);
+	     liveness_tick())
 		usleep(1000);
 }
 
 int __wrap_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
-			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
-			struct error *e)
+			const struct lease_input *in, const atomic_bool *stop, enum lease_outcome *end,
+			struct batch *out, struct error *e)
 {
-	lease = atomic_fetch_add(&begun, 1) + 1;
-	if (lease == every[CRASH])
+	lease_number = atomic_fetch_add(&leases_begun, 1) + 1;
+	if (lease_number == fault_intervals[CRASH])
 		raise(SIGSEGV);
-	while (lease == every[HANG])
+	while (lease_number == fault_intervals[HANG])
 		pause();
 	double start = clock_seconds();
 	int result = __real_render_lease(w, p, k, in, stop, end, out, e);
-	if (every[SLOW])
-		sleep_unless_stopped((double)(every[SLOW] - 1) * (clock_seconds() - start), stop);
+	if (fault_intervals[SLOW])
+		sleep_until_stopped((double)(fault_intervals[SLOW] - 1) * (clock_seconds() - start), stop);
 	return result;
 }
 
@@ -116,7 +118,7 @@ static float *first_value(const struct batch *b)
 }
 
 /* Flips the last bit of one number: the smallest possible error. */
-static void flip_a_bit(const struct batch *b)
+static void flip_lowest_bit(const struct batch *b)
 {
 	float *x = first_value(b);
 	uint32_t bits;
@@ -140,25 +142,25 @@ enum damage { FLIP_BITS, WRITE_NUMBERS, WRITE_NOISE, CUT_OFF, ALL_NOISE };
 /* Damages a state after its id, so that it still looks like that chain's. CUT_OFF and ALL_NOISE give no valid state of
  * any plan; the other kinds may give a valid state that is not the chain's, since in primary sample space a flipped bit
  * of a random number mostly gives another random number. */
-static void damage_state(struct chain_state *s, enum damage how, uint64_t *random)
+static void damage_state(struct chain_state *s, enum damage kind, uint64_t *random)
 {
-	enum { ID = 8, TIMES = 8 };
+	enum { ID_BYTES = 8, CHANGES = 8 };
 	static const double numbers[] = {NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-310, -0.0};
-	uint64_t left = s->size - ID;
-	for (int i = 0; i < TIMES; i++) {
-		uint8_t *at = s->bytes + ID + splitmix(random) % left;
-		if (how == FLIP_BITS)
-			*at ^= (uint8_t)(1u << splitmix(random) % 8);
-		else if (how == WRITE_NUMBERS)
-			memcpy(s->bytes + ID + splitmix(random) % (left / 8) * 8, &numbers[splitmix(random) % 8],
-			       sizeof *numbers);
-		else if (how == WRITE_NOISE)
-			*at = (uint8_t)splitmix(random);
+	uint64_t body_size = s->size - ID_BYTES;
+	for (int i = 0; i < CHANGES; i++) {
+		uint8_t *byte = s->bytes + ID_BYTES + splitmix(random) % body_size;
+		if (kind == FLIP_BITS)
+			*byte ^= (uint8_t)(1u << splitmix(random) % 8);
+		else if (kind == WRITE_NUMBERS)
+			memcpy(s->bytes + ID_BYTES + splitmix(random) % (body_size / 8) * 8,
+			       &numbers[splitmix(random) % 8], sizeof *numbers);
+		else if (kind == WRITE_NOISE)
+			*byte = (uint8_t)splitmix(random);
 	}
-	for (uint64_t i = 0; how == ALL_NOISE && i < left; i++)
-		s->bytes[ID + i] = (uint8_t)splitmix(random);
-	if (how == CUT_OFF)
-		s->size -= (uint32_t)(1 + splitmix(random) % (left - 1));
+	for (uint64_t i = 0; kind == ALL_NOISE && i < body_size; i++)
+		s->bytes[ID_BYTES + i] = (uint8_t)splitmix(random);
+	if (kind == CUT_OFF)
+		s->size -= (uint32_t)(1 + splitmix(random) % (body_size - 1));
 }
 
 /* The first state certainly becomes invalid, so that the worker which resumes it must notice. */
@@ -174,18 +176,18 @@ static void damage_states(const struct batch *b, uint64_t random)
 int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
 {
 	if (is_due(LIE))
-		flip_a_bit(b);
+		flip_lowest_bit(b);
 	if (is_due(LARGE) && first_value(b))
 		*first_value(b) = 1e30f;
 	if (is_due(SPOIL))
-		damage_states(b, lease);
+		damage_states(b, lease_number);
 	return __real_batch_pack(b, p, frame, size, e);
 }
 
 /* The worker sends only its results through this function. */
 void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
 {
-	unsigned char *copy = every[REPEAT] ? mem_alloc(size, 1) : NULL;
+	unsigned char *copy = fault_intervals[REPEAT] ? mem_alloc(size, 1) : NULL;
 	if (copy)
 		__real_conn_send_frame(c, memcpy(copy, frame, size), size);
 	__real_conn_send_frame(c, frame, size);

@@ -5,7 +5,7 @@
  */
 #include "common/base/mem.h"
 #include "common/net/client.h"
-#include "tests/fuzz/farm.h"
+#include "tests/fuzz/farm_world.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
 #include "tests/support/checksummed_frame.h"
@@ -19,7 +19,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum want { LIST, SUBMIT, WAIT, FETCH, FETCH_FILE, WANTS };
+enum request_kind { LIST, SUBMIT, WAIT, FETCH, FETCH_FILE, REQUEST_KINDS };
 enum { SPEAKERS = 1 };
 
 static struct {
@@ -27,8 +27,8 @@ static struct {
 	char address[32], file[128];
 	const struct step *steps;
 	size_t count;
-	bool hello;
-} now;
+	bool sends_hello;
+} client_state;
 
 /* ---- the coordinator, on a thread of its own ---- */
 
@@ -40,7 +40,7 @@ static void send_bytes(int fd, const void *bytes, size_t size)
 		n = send(fd, at, size, MSG_NOSIGNAL);
 }
 
-static void say_hello_ack(int fd)
+static void send_hello_ack(int fd)
 {
 	Farm__HelloAck ack;
 	Farm__Envelope m;
@@ -63,14 +63,15 @@ static void *run_server(void *user)
 {
 	char bytes[4096];
 	(void)user;
-	int fd = accept(now.listener, NULL, NULL);
-	if (now.hello)
-		say_hello_ack(fd);
-	for (size_t i = 0; i < now.count; i++) {
-		const struct step *s = &now.steps[i];
+	int fd = accept(client_state.listener, NULL, NULL);
+	if (client_state.sends_hello)
+		send_hello_ack(fd);
+	for (size_t i = 0; i < client_state.count; i++) {
+		const struct step *s = &client_state.steps[i];
 		size_t size;
-		unsigned char *checked = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size,
-							   i == 0 && !now.hello, &size);
+		unsigned char *checked =
+			checksummed_frame_from_parts(s->header, s->header_size, s->payload, s->payload_size,
+						     i == 0 && !client_state.sends_hello, &size);
 		send_bytes(fd, checked, size);
 		free(checked);
 	}
@@ -85,17 +86,17 @@ static void start_listening(void)
 {
 	struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	socklen_t size = sizeof a;
-	now.listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-	if (bind(now.listener, (struct sockaddr *)&a, size) || listen(now.listener, 8) ||
-	    getsockname(now.listener, (struct sockaddr *)&a, &size))
+	client_state.listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	if (bind(client_state.listener, (struct sockaddr *)&a, size) || listen(client_state.listener, 8) ||
+	    getsockname(client_state.listener, (struct sockaddr *)&a, &size))
 		abort();
-	snprintf(now.address, sizeof now.address, "127.0.0.1:%u", ntohs(a.sin_port));
-	snprintf(now.file, sizeof now.file, "%s/fetched", folders_base());
+	snprintf(client_state.address, sizeof client_state.address, "127.0.0.1:%u", ntohs(a.sin_port));
+	snprintf(client_state.file, sizeof client_state.file, "%s/fetched", folders_base());
 }
 
 /* ---- the client ---- */
 
-static void list(struct client *cl)
+static void request_list(struct client *cl)
 {
 	Farm__JobList question;
 	Farm__Envelope m;
@@ -109,38 +110,38 @@ static void list(struct client *cl)
 		client_message_fini(&answer);
 }
 
-static void submit(struct client *cl)
+static void request_submit(struct client *cl)
 {
 	static char folder_name[] = "/dev/null", name[] = "s.xml";
-	struct scene_file file = {.name = name, .size = strlen(farm_scene)};
+	struct scene_file file = {.name = name, .size = strlen(farm_world_scene)};
 	struct scene_files b = {.folder = folder_name,
-				.folders = asset_folders_of(folder_name, NULL, 0),
+				.folders = asset_folders_make(folder_name, NULL, 0),
 				.scene = name,
-				.count = 1,
-				.list = &file};
+				.file_count = 1,
+				.files = &file};
 	struct render_arguments args = {0};
 	struct submit_request r = {.name = "n", .output = "", .args = &args};
-	char text[PLAN_TEXT];
-	struct submitted job;
+	char text[PLAN_TEXT_MAX];
+	struct submitted_job job;
 	struct error e;
-	blob_hash_bytes(farm_scene, strlen(farm_scene), &file.hash, &e);
+	blob_hash_bytes(farm_world_scene, strlen(farm_world_scene), &file.hash, &e);
 	submit_send(cl, &r, &b, &job, text, sizeof text, &e);
 }
 
-static void make_request(struct client *cl, enum want w)
+static void make_request(struct client *cl, enum request_kind w)
 {
 	struct error e;
-	struct submit_end end;
+	struct submit_outcome end;
 	int fd;
 	switch (w) {
 	case LIST:
-		list(cl);
+		request_list(cl);
 		break;
 	case SUBMIT:
-		submit(cl);
+		request_submit(cl);
 		break;
 	case WAIT:
-		submit_wait(cl, &(struct submitted){.job = 1}, &end, &e);
+		submit_wait(cl, &(struct submitted_job){.job = 1}, &end, &e);
 		break;
 	case FETCH:
 		fd = open("/dev/null", O_WRONLY | O_CLOEXEC);
@@ -148,7 +149,7 @@ static void make_request(struct client *cl, enum want w)
 		close(fd);
 		break;
 	default:
-		client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, now.file, &e);
+		client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, client_state.file, &e);
 	}
 }
 
@@ -160,39 +161,39 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	struct error e;
 	if (!size)
 		return 0;
-	if (!now.listener)
+	if (!client_state.listener)
 		start_listening();
-	now.count = script_read(bytes + 1, size - 1, steps);
-	now.steps = steps;
-	now.hello = *bytes / WANTS % 8 != 0;
+	client_state.count = script_read(bytes + 1, size - 1, steps);
+	client_state.steps = steps;
+	client_state.sends_hello = *bytes / REQUEST_KINDS % 8 != 0;
 	if (pthread_create(&thread, NULL, run_server, NULL))
 		abort();
-	if (client_open(&cl, now.address, NULL, false, "n", &e) == 0) {
-		make_request(cl, *bytes % WANTS);
+	if (client_open(&cl, client_state.address, NULL, false, "n", &e) == 0) {
+		make_request(cl, *bytes % REQUEST_KINDS);
 		client_close(cl);
 	}
 	pthread_join(thread, NULL);
 	return 0;
 }
 
-size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t max_size, unsigned seed)
 {
 	if (size < 2 || seed % 64 == 0)
-		return LLVMFuzzerMutate(bytes, size, room);
-	return 1 + script_mutate(bytes + 1, size - 1, room - 1, seed, SPEAKERS);
+		return LLVMFuzzerMutate(bytes, size, max_size);
+	return 1 + script_mutate(bytes + 1, size - 1, max_size - 1, seed, SPEAKERS);
 }
 
 /* ---- seeds ---- */
 
-static void end(struct seed *s, enum want w, uint64_t number)
+static void end_seed(struct seed *s, enum request_kind w, uint64_t number)
 {
 	memmove(s->bytes + 1, s->bytes, s->size);
-	s->bytes[0] = (uint8_t)(WANTS + w);
+	s->bytes[0] = (uint8_t)(REQUEST_KINDS + w);
 	s->size++;
-	seed_end(s, "want", number);
+	seed_write(s, "want", number);
 }
 
-static void write_jobs(void)
+static void write_job_seeds(void)
 {
 	struct seed s = {0};
 	char state[] = "running", none[] = "", mixture[] = "n";
@@ -213,14 +214,14 @@ static void write_jobs(void)
 	answer.n_jobs = 1;
 	answer.jobs = jobs;
 	SEED_SAY(&s, 0, JOB_LIST_ANSWER, job_list_answer, &answer);
-	end(&s, LIST, 0);
+	end_seed(&s, LIST, 0);
 	SEED_SAY(&s, 0, JOB_STATUS, job_status, &status);
 	status.ended = true;
 	SEED_SAY(&s, 0, JOB_STATUS, job_status, &status);
-	end(&s, WAIT, 1);
+	end_seed(&s, WAIT, 1);
 }
 
-static void write_answers(void)
+static void write_answer_seeds(void)
 {
 	struct seed s = {0};
 	struct blob_hash hash;
@@ -228,15 +229,15 @@ static void write_answers(void)
 	ProtobufCBinaryData missing[1] = {{BLOB_HASH_SIZE, hash.bytes}};
 	Farm__SubmitAnswer answer;
 	farm__submit_answer__init(&answer);
-	blob_hash_bytes(farm_scene, strlen(farm_scene), &hash, &e);
+	blob_hash_bytes(farm_world_scene, strlen(farm_world_scene), &hash, &e);
 	answer.n_missing = 1;
 	answer.missing = missing;
 	SEED_SAY(&s, 0, SUBMIT_ANSWER, submit_answer, &answer);
 	answer.n_missing = 0;
 	answer.job = 1;
 	SEED_SAY(&s, 0, SUBMIT_ANSWER, submit_answer, &answer);
-	end(&s, SUBMIT, 2);
-	for (enum want w = FETCH; w <= FETCH_FILE; w++) {
+	end_seed(&s, SUBMIT, 2);
+	for (enum request_kind w = FETCH; w <= FETCH_FILE; w++) {
 		Farm__FetchChunk chunk;
 		Farm__Envelope m;
 		farm__fetch_chunk__init(&chunk);
@@ -245,10 +246,10 @@ static void write_answers(void)
 		chunk.size = 8;
 		m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 		m.fetch_chunk = &chunk;
-		seed_say(&s, 0, &m, "abcde", 5);
+		seed_add_message(&s, 0, &m, "abcde", 5);
 		chunk.offset = 5;
-		seed_say(&s, 0, &m, "fgh", 3);
-		end(&s, w, (uint64_t)w);
+		seed_add_message(&s, 0, &m, "fgh", 3);
+		end_seed(&s, w, (uint64_t)w);
 	}
 }
 
@@ -256,9 +257,9 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
 	(void)argc;
 	(void)argv;
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
-	write_jobs();
-	write_answers();
+	write_job_seeds();
+	write_answer_seeds();
 	exit(0);
 }

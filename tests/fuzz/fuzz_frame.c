@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void take_message(const struct frame_reader *r)
+static void exercise_message(const struct frame_reader *r)
 {
 	struct envelope env;
 	struct error e;
@@ -48,43 +48,45 @@ static void take_message(const struct frame_reader *r)
 	envelope_fini(&env);
 }
 
-static void read_all(const uint8_t *bytes, size_t size)
+static void read_frames(const uint8_t *bytes, size_t size)
 {
 	struct frame_reader r;
 	struct error e;
 	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 20});
-	for (size_t at = 0, used; at < size; at += used) {
-		size_t piece = 1 + (at * 2654435761u >> 7) % 4096;
-		int rc = frame_reader_take(&r, bytes + at, piece < size - at ? piece : size - at, &used, &e);
+	for (size_t offset = 0, used; offset < size; offset += used) {
+		size_t piece = 1 + (offset * 2654435761u >> 7) % 4096;
+		int rc =
+			frame_reader_feed(&r, bytes + offset, piece < size - offset ? piece : size - offset, &used, &e);
 		if (rc < 0)
 			break;
 		if (rc)
-			take_message(&r);
+			exercise_message(&r);
 	}
 	frame_reader_fini(&r);
 }
 
 /* Returns the frames of an input with correct checksums, so that the code behind the check is reached. The caller frees
  * it. */
-static uint8_t *check_all(const uint8_t *bytes, size_t size, size_t *out_size)
+static uint8_t *add_checksums(const uint8_t *bytes, size_t size, size_t *out_size)
 {
 	uint8_t *all = NULL;
 	*out_size = 0;
-	for (size_t at = 0; size - at >= FRAME_PREFIX;) {
+	for (size_t offset = 0; size - offset >= FRAME_PREFIX_SIZE;) {
 		uint32_t header, payload;
 		size_t n;
-		frame_prefix_read(bytes + at, &header, &payload);
-		at += FRAME_PREFIX;
-		header = header < size - at ? header : (uint32_t)(size - at);
-		payload = payload < size - at - header ? payload : (uint32_t)(size - at - header);
-		uint8_t *frame = checksummed_parts(bytes + at, header, bytes + at + header, payload, !all, &n);
+		frame_prefix_read(bytes + offset, &header, &payload);
+		offset += FRAME_PREFIX_SIZE;
+		header = header < size - offset ? header : (uint32_t)(size - offset);
+		payload = payload < size - offset - header ? payload : (uint32_t)(size - offset - header);
+		uint8_t *frame = checksummed_frame_from_parts(bytes + offset, header, bytes + offset + header, payload,
+							      !all, &n);
 		all = realloc(all, *out_size + n);
 		if (!all)
 			abort();
 		memcpy(all + *out_size, frame, n);
 		*out_size += n;
 		free(frame);
-		at += header + payload;
+		offset += header + payload;
 	}
 	return all;
 }
@@ -92,9 +94,9 @@ static uint8_t *check_all(const uint8_t *bytes, size_t size, size_t *out_size)
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	size_t out_size;
-	uint8_t *checked = check_all(bytes, size, &out_size);
-	read_all(checked, out_size);
+	uint8_t *checked = add_checksums(bytes, size, &out_size);
+	read_frames(checked, out_size);
 	free(checked);
-	read_all(bytes, size); /* with the input's own checksums, which are hardly ever right */
+	read_frames(bytes, size); /* with the input's own checksums, which are hardly ever right */
 	return 0;
 }

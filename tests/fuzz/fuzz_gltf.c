@@ -17,7 +17,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	static struct gltf_files f;
 	static unsigned char bytes[1 + sizeof f.file];
 	(void)argc, (void)argv;
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
 	for (int i = 0; i < 2 * GLTF_FORMS; i++) {
 		enum gltf_form form = (enum gltf_form)(i % GLTF_FORMS);
@@ -27,7 +27,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		gltf_files_pack(&f, form);
 		bytes[0] = (unsigned char)(form == GLTF_BINARY);
 		memcpy(bytes + 1, f.file, f.file_size);
-		seed_file("gltf", (uint64_t)i, bytes, 1 + f.file_size);
+		seed_write_file("gltf", (uint64_t)i, bytes, 1 + f.file_size);
 	}
 	exit(0);
 }

@@ -18,17 +18,17 @@ static void write_seed(uint8_t type, uint64_t number, const struct mesh_file *f)
 	static unsigned char bytes[1 + sizeof f->bytes];
 	bytes[0] = type;
 	memcpy(bytes + 1, f->bytes, f->size);
-	seed_file("mesh", number, bytes, 1 + f->size);
+	seed_write_file("mesh", number, bytes, 1 + f->size);
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
 	(void)argc, (void)argv;
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
 	static struct mesh_file f;
 	for (enum ply_kind k = 0; k < PLY_KINDS; k++) {
-		mesh_file_ply(&f, k);
+		mesh_file_make_ply(&f, k);
 		write_seed(1, k, &f);
 	}
 	static const char attributes[] =
@@ -39,7 +39,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	memcpy(f.bytes, attributes, f.size = sizeof attributes - 1);
 	write_seed(1, 20, &f);
 	for (int version = 3; version <= 5; version++) {
-		mesh_file_serialized(&f, version, version == 4, 11, 2);
+		mesh_file_make_serialized(&f, version, version == 4, 11, 2);
 		write_seed(2, 10 + (uint64_t)version, &f);
 	}
 	static const char curves[] =
@@ -79,7 +79,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	struct shape_geometry g;
 	uint64_t dropped;
 	if (!shape_build(scene.objects[0], &assets, &arena, &g, &dropped, &e) && g.kind == SHAPE_CURVE)
-		shape_curve_mesh(&g, scene.objects[0], &arena, &dropped, &e);
+		shape_curves_to_mesh(&g, scene.objects[0], &arena, &dropped, &e);
 	arena_fini(&arena);
 	scene_fini(&scene);
 	return 0;

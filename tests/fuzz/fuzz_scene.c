@@ -11,27 +11,27 @@
 
 #include <string.h>
 
-enum { LEVEL_MOST = 3, SIDE = 32 };
+enum { LEVEL_MAX = 3, SIDE = 32 };
 
 struct input {
 	const uint8_t *scene, *mesh, *picture;
 	size_t scene_size, mesh_size, picture_size;
 };
 
-static struct input cut_input(const uint8_t *bytes, size_t size)
+static struct input split_input(const uint8_t *bytes, size_t size)
 {
 	const uint8_t *zero = size ? memchr(bytes, 0, size) : NULL;
 	struct input in = {
 		.scene = bytes, .scene_size = zero ? (size_t)(zero - bytes) : size, .mesh = bytes, .picture = bytes};
-	size_t left = size - in.scene_size;
-	if (left < 3)
+	size_t remaining = size - in.scene_size;
+	if (remaining < 3)
 		return in;
 	in.mesh = zero + 3;
-	left -= 3;
+	remaining -= 3;
 	in.mesh_size = (size_t)zero[1] << 8 | zero[2];
-	in.mesh_size = in.mesh_size < left ? in.mesh_size : left;
+	in.mesh_size = in.mesh_size < remaining ? in.mesh_size : remaining;
 	in.picture = in.mesh + in.mesh_size;
-	in.picture_size = left - in.mesh_size;
+	in.picture_size = remaining - in.mesh_size;
 	return in;
 }
 
@@ -51,14 +51,14 @@ static void build_shapes(const struct scene *s, const struct asset_source *asset
 static bool is_moderate(const struct scene *s)
 {
 	for (uint32_t i = 0; i < s->object_count; i++)
-		if (node_int(s->objects[i], "displacement_level", 0) > LEVEL_MOST)
+		if (node_int(s->objects[i], "displacement_level", 0) > LEVEL_MAX)
 			return false;
 	return true;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	struct input in = cut_input(bytes, size);
+	struct input in = split_input(bytes, size);
 	const struct memory_file files[] = {{"s.xml", in.scene, in.scene_size},
 					    {"i.xml", in.scene, in.scene_size},
 					    {"m.obj", in.mesh, in.mesh_size},

@@ -10,7 +10,7 @@
 #include "coordinator/store/journal.h"
 #include "coordinator/store/ledger.h"
 #include "proto/stored.pb-c.h"
-#include "tests/fuzz/farm.h"
+#include "tests/fuzz/farm_world.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
 
@@ -19,7 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum what {
+enum damage_kind {
 	RECORD,
 	JOURNAL,
 	JOURNAL_CHANGED,
@@ -30,16 +30,16 @@ enum what {
 	SUBMISSION,
 	ASIDE,
 	OLD_ROW,
-	WHATS
+	DAMAGE_KINDS
 };
-enum { EDIT = 4, EDITS_MOST = 32, SEED_MOST = 16000, FILE_MOST = 1 << 20 };
+enum { EDIT_BYTES = 4, EDITS_MAX = 32, SEED_BYTES_MAX = 16000, FILE_BYTES_MAX = 1 << 20 };
 
-static uint8_t file[FILE_MOST];
+static uint8_t file_bytes[FILE_BYTES_MAX];
 
-static size_t load(const char *path)
+static size_t load_file(const char *path)
 {
 	FILE *f = fopen(path, "rb");
-	size_t n = f ? fread(file, 1, sizeof file, f) : 0;
+	size_t n = f ? fread(file_bytes, 1, sizeof file_bytes, f) : 0;
 	if (f)
 		fclose(f);
 	return n;
@@ -52,7 +52,7 @@ static void write_file(const char *path, const void *bytes, size_t size)
 		abort();
 }
 
-static void path_in(const char *spool, const char *name, char path[512])
+static void make_spool_path(const char *spool, const char *name, char path[512])
 {
 	snprintf(path, 512, "%s/%s", spool, name);
 }
@@ -60,13 +60,13 @@ static void path_in(const char *spool, const char *name, char path[512])
 /* The path of the journal of the job in its bootstrap, which has no checkpoint yet. */
 static void journal_path(const char *spool, char path[512])
 {
-	snprintf(path, 512, "%s/jobs/j%d/journal.0", spool, FARM_BOOTSTRAP);
+	snprintf(path, 512, "%s/jobs/j%d/journal.0", spool, FARM_JOB_BOOTSTRAP);
 }
 
 /* Each edit: u24 BE position, one byte to xor. */
 static void apply_edits(const uint8_t *edits, size_t size, uint8_t *bytes, size_t count)
 {
-	for (size_t i = 0; i + EDIT <= size && i < EDIT * EDITS_MOST && count; i += EDIT) {
+	for (size_t i = 0; i + EDIT_BYTES <= size && i < EDIT_BYTES * EDITS_MAX && count; i += EDIT_BYTES) {
 		size_t at = (size_t)edits[i] << 16 | (size_t)edits[i + 1] << 8 | edits[i + 2];
 		bytes[at % count] ^= edits[i + 3];
 	}
@@ -74,9 +74,9 @@ static void apply_edits(const uint8_t *edits, size_t size, uint8_t *bytes, size_
 
 static void change_file(const char *path, const uint8_t *edits, size_t size)
 {
-	size_t n = load(path);
-	apply_edits(edits, size, file, n);
-	write_file(path, file, n);
+	size_t n = load_file(path);
+	apply_edits(edits, size, file_bytes, n);
+	write_file(path, file_bytes, n);
 }
 
 static void write_checked(const char *path, const void *bytes, size_t size)
@@ -97,8 +97,8 @@ static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 	struct error e;
 	journal_path(spool, path);
 	unlink(path);
-	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_BOOTSTRAP);
-	if (journal_create(&j, folder, FARM_BOOTSTRAP, 0, &e))
+	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_JOB_BOOTSTRAP);
+	if (journal_create(&j, folder, FARM_JOB_BOOTSTRAP, 0, &e))
 		abort();
 	while (size > 3) {
 		size_t n = (size_t)bytes[1] << 8 | bytes[2];
@@ -138,21 +138,21 @@ static void write_submission(const char *spool, const uint8_t *bytes, size_t siz
 	ledger_close(l);
 }
 
-static void damage(const char *spool, enum what what, const uint8_t *bytes, size_t size)
+static void damage_spool(const char *spool, enum damage_kind kind, const uint8_t *bytes, size_t size)
 {
 	char path[512];
 	size_t n;
-	switch (what) {
+	switch (kind) {
 	case RECORD: /* of a job that an earlier version finished */
-		path_in(spool, "jobs/j7", path);
+		make_spool_path(spool, "jobs/j7", path);
 		mkdir(path, 0777);
-		path_in(spool, "jobs/j7/job.json", path);
+		make_spool_path(spool, "jobs/j7/job.json", path);
 		write_file(path, bytes, size);
 		break;
 	case OLD_ROW:
-		path_in(spool, "jobs/j7", path);
+		make_spool_path(spool, "jobs/j7", path);
 		mkdir(path, 0777);
-		path_in(spool, "jobs/j7/order", path);
+		make_spool_path(spool, "jobs/j7/order", path);
 		write_checked(path, bytes, size);
 		break;
 	case JOURNAL:
@@ -167,23 +167,23 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		write_journal(spool, bytes, size);
 		break;
 	case CHECKPOINT_CHANGED:
-		path_in(spool, "jobs/j2/checkpoint", path);
-		n = load(path);
+		make_spool_path(spool, "jobs/j2/checkpoint", path);
+		n = load_file(path);
 		if (n < 4)
 			abort();
-		apply_edits(bytes, size, file, n - 4);
-		write_checked(path, file, n - 4);
+		apply_edits(bytes, size, file_bytes, n - 4);
+		write_checked(path, file_bytes, n - 4);
 		break;
 	case CHECKPOINT_BODY:
-		path_in(spool, "jobs/j2/checkpoint", path);
+		make_spool_path(spool, "jobs/j2/checkpoint", path);
 		write_checked(path, bytes, size);
 		break;
 	case DATABASE_CHANGED:
-		path_in(spool, "jobs.db", path);
+		make_spool_path(spool, "jobs.db", path);
 		change_file(path, bytes, size);
 		break;
 	case ASIDE:
-		path_in(spool, "aside", path);
+		make_spool_path(spool, "aside", path);
 		write_file(path, bytes, size);
 		break;
 	default:
@@ -199,21 +199,21 @@ static void send_requests(struct farm_world *w)
 	farm__job_list__init(&list);
 	farm__lease_request__init(&request);
 	farm__envelope__init(&m);
-	farm_call(w, 0, false);
-	farm_hello(w, 0, FARM__ROLE__ROLE_CLIENT);
+	farm_world_connect(w, 0, false);
+	farm_world_send_hello(w, 0, FARM__ROLE__ROLE_CLIENT);
 	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST;
 	m.job_list = &list;
-	farm_say_message(w, 0, &m, NULL, 0);
-	farm_call(w, 1, false);
-	farm_hello(w, 1, FARM__ROLE__ROLE_WORKER);
+	farm_world_send_message(w, 0, &m, NULL, 0);
+	farm_world_connect(w, 1, false);
+	farm_world_send_hello(w, 1, FARM__ROLE__ROLE_WORKER);
 	request.want = 20;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
 	m.lease_request = &request;
-	farm_say_message(w, 1, &m, NULL, 0);
-	farm_turn(w);
+	farm_world_send_message(w, 1, &m, NULL, 0);
+	farm_world_run_once(w);
 	if (w->peers[0].fd < 0)
 		abort();
-	farm_settle(w);
+	farm_world_settle(w);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
@@ -223,8 +223,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	if (!size)
 		return 0;
 	snprintf(w.spool, sizeof w.spool, "%s/damaged", folders_base());
-	farm_spool_copy(w.spool);
-	damage(w.spool, (enum what)(*bytes % WHATS), bytes + 1, size - 1);
+	farm_world_copy_spool(w.spool);
+	damage_spool(w.spool, (enum damage_kind)(*bytes % DAMAGE_KINDS), bytes + 1, size - 1);
 	if (farm_world_open(&w, &e) == 0) {
 		send_requests(&w);
 		farm_world_close(&w);
@@ -235,36 +235,36 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 
 /* ---- seeds ---- */
 
-static uint8_t seed[FILE_MOST];
+static uint8_t seed_bytes[FILE_BYTES_MAX];
 
-static void write_seed(enum what what, size_t size)
+static void write_seed(enum damage_kind kind, size_t size)
 {
-	seed[0] = (uint8_t)what;
-	seed_file("spool", what, seed, size + 1);
+	seed_bytes[0] = (uint8_t)kind;
+	seed_write_file("spool", kind, seed_bytes, size + 1);
 }
 
-static size_t seeded;
+static size_t seed_size;
 
 static int add_record(void *user, const struct journal_item *item, struct error *e)
 {
-	size_t size = item->size;
+	size_t size = item->body_size;
 	(void)user;
 	(void)e;
-	if (item->missing || size > 0xffff || seeded + 3 + size > sizeof seed - 1)
+	if (item->damaged_count || size > 0xffff || seed_size + 3 + size > sizeof seed_bytes - 1)
 		return 0;
-	uint8_t *at = seed + 1 + seeded;
+	uint8_t *at = seed_bytes + 1 + seed_size;
 	at[0] = (uint8_t)item->kind;
 	at[1] = (uint8_t)(size >> 8);
 	at[2] = (uint8_t)size;
 	memcpy(at + 3, item->body, size);
-	seeded += 3 + size;
+	seed_size += 3 + size;
 	return 0;
 }
 
-static size_t take_file(const char *path)
+static size_t copy_file_to_seed(const char *path)
 {
-	size_t n = load(path);
-	memcpy(seed + 1, file, n);
+	size_t n = load_file(path);
+	memcpy(seed_bytes + 1, file_bytes, n);
 	return n;
 }
 
@@ -277,19 +277,19 @@ static void write_old_seeds(const struct ledger_job *job)
 	struct error e;
 	stored__row__init(&m);
 	m.id = 7;
-	m.submission = (ProtobufCBinaryData){job->submission_size, file};
-	m.plan = (ProtobufCBinaryData){job->plan_size, file + job->submission_size};
-	memcpy(file, job->submission, job->submission_size);
-	memcpy(file + job->submission_size, job->plan, job->plan_size);
-	memcpy(seed + 1, "hsltO003", 8);
-	write_seed(OLD_ROW, 8 + stored__row__pack(&m, seed + 9));
+	m.submission = (ProtobufCBinaryData){job->submission_size, file_bytes};
+	m.plan = (ProtobufCBinaryData){job->plan_size, file_bytes + job->submission_size};
+	memcpy(file_bytes, job->submission, job->submission_size);
+	memcpy(file_bytes + job->submission_size, job->plan, job->plan_size);
+	memcpy(seed_bytes + 1, "hsltO003", 8);
+	write_seed(OLD_ROW, 8 + stored__row__pack(&m, seed_bytes + 9));
 	if (!r)
 		abort();
-	record_begin(r, 7, "n", "");
+	record_init(r, 7, "n", "");
 	strcpy(r->state, "done");
 	if (record_to_json(r, &text, &e))
 		abort();
-	memcpy(seed + 1, text, strlen(text));
+	memcpy(seed_bytes + 1, text, strlen(text));
 	write_seed(RECORD, strlen(text));
 	mem_free(text);
 	mem_free(r);
@@ -299,38 +299,38 @@ static void write_seeds(const char *spool)
 {
 	static const char aside[] =
 		"{\"schema\":1,\"workers\":[{\"certificate\":\"\",\"name\":\"w1-0\",\"home\":\"h\",\"restarts\":2,\"why\":\"x\"}]}";
-	memcpy(seed + 1, aside, sizeof aside - 1);
+	memcpy(seed_bytes + 1, aside, sizeof aside - 1);
 	write_seed(ASIDE, sizeof aside - 1);
 	char path[512], folder[512];
 	struct journal *j;
 	struct ledger *l;
 	struct ledger_job job;
 	struct error e;
-	struct journal_found found;
-	path_in(spool, "jobs/j2/checkpoint", path);
-	size_t n = take_file(path);
+	struct journal_damage found;
+	make_spool_path(spool, "jobs/j2/checkpoint", path);
+	size_t n = copy_file_to_seed(path);
 	if (n < 4)
 		abort(); /* the world has no checkpoint */
-	write_seed(CHECKPOINT_BODY, n - 4 < SEED_MOST ? n - 4 : SEED_MOST);
+	write_seed(CHECKPOINT_BODY, n - 4 < SEED_BYTES_MAX ? n - 4 : SEED_BYTES_MAX);
 	journal_path(spool, path);
-	write_seed(JOURNAL, take_file(path));
+	write_seed(JOURNAL, copy_file_to_seed(path));
 	for (int i = 0; i < 3; i++) {
-		static const enum what changed[] = {JOURNAL_CHANGED, CHECKPOINT_CHANGED, DATABASE_CHANGED};
-		memcpy(seed + 1, "\0\0\60\1", EDIT);
-		write_seed(changed[i], EDIT);
+		static const enum damage_kind changed[] = {JOURNAL_CHANGED, CHECKPOINT_CHANGED, DATABASE_CHANGED};
+		memcpy(seed_bytes + 1, "\0\0\60\1", EDIT_BYTES);
+		write_seed(changed[i], EDIT_BYTES);
 	}
-	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_BOOTSTRAP);
-	if (journal_open(&j, folder, FARM_BOOTSTRAP, 0, add_record, NULL, &found, &e))
+	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_JOB_BOOTSTRAP);
+	if (journal_open(&j, folder, FARM_JOB_BOOTSTRAP, 0, add_record, NULL, &found, &e))
 		abort();
 	journal_release(j);
-	write_seed(JOURNAL_BODIES, seeded);
-	if (ledger_open(&l, spool, &e) || ledger_get(l, FARM_BOOTSTRAP, &job, &e) <= 0)
+	write_seed(JOURNAL_BODIES, seed_size);
+	if (ledger_open(&l, spool, &e) || ledger_read_row(l, FARM_JOB_BOOTSTRAP, &job, &e) <= 0)
 		abort();
 	write_old_seeds(&job);
-	seed[1] = (uint8_t)(job.submission_size >> 8);
-	seed[2] = (uint8_t)job.submission_size;
-	memcpy(seed + 3, job.submission, job.submission_size);
-	memcpy(seed + 3 + job.submission_size, job.plan, job.plan_size);
+	seed_bytes[1] = (uint8_t)(job.submission_size >> 8);
+	seed_bytes[2] = (uint8_t)job.submission_size;
+	memcpy(seed_bytes + 3, job.submission, job.submission_size);
+	memcpy(seed_bytes + 3 + job.submission_size, job.plan, job.plan_size);
 	write_seed(SUBMISSION, 2 + job.submission_size + job.plan_size);
 	ledger_close(l);
 }
@@ -340,10 +340,10 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	char spool[128];
 	(void)argc;
 	(void)argv;
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
 	snprintf(spool, sizeof spool, "%s/seeds", folders_base());
-	farm_spool_copy(spool);
+	farm_world_copy_spool(spool);
 	write_seeds(spool);
 	exit(0);
 }

@@ -19,10 +19,10 @@
 #define chain_path (*integrator_find("hslt")->chain)
 #define chain_pss (*integrator_find("pssmlt")->chain)
 
-enum { SIDE = 32, EDGES = 8, STEPS = 5, BUILT_MOST = 64, STATE_MOST = 1 << 14, CHAIN = 3 };
+enum { SIDE = 32, EDGES = 8, STEPS = 5, WORLDS_MAX = 64, STATE_BYTES_MAX = 1 << 14, CHAIN_ID = 3 };
 static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
 
-static struct world *worlds[BUILT_MOST];
+static struct world *worlds[WORLDS_MAX];
 static unsigned world_count;
 static struct path_context context;
 static struct film_sums film;
@@ -34,7 +34,7 @@ static void set_up(void)
 	static const struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	static const struct scene_settings settings = {
 		.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
-	while (world_count < BUILT_MOST && rooms[world_count].name) {
+	while (world_count < WORLDS_MAX && rooms[world_count].name) {
 		worlds[world_count] = rooms[world_count].build();
 		world_count++;
 	}
@@ -43,22 +43,22 @@ static void set_up(void)
 		abort();
 }
 
-static const struct chain_ops *begin(struct chain *c, unsigned which)
+static const struct chain_ops *begin_chain(struct chain *c, unsigned index)
 {
-	bool whole = which / world_count % 2 == 0;
-	starts_context(&context, worlds[which % world_count], 1, EDGES, counters);
-	*c = (struct chain){.integrator = integrator_find(whole ? "hslt" : "pssmlt"),
+	bool is_path_chain = index / world_count % 2 == 0;
+	starts_init_context(&context, worlds[index % world_count], 1, EDGES, counters);
+	*c = (struct chain){.integrator = integrator_find(is_path_chain ? "hslt" : "pssmlt"),
 			    .context = &context,
 			    .film = &film,
 			    .mixture = mixture,
-			    .strategy = strategies,
+			    .strategy_counters = strategies,
 			    .seed = 7,
-			    .id = CHAIN,
+			    .id = CHAIN_ID,
 			    .step = 1000};
 	return c->integrator->chain;
 }
 
-static void go_on(struct chain *c, const struct chain_ops *ops)
+static void continue_chain(struct chain *c, const struct chain_ops *ops)
 {
 	struct chain_sums sums = {0, 0};
 	struct chain_state s = {0};
@@ -72,32 +72,33 @@ static void go_on(struct chain *c, const struct chain_ops *ops)
 
 static void write_seeds(struct chain *c)
 {
-	for (unsigned which = 0; which < 2 * world_count; which++) {
-		const struct chain_ops *ops = begin(c, which);
+	for (unsigned number = 0; number < 2 * world_count; number++) {
+		const struct chain_ops *ops = begin_chain(c, number);
 		struct chain_state s;
-		uint8_t bytes[1 + STATE_MOST] = {(uint8_t)which};
+		uint8_t bytes[1 + STATE_BYTES_MAX] = {(uint8_t)number};
 		uint64_t index = 0;
 		while (!ops->start(c, index))
 			index++;
-		go_on(c, ops);
-		if (ops->save(c, &s) || s.size > STATE_MOST)
+		continue_chain(c, ops);
+		if (ops->save(c, &s) || s.size > STATE_BYTES_MAX)
 			abort();
 		memcpy(bytes + 1, s.bytes, s.size);
-		seed_file("state", which, bytes, 1 + s.size);
+		seed_write_file("state", number, bytes, 1 + s.size);
 		mem_free(s.bytes);
 	}
 }
 
-static void put_right(const struct chain *c, uint8_t *bytes, size_t size)
+static void correct_state(const struct chain *c, uint8_t *bytes, size_t size)
 {
 	static struct full_path x;
 	double contribution;
-	put64(bytes, CHAIN);
+	put64(bytes, CHAIN_ID);
 	put64(bytes + 8, c->step);
-	if (size < CHAIN_STATE_HEAD + 16 || bytes[16] % 2)
+	if (size < CHAIN_STATE_HEADER_BYTES + 16 || bytes[16] % 2)
 		return;
-	if (path_contribution(&context, bytes + CHAIN_STATE_HEAD, size - CHAIN_STATE_HEAD, &x, &contribution))
-		put_double(bytes + CHAIN_STATE_HEAD + 8, contribution);
+	if (path_read_contribution(&context, bytes + CHAIN_STATE_HEADER_BYTES, size - CHAIN_STATE_HEADER_BYTES, &x,
+				   &contribution))
+		put_double(bytes + CHAIN_STATE_HEADER_BYTES + 8, contribution);
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
@@ -105,7 +106,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	(void)argc;
 	(void)argv;
 	set_up();
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
 	write_seeds(chain);
 	exit(0);
@@ -113,15 +114,15 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	static uint8_t state[STATE_MOST];
-	if (size < 1 + CHAIN_STATE_HEAD || size > 1 + STATE_MOST)
+	static uint8_t state[STATE_BYTES_MAX];
+	if (size < 1 + CHAIN_STATE_HEADER_BYTES || size > 1 + STATE_BYTES_MAX)
 		return 0;
-	const struct chain_ops *ops = begin(chain, bytes[0]);
+	const struct chain_ops *ops = begin_chain(chain, bytes[0]);
 	struct chain_state s = {state, (uint32_t)(size - 1)};
 	memcpy(state, bytes + 1, s.size);
-	put_right(chain, state, s.size);
+	correct_state(chain, state, s.size);
 	if (ops->resume(chain, &s))
-		go_on(chain, ops);
+		continue_chain(chain, ops);
 	memset(film.xyz, 0, (size_t)SIDE * SIDE * 3 * sizeof *film.xyz);
 	return 0;
 }

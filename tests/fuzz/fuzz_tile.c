@@ -17,17 +17,17 @@ static void read_tile(const uint8_t *bytes, size_t size)
 {
 	struct tile t;
 	struct error e;
-	unsigned char *again;
+	unsigned char *rewritten;
 	size_t n;
 	if (exr_tile_read(bytes, size, WIDTH, HEIGHT, &t, &e))
 		return;
-	if (exr_tile_write(&t, WIDTH, HEIGHT, &again, &n, &e) == 0)
-		mem_free(again);
+	if (exr_tile_write(&t, WIDTH, HEIGHT, &rewritten, &n, &e) == 0)
+		mem_free(rewritten);
 	mem_free(t.xyz);
 }
 
 /* Reads the result of a lease of samples, so that there are neither chain states nor moments. */
-static void read_result(const uint8_t *bytes, size_t size, bool two)
+static void read_result(const uint8_t *bytes, size_t size, bool has_two_tiles)
 {
 	static const struct plan_request request = {.integrator = "path",
 						    .kind = PLAN_SAMPLES,
@@ -56,7 +56,7 @@ static void read_result(const uint8_t *bytes, size_t size, bool two)
 	m.classes = classes;
 	m.n_tile_sizes = 1;
 	m.tile_sizes = sizes;
-	if (two && size > 2) { /* with two tiles the fuzzer chooses where the first one ends */
+	if (has_two_tiles && size > 2) { /* with two tiles the fuzzer chooses where the first one ends */
 		m.n_tile_sizes = 2;
 		sizes[0] = (uint32_t)bytes[size - 1] << 8 | bytes[size - 2];
 		size -= 2;
@@ -81,11 +81,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	if (!size)
 		return 0;
-	unsigned what = *bytes;
-	if (what % 4 == 0)
+	unsigned kind = *bytes;
+	if (kind % 4 == 0)
 		read_tile(bytes + 1, size - 1);
-	else if (what % 4 < 3)
-		read_result(bytes + 1, size - 1, what % 4 == 2);
+	else if (kind % 4 < 3)
+		read_result(bytes + 1, size - 1, kind % 4 == 2);
 	else
 		read_image(bytes + 1, size - 1);
 	return 0;

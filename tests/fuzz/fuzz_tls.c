@@ -15,8 +15,8 @@
 #include <stdio.h>
 #include <string.h>
 
-enum what { TO_LISTENER, TO_CALLER, CHANGE_CALLER, CHANGE_LISTENER, RECORDS, CERTIFICATE, WHATS };
-enum { SAID = 3000, EDITS_MOST = 16, PIECE = 700 };
+enum input_kind { TO_LISTENER, TO_CALLER, CHANGE_CALLER, CHANGE_LISTENER, RECORDS, CERTIFICATE, INPUT_KINDS };
+enum { STREAM_BYTES = 3000, EDITS_MAX = 16, PIECE_BYTES = 700 };
 
 static struct tls *farm, *node, *stranger;
 
@@ -28,7 +28,7 @@ static void require(int rc, const struct error *e)
 	}
 }
 
-static struct tls *folder_of(const char *authority, const char *name, enum tls_role role)
+static struct tls *issue_and_open(const char *authority, const char *name, enum tls_role role)
 {
 	char path[256], home[128];
 	struct tls *t;
@@ -49,50 +49,50 @@ static void make_folders(void)
 	for (int i = 0; i < 2; i++) {
 		char home[128];
 		snprintf(home, sizeof home, "%s/%s", folders_base(), homes[i]);
-		require(authority_init(home, homes[i], 2, &e), &e);
+		require(authority_create(home, homes[i], 2, &e), &e);
 	}
-	farm = folder_of("ours", "farm", TLS_COORDINATOR);
-	node = folder_of("ours", "node", TLS_WORKER);
-	stranger = folder_of("theirs", "node", TLS_WORKER);
+	farm = issue_and_open("ours", "farm", TLS_COORDINATOR);
+	node = issue_and_open("ours", "node", TLS_WORKER);
+	stranger = issue_and_open("theirs", "node", TLS_WORKER);
 }
 
 /* ---- an end ---- */
 
-struct end {
+struct tls_end {
 	struct tls_link *link;
-	bool broken;
-	uint8_t got[2 * SAID];
-	size_t got_size;
+	bool is_broken;
+	uint8_t received[2 * STREAM_BYTES];
+	size_t received_size;
 };
 
-static struct end caller, listener;
+static struct tls_end caller, listener;
 
-static void open_end(struct end *x, struct tls *t, bool listening)
+static void open_end(struct tls_end *x, struct tls *t, bool listening)
 {
 	struct error e;
-	*x = (struct end){0};
+	*x = (struct tls_end){0};
 	require(tls_link_new(&x->link, t, listening, &e), &e);
 }
 
-static void read_all(struct end *x)
+static void read_all(struct tls_end *x)
 {
 	struct error e;
 	ssize_t n = 1;
-	while (!x->broken && n > 0) {
+	while (!x->is_broken && n > 0) {
 		uint8_t bytes[512];
 		n = tls_link_read(x->link, bytes, sizeof bytes, &e);
-		x->broken = n < 0;
-		for (ssize_t i = 0; i < n && x->got_size < sizeof x->got; i++)
-			x->got[x->got_size++] = bytes[i];
+		x->is_broken = n < 0;
+		for (ssize_t i = 0; i < n && x->received_size < sizeof x->received; i++)
+			x->received[x->received_size++] = bytes[i];
 	}
 }
 
-static void pass_bytes(struct end *x, const void *bytes, size_t size)
+static void pass_bytes(struct tls_end *x, const void *bytes, size_t size)
 {
 	struct error e;
-	for (size_t i = 0; i < size && !x->broken; i += PIECE) {
-		x->broken = tls_link_take(x->link, (const uint8_t *)bytes + i, size - i < PIECE ? size - i : PIECE,
-					  &e) != 0;
+	for (size_t i = 0; i < size && !x->is_broken; i += PIECE_BYTES) {
+		x->is_broken = tls_link_receive(x->link, (const uint8_t *)bytes + i,
+						size - i < PIECE_BYTES ? size - i : PIECE_BYTES, &e) != 0;
 		read_all(x);
 	}
 }
@@ -102,12 +102,12 @@ static void pass_bytes(struct end *x, const void *bytes, size_t size)
 struct edits { /* changes to one direction: u16 BE position, one byte to xor */
 	const uint8_t *bytes;
 	size_t size, passed;
-	const struct end *from;
+	const struct tls_end *from;
 };
 
 static void apply_edits(struct edits *d, uint8_t *bytes, size_t size)
 {
-	for (size_t i = 0; i + 3 <= d->size && i < 3 * EDITS_MOST; i += 3) {
+	for (size_t i = 0; i + 3 <= d->size && i < 3 * EDITS_MAX; i += 3) {
 		size_t place = (size_t)d->bytes[i] << 8 | d->bytes[i + 1];
 		if (place >= d->passed && place < d->passed + size)
 			bytes[place - d->passed] ^= d->bytes[i + 2];
@@ -115,7 +115,7 @@ static void apply_edits(struct edits *d, uint8_t *bytes, size_t size)
 	d->passed += size;
 }
 
-static bool carry_output(struct end *from, struct end *to, struct edits *d)
+static bool carry_output(struct tls_end *from, struct tls_end *to, struct edits *d)
 {
 	const unsigned char *bytes;
 	static uint8_t copy[1 << 17];
@@ -125,7 +125,7 @@ static bool carry_output(struct end *from, struct end *to, struct edits *d)
 	if (size > sizeof copy)
 		abort();
 	memcpy(copy, bytes, size);
-	tls_link_output_taken(from->link);
+	tls_link_clear_output(from->link);
 	if (d && d->from == from)
 		apply_edits(d, copy, size);
 	pass_bytes(to, copy, size);
@@ -141,36 +141,36 @@ static void carry_all(struct edits *d)
 	}
 }
 
-static uint8_t byte_sent(size_t i)
+static uint8_t stream_byte(size_t i)
 {
 	return (uint8_t)(i * 7 + i / 251);
 }
 
-static void write_bytes(struct end *x)
+static void write_bytes(struct tls_end *x)
 {
-	uint8_t bytes[SAID];
+	uint8_t bytes[STREAM_BYTES];
 	struct error e;
-	for (size_t i = 0; i < SAID; i++)
-		bytes[i] = byte_sent(i);
-	if (!x->broken && tls_link_is_open(x->link))
-		x->broken = tls_link_write(x->link, bytes, SAID, &e) != 0;
+	for (size_t i = 0; i < STREAM_BYTES; i++)
+		bytes[i] = stream_byte(i);
+	if (!x->is_broken && tls_link_is_open(x->link))
+		x->is_broken = tls_link_write(x->link, bytes, STREAM_BYTES, &e) != 0;
 }
 
-static void check_received(const struct end *x, const char *name)
+static void check_received(const struct tls_end *x, const char *name)
 {
-	if (x->got_size > SAID)
+	if (x->received_size > STREAM_BYTES)
 		abort();
-	for (size_t i = 0; i < x->got_size; i++)
-		if (x->got[i] != byte_sent(i))
+	for (size_t i = 0; i < x->received_size; i++)
+		if (x->received[i] != stream_byte(i))
 			abort();
 	if (tls_link_is_open(x->link) && strcmp(tls_link_peer(x->link)->name, name) != 0)
 		abort();
 }
 
-static void run_conversation(const uint8_t *bytes, size_t size, const struct end *changed, struct tls *who)
+static void run_conversation(const uint8_t *bytes, size_t size, const struct tls_end *changed, struct tls *caller_tls)
 {
 	struct edits d = {bytes, size, 0, changed};
-	open_end(&caller, who, false);
+	open_end(&caller, caller_tls, false);
 	open_end(&listener, farm, true);
 	read_all(&caller);
 	carry_all(&d);
@@ -179,7 +179,7 @@ static void run_conversation(const uint8_t *bytes, size_t size, const struct end
 	carry_all(&d);
 	check_received(&caller, "farm");
 	check_received(&listener, "node");
-	if (who == stranger && tls_link_is_open(listener.link))
+	if (caller_tls == stranger && tls_link_is_open(listener.link))
 		abort();
 	tls_link_free(caller.link);
 	tls_link_free(listener.link);
@@ -195,7 +195,7 @@ static void send_records(const uint8_t *bytes, size_t size)
 	if (!tls_link_is_open(listener.link) || !tls_link_is_open(caller.link))
 		abort();
 	pass_bytes(&listener, bytes, size);
-	if (listener.got_size)
+	if (listener.received_size)
 		abort(); /* without the keys nothing may be received from a peer */
 	if (tls_link_recheck(listener.link, &e))
 		abort();
@@ -205,7 +205,7 @@ static void send_records(const uint8_t *bytes, size_t size)
 
 static void send_alone(const uint8_t *bytes, size_t size, bool listening)
 {
-	struct end *x = listening ? &listener : &caller;
+	struct tls_end *x = listening ? &listener : &caller;
 	open_end(x, listening ? farm : node, listening);
 	read_all(x);
 	pass_bytes(x, bytes, size);
@@ -219,7 +219,7 @@ static void read_certificate(const uint8_t *bytes, size_t size)
 	struct tls_peer p;
 	struct error e;
 	X509 *cert = d2i_X509(NULL, &bytes, (long)size);
-	if (cert && tls_read_peer(cert, &p, &e) == 0 && (!tls_name_ok(p.name) || p.role == TLS_NOBODY))
+	if (cert && tls_read_peer(cert, &p, &e) == 0 && (!tls_name_is_valid(p.name) || p.role == TLS_NO_ROLE))
 		abort();
 	X509_free(cert);
 	ERR_clear_error();
@@ -230,17 +230,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	make_folders();
 	if (!size)
 		return 0;
-	unsigned what = *bytes++;
+	unsigned kind = *bytes++;
 	size--;
-	switch ((enum what)(what % WHATS)) {
+	switch ((enum input_kind)(kind % INPUT_KINDS)) {
 	case TO_LISTENER:
 	case TO_CALLER:
-		send_alone(bytes, size, what % WHATS == TO_LISTENER);
+		send_alone(bytes, size, kind % INPUT_KINDS == TO_LISTENER);
 		break;
 	case CHANGE_CALLER:
 	case CHANGE_LISTENER:
-		run_conversation(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener,
-				 what / WHATS % 8 == 1 ? stranger : node);
+		run_conversation(bytes, size, kind % INPUT_KINDS == CHANGE_CALLER ? &caller : &listener,
+				 kind / INPUT_KINDS % 8 == 1 ? stranger : node);
 		break;
 	case RECORDS:
 		send_records(bytes, size);
@@ -253,19 +253,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 
 /* ---- seeds ---- */
 
-static void write_seed(enum what what, const void *bytes, size_t size)
+static void write_seed(enum input_kind kind, const void *bytes, size_t size)
 {
-	static uint8_t all[1 << 16];
-	all[0] = (uint8_t)what;
-	memcpy(all + 1, bytes, size);
-	seed_file("tls", what, all, size + 1);
+	static uint8_t seed_bytes[1 << 16];
+	seed_bytes[0] = (uint8_t)kind;
+	memcpy(seed_bytes + 1, bytes, size);
+	seed_write_file("tls", kind, seed_bytes, size + 1);
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
 	(void)argc;
 	(void)argv;
-	if (!seeds_wanted())
+	if (!seeds_are_requested())
 		return 0;
 	const unsigned char *bytes;
 	char path[256];

@@ -6,7 +6,7 @@
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "tests/fuzz/farm.h"
+#include "tests/fuzz/farm_world.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/messages.h"
 #include "tests/fuzz/seeds.h"
@@ -23,7 +23,7 @@
 #include <unistd.h>
 
 enum speaker { COORDINATOR, POOL, NETWORK, SIGNAL, SPEAKERS };
-enum { WORK_MOST = 3000, PIXELS_MOST = 10000 };
+enum { WORK_MAX = 3000, PIXELS_MAX = 10000 };
 
 /* ---- the thread pool ---- */
 
@@ -50,7 +50,7 @@ void thread_pool_add(struct thread_pool *c, struct task *t)
 	c->pending++;
 }
 
-bool thread_pool_take_back(struct thread_pool *c, struct task *t)
+bool thread_pool_remove(struct thread_pool *c, struct task *t)
 {
 	for (struct task **at = &c->first; *at; at = &(*at)->next)
 		if (*at == t) {
@@ -77,29 +77,32 @@ static struct {
 	struct agent *agent;
 	int listener, fd;
 	char address[32], cache[96];
-} now = {.fd = -1};
+} worker_state = {.fd = -1};
 
 static void start_listening(void)
 {
 	struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	socklen_t size = sizeof a;
-	now.listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	if (bind(now.listener, (struct sockaddr *)&a, size) || listen(now.listener, 8) ||
-	    getsockname(now.listener, (struct sockaddr *)&a, &size))
+	worker_state.listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	if (bind(worker_state.listener, (struct sockaddr *)&a, size) || listen(worker_state.listener, 8) ||
+	    getsockname(worker_state.listener, (struct sockaddr *)&a, &size))
 		abort();
-	snprintf(now.address, sizeof now.address, "127.0.0.1:%u", ntohs(a.sin_port));
-	snprintf(now.cache, sizeof now.cache, "%s/cache", folders_base());
+	snprintf(worker_state.address, sizeof worker_state.address, "127.0.0.1:%u", ntohs(a.sin_port));
+	snprintf(worker_state.cache, sizeof worker_state.cache, "%s/cache", folders_base());
 	log_set_level(getenv("HSLT_FUZZ_LOG") ? LOG_LEVEL_DEBUG : LOG_LEVEL_ERROR);
 }
 
 static void start_worker(void)
 {
-	struct agent_config c = {
-		.coordinator = now.address, .name = "w", .cache = now.cache, .cache_bytes = 1 << 22, .threads = 1};
+	struct agent_config c = {.coordinator_address = worker_state.address,
+				 .name = "w",
+				 .cache_folder = worker_state.cache,
+				 .max_cache_bytes = 1 << 22,
+				 .threads = 1};
 	struct error e;
-	if (!now.listener)
+	if (!worker_state.listener)
 		start_listening();
-	if (agent_open(&now.agent, &c, &e)) {
+	if (agent_open(&worker_state.agent, &c, &e)) {
 		fprintf(stderr, "%s\n", e.text);
 		abort();
 	}
@@ -107,22 +110,22 @@ static void start_worker(void)
 
 static void run_loop(void)
 {
-	uv_run(&now.agent->loop, UV_RUN_NOWAIT);
+	uv_run(&worker_state.agent->loop, UV_RUN_NOWAIT);
 }
 
 static void drain_socket(void)
 {
 	char bytes[1 << 15];
 	ssize_t n = 1;
-	while (now.fd >= 0 && n > 0)
-		n = recv(now.fd, bytes, sizeof bytes, MSG_DONTWAIT);
+	while (worker_state.fd >= 0 && n > 0)
+		n = recv(worker_state.fd, bytes, sizeof bytes, MSG_DONTWAIT);
 }
 
 static void send_bytes(const void *bytes, size_t size)
 {
 	const char *at = bytes;
-	while (now.fd >= 0 && size && now.agent->conn) {
-		ssize_t n = send(now.fd, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+	while (worker_state.fd >= 0 && size && worker_state.agent->conn) {
+		ssize_t n = send(worker_state.fd, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
 		if (n < 0 && errno != EAGAIN)
 			return;
 		at += n > 0 ? n : 0;
@@ -131,7 +134,7 @@ static void send_bytes(const void *bytes, size_t size)
 	}
 }
 
-static void say_hello_ack(void)
+static void send_hello_ack(void)
 {
 	Farm__HelloAck ack;
 	Farm__Envelope m;
@@ -151,33 +154,33 @@ static void say_hello_ack(void)
 	}
 }
 
-static void hang_up(void)
+static void disconnect(void)
 {
 	struct linger reset = {1, 0};
-	if (now.fd >= 0) {
-		setsockopt(now.fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
-		close(now.fd);
+	if (worker_state.fd >= 0) {
+		setsockopt(worker_state.fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+		close(worker_state.fd);
 	}
-	now.fd = -1;
-	for (int i = 0; now.agent->conn && i < 1000; i++)
+	worker_state.fd = -1;
+	for (int i = 0; worker_state.agent->conn && i < 1000; i++)
 		run_loop();
 }
 
 /* A real worker waits before it calls again; this one does not. */
-static void send_answer(void)
+static void accept_worker(void)
 {
-	struct agent *a = now.agent;
-	for (int i = 0; i < 1000 && now.fd < 0 && !a->gone; i++) {
-		if (!a->conn && !a->resolves)
-			uv_timer_start(&a->retry, a->retry.timer_cb, 0, 0);
-		if (a->resolves)
+	struct agent *a = worker_state.agent;
+	for (int i = 0; i < 1000 && worker_state.fd < 0 && !a->has_left; i++) {
+		if (!a->conn && !a->is_resolving)
+			uv_timer_start(&a->retry_timer, a->retry_timer.timer_cb, 0, 0);
+		if (a->is_resolving)
 			uv_run(&a->loop, UV_RUN_ONCE);
 		run_loop();
-		now.fd = accept4(now.listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+		worker_state.fd = accept4(worker_state.listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
 	}
-	setsockopt(now.fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
+	setsockopt(worker_state.fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
 	run_loop();
-	say_hello_ack();
+	send_hello_ack();
 }
 
 /* ---- steps ---- */
@@ -185,16 +188,16 @@ static void send_answer(void)
 static bool is_small(const struct plan *p)
 {
 	uint64_t pixels = (uint64_t)p->width * p->height;
-	return pixels <= PIXELS_MOST && p->border < 16 && p->bootstrap / (p->groups * p->parts) <= WORK_MOST &&
-	       p->epoch <= WORK_MOST &&
+	return pixels <= PIXELS_MAX && p->border < 16 && p->bootstrap / (p->groups * p->parts) <= WORK_MAX &&
+	       p->epoch <= WORK_MAX &&
 	       (p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) * p->epoch : pixels * p->epoch) <=
-		       WORK_MOST &&
+		       WORK_MAX &&
 	       p->max_depth <= 16;
 }
 
 static bool is_building(const struct task *t)
 {
-	for (const struct job_cache *b = now.agent->job_caches; b; b = b->next)
+	for (const struct job_cache *b = worker_state.agent->job_caches; b; b = b->next)
 		if (&b->task == t)
 			return true;
 	return false;
@@ -203,7 +206,7 @@ static bool is_building(const struct task *t)
 /* Runs a task and returns it, as a thread of the pool does. */
 static void run_next_task(void)
 {
-	struct thread_pool *c = now.agent->thread_pool;
+	struct thread_pool *c = worker_state.agent->thread_pool;
 	struct task *t = c->first;
 	if (!t)
 		return;
@@ -215,22 +218,23 @@ static void run_next_task(void)
 			((struct job_cache *)t)->state = JOB_CACHE_FAILED;
 	} else {
 		struct lease_task *l = (struct lease_task *)t;
-		atomic_store(&l->stop, !is_small(&l->job_cache->plan));
+		atomic_store(&l->stop_requested, !is_small(&l->job_cache->plan));
 		t->run(t);
 	}
 	c->pending--;
-	t->done(t);
+	t->on_done(t);
 }
 
-static void step(const struct step *s)
+static void run_step(const struct step *s)
 {
 	unsigned char *bytes;
 	size_t size;
-	switch (s->who % SPEAKERS) {
+	switch (s->speaker % SPEAKERS) {
 	case COORDINATOR:
-		if (now.fd < 0)
-			send_answer();
-		bytes = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
+		if (worker_state.fd < 0)
+			accept_worker();
+		bytes = checksummed_frame_from_parts(s->header, s->header_size, s->payload, s->payload_size, false,
+						     &size);
 		send_bytes(bytes, size);
 		free(bytes);
 		break;
@@ -238,13 +242,13 @@ static void step(const struct step *s)
 		run_next_task();
 		break;
 	case NETWORK:
-		hang_up();
+		disconnect();
 		break;
 	case SIGNAL:
-		if (!now.agent->leaving) {
-			now.agent->leaving = true;
-			lease_queue_leave(now.agent);
-			agent_settle(now.agent);
+		if (!worker_state.agent->is_leaving) {
+			worker_state.agent->is_leaving = true;
+			lease_queue_return_unstarted(worker_state.agent);
+			agent_leave_if_idle(worker_state.agent);
 		}
 	}
 	run_loop();
@@ -254,51 +258,51 @@ static void step(const struct step *s)
 /* Files of the cache are read by libuv's pool, which this fuzzer does not control; a worker that ends waits for it. */
 static void finish_reading(void)
 {
-	for (struct job_cache *b = now.agent->job_caches; b;) {
-		bool reads = b->reading.check;
-		if (reads)
-			uv_run(&now.agent->loop, UV_RUN_ONCE);
-		b = reads ? now.agent->job_caches : b->next;
+	for (struct job_cache *b = worker_state.agent->job_caches; b;) {
+		bool is_reading = b->reading.check;
+		if (is_reading)
+			uv_run(&worker_state.agent->loop, UV_RUN_ONCE);
+		b = is_reading ? worker_state.agent->job_caches : b->next;
 	}
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	struct step steps[SCRIPT_STEPS];
-	if (!now.agent)
+	if (!worker_state.agent)
 		start_worker();
 	size_t count = script_read(bytes, size, steps);
-	for (size_t i = 0; i < count && !now.agent->gone; i++)
-		step(&steps[i]);
-	hang_up();
+	for (size_t i = 0; i < count && !worker_state.agent->has_left; i++)
+		run_step(&steps[i]);
+	disconnect();
 	finish_reading();
-	if (!now.agent->gone)
-		*now.agent->thread_pool = (struct thread_pool){0};
-	lease_queue_close(now.agent);
-	if (now.agent->leaving) {
-		agent_close(now.agent);
-		now.agent = NULL;
+	if (!worker_state.agent->has_left)
+		*worker_state.agent->thread_pool = (struct thread_pool){0};
+	lease_queue_close(worker_state.agent);
+	if (worker_state.agent->is_leaving) {
+		agent_close(worker_state.agent);
+		worker_state.agent = NULL;
 	}
 	return 0;
 }
 
-size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t max_size, unsigned seed)
 {
-	return script_mutate(bytes, size, room, seed, SPEAKERS);
+	return script_mutate(bytes, size, max_size, seed, SPEAKERS);
 }
 
 /* ---- seeds ---- */
 
-static char room[] =
+static char room_scene[] =
 	"<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">"
 	"<integer name=\"width\" value=\"20\"/><integer name=\"height\" value=\"10\"/></film></sensor>"
 	"<shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"0\" z=\"4\"/><bsdf type=\"diffuse\"/></shape>"
 	"<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"90\"/><translate y=\"3\" z=\"4\"/></transform>"
 	"<emitter type=\"area\"><rgb name=\"radiance\" value=\"9\"/></emitter></shape></scene>";
 
-static void describe_job(struct seed *s, uint64_t job)
+static void add_job(struct seed *s, uint64_t job)
 {
-	struct plan plan = farm_plan(job);
+	struct plan plan = farm_world_make_plan(job);
 	struct blob_hash hash;
 	struct error e;
 	Farm__JobInfo info;
@@ -310,11 +314,11 @@ static void describe_job(struct seed *s, uint64_t job)
 	farm__job_info__init(&info);
 	farm__file__init(&file);
 	farm__blob_chunk__init(&chunk);
-	blob_hash_bytes(room, strlen(room), &hash, &e);
+	blob_hash_bytes(room_scene, strlen(room_scene), &hash, &e);
 	plan_to_wire(&plan, &wire);
 	file.name = info.name = info.scene = name;
 	file.hash = chunk.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
-	file.size = chunk.size = strlen(room);
+	file.size = chunk.size = strlen(room_scene);
 	info.job = job;
 	info.plan = &wire;
 	info.n_files = 1;
@@ -323,15 +327,15 @@ static void describe_job(struct seed *s, uint64_t job)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
 	m.blob_chunk = &chunk;
-	seed_say(s, COORDINATOR, &m, room, strlen(room));
+	seed_add_message(s, COORDINATOR, &m, room_scene, strlen(room_scene));
 }
 
-static void grant_lease(struct seed *s, const struct lease_key *k)
+static void add_grant(struct seed *s, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
 	Farm__LeaseGrant g;
 	uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX}; /* seeds of a bootstrap that found no light */
-	struct plan plan = farm_plan(k->job);
+	struct plan plan = farm_world_make_plan(k->job);
 	farm__lease_grant__init(&g);
 	lease_key_to_wire(k, &key);
 	g.key = &key;
@@ -347,10 +351,10 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
 	(void)argc;
 	(void)argv;
-	static const struct lease_key keys[] = {{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP},
-						{.job = FARM_CHAINS, .kind = LEASE_RENDER},
-						{.job = FARM_SAMPLES, .kind = LEASE_RENDER}};
-	if (!seeds_wanted())
+	static const struct lease_key keys[] = {{.job = FARM_JOB_BOOTSTRAP, .kind = LEASE_BOOTSTRAP},
+						{.job = FARM_JOB_CHAINS, .kind = LEASE_RENDER},
+						{.job = FARM_JOB_SAMPLES, .kind = LEASE_RENDER}};
+	if (!seeds_are_requested())
 		return 0;
 	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
 		for (int end = 0; end < 3; end++) {
@@ -366,23 +370,23 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 			ack.key = revoke.key = &key;
 			ack.verdict = FARM__VERDICT__VERDICT_MERGED;
 			job_end.job = keys[i].job;
-			grant_lease(&s, &keys[i]);
-			describe_job(&s, keys[i].job);
-			seed_raw(&s, POOL, "-");
+			add_grant(&s, &keys[i]);
+			add_job(&s, keys[i].job);
+			seed_add_raw(&s, POOL, "-");
 			if (end == 1)
 				SEED_SAY(&s, COORDINATOR, LEASE_REVOKE, lease_revoke, &revoke);
-			seed_raw(&s, end == 2 ? SIGNAL : POOL, "-");
+			seed_add_raw(&s, end == 2 ? SIGNAL : POOL, "-");
 			if (end == 0) {
-				seed_raw(&s, NETWORK, "-");
-				describe_job(&s, keys[i].job);
+				seed_add_raw(&s, NETWORK, "-");
+				add_job(&s, keys[i].job);
 				SEED_SAY(&s, COORDINATOR, LEASE_ACK, lease_ack, &ack);
 			}
 			SEED_SAY(&s, COORDINATOR, JOB_END, job_end, &job_end);
-			seed_end(&s, "lease", 3 * i + (size_t)end);
+			seed_write(&s, "lease", 3 * i + (size_t)end);
 		}
 	struct seed flood = {0};
 	for (uint64_t epoch = 0; epoch < SCRIPT_STEPS; epoch++)
-		grant_lease(&flood, &(struct lease_key){.job = FARM_SAMPLES, .kind = LEASE_RENDER, .epoch = epoch});
-	seed_end(&flood, "flood", 0);
+		add_grant(&flood, &(struct lease_key){.job = FARM_JOB_SAMPLES, .kind = LEASE_RENDER, .epoch = epoch});
+	seed_write(&flood, "flood", 0);
 	exit(0);
 }

@@ -14,72 +14,72 @@
 
 /* ---- memory of one mutation ---- */
 
-enum { SPACE = 1 << 22, STRING_ROOM = 256, STEP_PREFIX = 5, PART_MOST = 0xffff };
+enum { SPACE_BYTES = 1 << 22, STRING_BYTES_MAX = 256, STEP_PREFIX = 5, PART_BYTES_MAX = 0xffff };
 
 static struct {
-	_Alignas(16) uint8_t bytes[SPACE];
+	_Alignas(16) uint8_t bytes[SPACE_BYTES];
 	size_t used;
 	uint64_t random;
-} now;
+} mutator;
 
 static void *allocate(void *user, size_t size)
 {
 	(void)user;
 	size_t need = (size + 15) & ~(size_t)15;
-	if (need < size || need > SPACE - now.used)
+	if (need < size || need > SPACE_BYTES - mutator.used)
 		return NULL;
-	void *p = now.bytes + now.used;
-	now.used += need;
+	void *p = mutator.bytes + mutator.used;
+	mutator.used += need;
 	return memset(p, 0, need);
 }
 
-static void give_back(void *user, void *p)
+static void free_nothing(void *user, void *p)
 {
 	(void)user;
 	(void)p;
 }
 
-static ProtobufCAllocator allocator = {allocate, give_back, NULL};
+static ProtobufCAllocator allocator = {allocate, free_nothing, NULL};
 
-static void begin(unsigned seed)
+static void begin_mutation(unsigned seed)
 {
-	now.used = 0;
-	now.random = seed * UINT64_C(0x9E3779B97F4A7C15) + 1;
+	mutator.used = 0;
+	mutator.random = seed * UINT64_C(0x9E3779B97F4A7C15) + 1;
 }
 
 static uint64_t random_below(uint64_t below)
 {
-	now.random ^= now.random << 13;
-	now.random ^= now.random >> 7;
-	now.random ^= now.random << 17;
-	return (now.random >> 8) % below;
+	mutator.random ^= mutator.random << 13;
+	mutator.random ^= mutator.random >> 7;
+	mutator.random ^= mutator.random << 17;
+	return (mutator.random >> 8) % below;
 }
 
 /* ---- fields ---- */
 
-static uint64_t some_integer(uint64_t before)
+static uint64_t mutate_integer(uint64_t original)
 {
 	switch (random_below(8)) {
 	case 0:
 		return random_below(5);
 	case 1:
-		return before + 1;
+		return original + 1;
 	case 2:
-		return before - 1;
+		return original - 1;
 	case 3:
-		return before ^ UINT64_C(1) << random_below(64);
+		return original ^ UINT64_C(1) << random_below(64);
 	case 4:
 		return UINT64_MAX >> random_below(64);
 	case 5:
 		return UINT64_C(1) << random_below(64);
 	case 6:
-		return before * 2;
+		return original * 2;
 	default:
 		return random_below(300);
 	}
 }
 
-static double some_double(double before)
+static double mutate_double(double original)
 {
 	static const double values[] = {0,
 					-0.0,
@@ -96,11 +96,11 @@ static double some_double(double before)
 					-(double)__builtin_inf(),
 					(double)__builtin_nan("")};
 	return random_below(4)	 ? values[random_below(sizeof values / sizeof *values)]
-	       : random_below(2) ? before * 2
-				 : before + 1;
+	       : random_below(2) ? original * 2
+				 : original + 1;
 }
 
-static char *some_text(const char *before)
+static char *mutate_text(const char *original)
 {
 	static const char *const texts[] = {"",
 					    "s.xml",
@@ -124,35 +124,35 @@ static char *some_text(const char *before)
 					    "\xff",
 					    "a\nb",
 					    "%s%n"};
-	char *p = allocate(NULL, STRING_ROOM);
+	char *p = allocate(NULL, STRING_BYTES_MAX);
 	if (!p)
 		return NULL;
 	if (random_below(2)) {
 		strcpy(p, texts[random_below(sizeof texts / sizeof *texts)]);
 		return p;
 	}
-	size_t length = before ? strlen(before) : 0;
-	length = length < STRING_ROOM - 1 ? length : STRING_ROOM - 1;
-	if (before)
-		memcpy(p, before, length);
-	length = LLVMFuzzerMutate((uint8_t *)p, length, STRING_ROOM - 1);
+	size_t length = original ? strlen(original) : 0;
+	length = length < STRING_BYTES_MAX - 1 ? length : STRING_BYTES_MAX - 1;
+	if (original)
+		memcpy(p, original, length);
+	length = LLVMFuzzerMutate((uint8_t *)p, length, STRING_BYTES_MAX - 1);
 	p[length] = 0;
 	return p;
 }
 
-static ProtobufCBinaryData some_bytes(ProtobufCBinaryData before)
+static ProtobufCBinaryData mutate_bytes(ProtobufCBinaryData original)
 {
-	ProtobufCBinaryData b = {0, allocate(NULL, STRING_ROOM)};
+	ProtobufCBinaryData b = {0, allocate(NULL, STRING_BYTES_MAX)};
 	if (!b.data)
 		return b;
-	b.len = before.len < STRING_ROOM ? before.len : STRING_ROOM;
+	b.len = original.len < STRING_BYTES_MAX ? original.len : STRING_BYTES_MAX;
 	if (b.len)
-		memcpy(b.data, before.data, b.len);
-	b.len = LLVMFuzzerMutate(b.data, b.len, STRING_ROOM);
+		memcpy(b.data, original.data, b.len);
+	b.len = LLVMFuzzerMutate(b.data, b.len, STRING_BYTES_MAX);
 	return b;
 }
 
-static size_t size_of(ProtobufCType t)
+static size_t type_size(ProtobufCType t)
 {
 	switch (t) {
 	case PROTOBUF_C_TYPE_INT32:
@@ -174,7 +174,7 @@ static size_t size_of(ProtobufCType t)
 
 static void change_message(ProtobufCMessage *m);
 
-static ProtobufCMessage *fresh(const ProtobufCMessageDescriptor *d)
+static ProtobufCMessage *new_message(const ProtobufCMessageDescriptor *d)
 {
 	ProtobufCMessage *m = allocate(NULL, d->sizeof_message);
 	if (m)
@@ -189,53 +189,54 @@ static void change_value(const ProtobufCFieldDescriptor *f, void *at)
 	double d;
 	switch (f->type) {
 	case PROTOBUF_C_TYPE_STRING:
-		*(char **)at = some_text(*(char **)at);
+		*(char **)at = mutate_text(*(char **)at);
 		return;
 	case PROTOBUF_C_TYPE_BYTES:
-		*(ProtobufCBinaryData *)at = some_bytes(*(ProtobufCBinaryData *)at);
+		*(ProtobufCBinaryData *)at = mutate_bytes(*(ProtobufCBinaryData *)at);
 		return;
 	case PROTOBUF_C_TYPE_MESSAGE:
 		if (!*(ProtobufCMessage **)at)
-			*(ProtobufCMessage **)at = fresh(f->descriptor);
+			*(ProtobufCMessage **)at = new_message(f->descriptor);
 		if (*(ProtobufCMessage **)at)
 			change_message(*(ProtobufCMessage **)at);
 		return;
 	case PROTOBUF_C_TYPE_DOUBLE:
 		memcpy(&d, at, sizeof d);
-		d = some_double(d);
+		d = mutate_double(d);
 		memcpy(at, &d, sizeof d);
 		return;
 	default:
-		memcpy(&n, at, size_of(f->type));
-		n = f->type == PROTOBUF_C_TYPE_BOOL ? !n : some_integer(n);
-		memcpy(at, &n, size_of(f->type));
+		memcpy(&n, at, type_size(f->type));
+		n = f->type == PROTOBUF_C_TYPE_BOOL ? !n : mutate_integer(n);
+		memcpy(at, &n, type_size(f->type));
 	}
 }
 
 static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *count)
 {
-	size_t each = size_of(f->type);
+	size_t element_size = type_size(f->type);
 	uint8_t *list = *(uint8_t **)at;
 	if (*count && random_below(2)) {
-		change_value(f, list + random_below(*count) * each);
+		change_value(f, list + random_below(*count) * element_size);
 	} else if (*count && random_below(2)) {
-		size_t gone = random_below(*count);
-		memmove(list + gone * each, list + (gone + 1) * each, (*count - gone - 1) * each);
+		size_t removed = random_below(*count);
+		memmove(list + removed * element_size, list + (removed + 1) * element_size,
+			(*count - removed - 1) * element_size);
 		--*count;
 	} else {
-		uint8_t *more = allocate(NULL, (*count + 1) * each);
-		if (!more)
+		uint8_t *grown = allocate(NULL, (*count + 1) * element_size);
+		if (!grown)
 			return;
 		if (*count)
-			memcpy(more, list, *count * each);
+			memcpy(grown, list, *count * element_size);
 		if (*count && random_below(2))
-			memcpy(more + *count * each, list + random_below(*count) * each, each);
+			memcpy(grown + *count * element_size, list + random_below(*count) * element_size, element_size);
 		else
-			change_value(f, more + *count * each);
+			change_value(f, grown + *count * element_size);
 		if (f->type >= PROTOBUF_C_TYPE_STRING && f->type != PROTOBUF_C_TYPE_BYTES &&
-		    !*(void **)(void *)(more + *count * each))
+		    !*(void **)(void *)(grown + *count * element_size))
 			return;
-		*(uint8_t **)at = more;
+		*(uint8_t **)at = grown;
 		++*count;
 	}
 }
@@ -248,9 +249,9 @@ static const ProtobufCFieldDescriptor *choose_field(ProtobufCMessage *m)
 	if (!(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF))
 		return f;
 	uint32_t *chosen = (uint32_t *)(void *)((uint8_t *)m + f->quantifier_offset);
-	const ProtobufCFieldDescriptor *there = protobuf_c_message_descriptor_get_field(d, *chosen);
-	if (there && random_below(16))
-		return there;
+	const ProtobufCFieldDescriptor *current = protobuf_c_message_descriptor_get_field(d, *chosen);
+	if (current && random_below(16))
+		return current;
 	*chosen = f->id;
 	*(void **)(void *)((uint8_t *)m + f->offset) = NULL;
 	return f;
@@ -276,7 +277,7 @@ static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
 {
 	ProtobufCMessage *m = protobuf_c_message_unpack(&farm__envelope__descriptor, &allocator, *size, bytes);
 	if (!m)
-		m = fresh(&farm__envelope__descriptor);
+		m = new_message(&farm__envelope__descriptor);
 	for (uint64_t i = 0, n = 1 + random_below(4); i < n && m; i++)
 		change_message(m);
 	size_t packed = m ? protobuf_c_message_get_packed_size(m) : 0;
@@ -286,13 +287,13 @@ static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
 	return out;
 }
 
-size_t message_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+size_t message_mutate(uint8_t *bytes, size_t size, size_t max_size, unsigned seed)
 {
-	begin(seed);
+	begin_mutation(seed);
 	size_t changed = size;
 	const uint8_t *out = random_below(8) ? change_packed(bytes, &changed) : NULL;
-	if (!out || changed > room)
-		return LLVMFuzzerMutate(bytes, size, room);
+	if (!out || changed > max_size)
+		return LLVMFuzzerMutate(bytes, size, max_size);
 	memcpy(bytes, out, changed);
 	return changed;
 }
@@ -306,7 +307,7 @@ size_t script_read(const uint8_t *bytes, size_t size, struct step steps[SCRIPT_S
 	for (; count < SCRIPT_STEPS && end - p > STEP_PREFIX; count++) {
 		size_t header = (size_t)p[1] << 8 | p[2], payload = (size_t)p[3] << 8 | p[4];
 		struct step *s = &steps[count];
-		s->who = p[0];
+		s->speaker = p[0];
 		p += STEP_PREFIX;
 		s->header = p;
 		s->header_size = header < (size_t)(end - p) ? header : (size_t)(end - p);
@@ -318,15 +319,15 @@ size_t script_read(const uint8_t *bytes, size_t size, struct step steps[SCRIPT_S
 	return count;
 }
 
-size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t room)
+size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t max_size)
 {
 	uint8_t *p = bytes;
 	for (size_t i = 0; i < count; i++) {
 		const struct step *s = &steps[i];
-		if (s->header_size > PART_MOST || s->payload_size > PART_MOST ||
-		    STEP_PREFIX + s->header_size + s->payload_size > room - (size_t)(p - bytes))
+		if (s->header_size > PART_BYTES_MAX || s->payload_size > PART_BYTES_MAX ||
+		    STEP_PREFIX + s->header_size + s->payload_size > max_size - (size_t)(p - bytes))
 			return 0;
-		*p++ = s->who;
+		*p++ = s->speaker;
 		*p++ = (uint8_t)(s->header_size >> 8);
 		*p++ = (uint8_t)s->header_size;
 		*p++ = (uint8_t)(s->payload_size >> 8);
@@ -341,27 +342,27 @@ size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size
 	return (size_t)(p - bytes);
 }
 
-size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload,
-		  size_t payload_size)
+size_t script_add(uint8_t *bytes, size_t size, size_t max_size, uint8_t speaker, const Farm__Envelope *m,
+		  const void *payload, size_t payload_size)
 {
-	static uint8_t header[PART_MOST];
-	struct step s = {.who = who, .header = header, .payload = payload, .payload_size = payload_size};
+	static uint8_t header[PART_BYTES_MAX];
+	struct step s = {.speaker = speaker, .header = header, .payload = payload, .payload_size = payload_size};
 	s.header_size = farm__envelope__get_packed_size(m);
 	if (s.header_size > sizeof header)
 		return size;
 	farm__envelope__pack(m, header);
-	return size + script_write(&s, 1, bytes + size, room - size);
+	return size + script_write(&s, 1, bytes + size, max_size - size);
 }
 
 static void change_payload(struct step *s)
 {
-	size_t room = s->payload_size + 64 < PART_MOST ? s->payload_size + 64 : PART_MOST;
-	uint8_t *p = allocate(NULL, room);
+	size_t max_size = s->payload_size + 64 < PART_BYTES_MAX ? s->payload_size + 64 : PART_BYTES_MAX;
+	uint8_t *p = allocate(NULL, max_size);
 	if (!p)
 		return;
 	if (s->payload_size)
 		memcpy(p, s->payload, s->payload_size);
-	s->payload_size = LLVMFuzzerMutate(p, s->payload_size, room);
+	s->payload_size = LLVMFuzzerMutate(p, s->payload_size, max_size);
 	s->payload = p;
 }
 
@@ -371,7 +372,7 @@ static void change_step(struct step *s, unsigned speakers)
 	const uint8_t *changed;
 	switch (random_below(10)) {
 	case 0:
-		s->who = (uint8_t)random_below(speakers);
+		s->speaker = (uint8_t)random_below(speakers);
 		break;
 	case 1:
 	case 2:
@@ -394,7 +395,7 @@ static size_t change_script(struct step *steps, size_t count, unsigned speakers)
 		if (count == SCRIPT_STEPS)
 			return count;
 		memmove(steps + at + 1, steps + at, (count - at) * sizeof *steps);
-		steps[at] = (struct step){.who = (uint8_t)random_below(speakers), .header = now.bytes};
+		steps[at] = (struct step){.speaker = (uint8_t)random_below(speakers), .header = mutator.bytes};
 		change_step(&steps[at], speakers);
 		return count + 1;
 	case 1: /* repeat a step */
@@ -417,18 +418,18 @@ static size_t change_script(struct step *steps, size_t count, unsigned speakers)
 	}
 }
 
-size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, unsigned speakers)
+size_t script_mutate(uint8_t *bytes, size_t size, size_t max_size, unsigned seed, unsigned speakers)
 {
 	struct step steps[SCRIPT_STEPS];
-	begin(seed);
+	begin_mutation(seed);
 	uint8_t *copy = allocate(NULL, size + 1); /* the input may overwrite the bytes that the steps point at */
 	if (!copy || random_below(32) == 0)
-		return LLVMFuzzerMutate(bytes, size, room);
+		return LLVMFuzzerMutate(bytes, size, max_size);
 	if (size)
 		memcpy(copy, bytes, size);
 	size_t count = script_read(copy, size, steps);
 	for (uint64_t i = 0, n = 1 + random_below(3); i < n; i++)
 		count = change_script(steps, count, speakers);
-	size_t changed = script_write(steps, count, bytes, room);
-	return changed ? changed : LLVMFuzzerMutate(bytes, size, room);
+	size_t changed = script_write(steps, count, bytes, max_size);
+	return changed ? changed : LLVMFuzzerMutate(bytes, size, max_size);
 }

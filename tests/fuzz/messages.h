@@ -17,7 +17,7 @@ enum { SCRIPT_STEPS = 64 /* further steps are ignored */ };
 /* In the input: speaker, u16 BE header size, u16 BE payload size, header, payload; a truncated part is as long as what
  * is there. */
 struct step {
-	uint8_t who;
+	uint8_t speaker;
 	const uint8_t *header, *payload;
 	size_t header_size, payload_size;
 };

@@ -16,20 +16,20 @@ struct seed {
 	size_t size;
 };
 
-bool seeds_wanted(void);
-void seed_say(struct seed *s, uint8_t who, const Farm__Envelope *m, const void *payload, size_t size);
-void seed_raw(struct seed *s, uint8_t who, const char *text);
-void seed_end(struct seed *s, const char *name, uint64_t number); /* writes the seed, and empties it */
-void seed_file(const char *name, uint64_t number, const void *bytes, size_t size);
+bool seeds_are_requested(void);
+void seed_add_message(struct seed *s, uint8_t speaker, const Farm__Envelope *m, const void *payload, size_t size);
+void seed_add_raw(struct seed *s, uint8_t speaker, const char *text);
+void seed_write(struct seed *s, const char *name, uint64_t number); /* writes the seed, and empties it */
+void seed_write_file(const char *name, uint64_t number, const void *bytes, size_t size);
 
 /* Adds a message without payload; the kind is given as the envelope's case and as its member. */
-#define SEED_SAY(seed, who, KIND, kind, message)                \
-	do {                                                    \
-		Farm__Envelope seed_m;                          \
-		farm__envelope__init(&seed_m);                  \
-		seed_m.body_case = FARM__ENVELOPE__BODY_##KIND; \
-		seed_m.kind = (message);                        \
-		seed_say((seed), (who), &seed_m, NULL, 0);      \
+#define SEED_SAY(seed, who, KIND, kind, message)                   \
+	do {                                                       \
+		Farm__Envelope seed_m;                             \
+		farm__envelope__init(&seed_m);                     \
+		seed_m.body_case = FARM__ENVELOPE__BODY_##KIND;    \
+		seed_m.kind = (message);                           \
+		seed_add_message((seed), (who), &seed_m, NULL, 0); \
 	} while (0)
 
 #endif

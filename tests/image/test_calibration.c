@@ -21,7 +21,7 @@
  * FULL=1: larger pictures with more samples, and the cases after the fourth.
  * HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/repeats.h"
 #include "tests/support/worlds.h"
 
@@ -50,13 +50,13 @@ enum { RENDERS = 200 };
 
 enum { DIFFUSE, GLASS, SCENES };
 
-static struct world *build(int scene, uint32_t width, uint32_t height)
+static struct world *build_scene(int scene, uint32_t width, uint32_t height)
 {
 	if (scene == GLASS) /* a caustic, in which path gives fireflies */
-		return world_of_text(width, height, ROOM LAMP("1.2", "6,5,4") BALL("<bsdf type='dielectric'/>"));
-	return world_of_text(width, height,
-			     ROOM LAMP("0.8", "6,5,4")
-				     BALL("<bsdf type='diffuse'><rgb name='reflectance' value='0.2,0.5,0.7'/></bsdf>"));
+		return world_from_text(width, height, ROOM LAMP("1.2", "6,5,4") BALL("<bsdf type='dielectric'/>"));
+	return world_from_text(width, height,
+			       ROOM LAMP("0.8", "6,5,4") BALL(
+				       "<bsdf type='diffuse'><rgb name='reflectance' value='0.2,0.5,0.7'/></bsdf>"));
 }
 
 struct reference {
@@ -67,21 +67,21 @@ struct reference {
 
 static struct reference references[SCENES];
 
-static struct reference *reference_of(int scene)
+static struct reference *get_reference(int scene)
 {
 	struct reference *r = &references[scene];
 	if (r->world)
 		return r;
-	r->world = build(scene, test_full() ? 32 : 8, test_full() ? 24 : 6);
+	r->world = build_scene(scene, test_is_full() ? 32 : 8, test_is_full() ? 24 : 6);
 	r->values = r->world->settings.width * r->world->settings.height * 3;
 	r->rgb = calloc(r->values, sizeof *r->rgb);
 	enum { PARTS = 4 };
 	struct repeats parts;
 	repeats_run(r->world,
-		    &(struct repeats_how){.integrator = scene == GLASS ? "bdpt" : "path",
-					  .test = "calibration reference",
-					  .count = PARTS,
-					  .spp = scene == GLASS ? 3000 : 2000},
+		    &(struct repeats_options){.integrator = scene == GLASS ? "bdpt" : "path",
+					      .test = "calibration reference",
+					      .count = PARTS,
+					      .spp = scene == GLASS ? 3000 : 2000},
 		    NULL, NULL, &parts);
 	double mean = 0;
 	for (uint32_t p = 0; p < PARTS; p++) {
@@ -93,11 +93,11 @@ static struct reference *reference_of(int scene)
 		mean += r->rgb[i] / r->values;
 	r->floor_square = 1e-4 * mean * mean;
 	print_message("reference: relative error %.2f %%, %.1f s CPU\n", 100 * sqrt(r->variance), parts.cpu_seconds);
-	repeats_free(&parts);
+	repeats_fini(&parts);
 	return r;
 }
 
-struct kase {
+struct calibration_case {
 	const char *name, *integrator;
 	int scene;
 	uint64_t spp, epoch, bootstrap;
@@ -106,11 +106,11 @@ struct kase {
 };
 
 struct figures {
-	double realised, bias, median, pixels; /* root mean square; mean estimated over mean realised; .. */
-	int known, held, upper, b_held;	       /* known: renders that state an interval */
+	double realised, bias, median, pixel_coverage;	   /* root mean square; mean estimated over mean realised; .. */
+	int stated, covered, upper_bounds_held, b_covered; /* stated: renders that state an interval */
 };
 
-static int by_size(const void *a, const void *b)
+static int compare_ratios(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x > y) - (x < y);
@@ -125,83 +125,86 @@ static double realised_error(const struct reference *r, const struct canvas_imag
 }
 
 /* `shrink`: the planted fault: all errors are divided by it. */
-static struct figures figures_of(const struct reference *r, const struct repeats *s, double b, double shrink)
+static struct figures compute_figures(const struct reference *r, const struct repeats *s, double b, double shrink)
 {
 	struct figures f = {0};
-	double ratio[RENDERS], mean = 0, estimated = 0, inside = 0, all = 0, square = shrink * shrink;
+	double ratio[RENDERS], mean = 0, estimated = 0, covered_count = 0, value_count = 0,
+			       shrink_square = shrink * shrink;
 	for (uint32_t i = 0; i < RENDERS; i++)
 		mean += realised_error(r, &s->images[i]) / RENDERS;
 	for (uint32_t i = 0; i < RENDERS; i++) {
 		const struct canvas_image *img = &s->images[i];
-		double own = realised_error(r, img);
-		ratio[i] = own / img->rel_mse * square;
-		estimated += img->rel_mse / square / RENDERS;
-		f.known += img->rel_mse_doubt == ERROR_KNOWN;
-		f.held += img->rel_mse_95[0] / square <= own && own <= img->rel_mse_95[1] / square;
-		f.upper += img->rel_mse_doubt == ERROR_KNOWN && img->rel_mse_upper / square >= own;
-		f.b_held += fabs(img->b - b) <= 2.131 * img->b_error / shrink;
+		double realised = realised_error(r, img);
+		ratio[i] = realised / img->rel_mse * shrink_square;
+		estimated += img->rel_mse / shrink_square / RENDERS;
+		f.stated += img->rel_mse_doubt == ERROR_DOUBT_NONE;
+		f.covered += img->rel_mse_95[0] / shrink_square <= realised &&
+			     realised <= img->rel_mse_95[1] / shrink_square;
+		f.upper_bounds_held +=
+			img->rel_mse_doubt == ERROR_DOUBT_NONE && img->rel_mse_upper / shrink_square >= realised;
+		f.b_covered += fabs(img->b - b) <= 2.131 * img->b_error / shrink;
 		for (uint32_t k = 0; k < r->values; k++) {
 			double error = (double)img->error[k] / shrink;
-			all += error > 0;
-			inside += error > 0 && fabs((double)img->rgb[k] - r->rgb[k]) <= 1.96 * error;
+			value_count += error > 0;
+			covered_count += error > 0 && fabs((double)img->rgb[k] - r->rgb[k]) <= 1.96 * error;
 		}
 	}
-	qsort(ratio, RENDERS, sizeof *ratio, by_size);
+	qsort(ratio, RENDERS, sizeof *ratio, compare_ratios);
 	f.realised = sqrt(mean);
 	f.bias = estimated / mean;
 	f.median = ratio[RENDERS / 2];
-	f.pixels = inside / all;
+	f.pixel_coverage = covered_count / value_count;
 	return f;
 }
 
-static bool interval_is_right(const struct figures *f)
+static bool has_right_coverage(const struct figures *f)
 {
-	return f->held * 10 >= f->known * 9;
+	return f->covered * 10 >= f->stated * 9;
 }
 
-static void check(const struct kase *c)
+static void check(const struct calibration_case *c)
 {
-	struct repeats_how how = {.integrator = c->integrator,
-				  .test = c->name,
-				  .count = RENDERS / test_scale() + 1,
-				  .spp = c->spp * (test_full() ? 2 : 1),
-				  .epoch = c->epoch,
-				  .bootstrap = c->bootstrap,
-				  .chains = c->chains,
-				  .groups = 16};
+	struct repeats_options options = {.integrator = c->integrator,
+					  .test = c->name,
+					  .count = RENDERS / test_scale() + 1,
+					  .spp = c->spp * (test_is_full() ? 2 : 1),
+					  .epoch = c->epoch,
+					  .bootstrap = c->bootstrap,
+					  .chains = c->chains,
+					  .groups = 16};
 	struct repeats s;
-	if (test_scaled()) {
-		struct world *w = build(c->scene, 8, 6);
-		repeats_run(w, &how, NULL, NULL, &s);
-		repeats_free(&s);
+	if (test_is_scaled()) {
+		struct world *w = build_scene(c->scene, 8, 6);
+		repeats_run(w, &options, NULL, NULL, &s);
+		repeats_fini(&s);
 		world_free(w);
 		return;
 	}
-	struct reference *r = reference_of(c->scene);
-	how.count = RENDERS;
-	repeats_run(r->world, &how, NULL, NULL, &s);
+	struct reference *r = get_reference(c->scene);
+	options.count = RENDERS;
+	repeats_run(r->world, &options, NULL, NULL, &s);
 	/* The mean of 200 values of b replaces the true b: its error is at most a fourteenth of that of one value. */
 	double b = 0;
 	for (uint32_t i = 0; i < RENDERS; i++)
 		b += s.images[i].b / RENDERS;
-	struct figures f = figures_of(r, &s, b, 1), planted = figures_of(r, &s, b, 1.3);
+	struct figures f = compute_figures(r, &s, b, 1), planted = compute_figures(r, &s, b, 1.3);
 	print_message("| %s | %s | %.1f | %.2f | %.2f | %d of %d | %d | %.1f | %d | %.3f |\n", c->name, c->integrator,
-		      100 * f.realised, f.bias, f.median, f.held, f.known, f.upper, 100 * f.pixels,
-		      c->chains ? f.b_held : 0, s.cpu_seconds / RENDERS);
-	repeats_free(&s);
-	assert_true(interval_is_right(&f));
+		      100 * f.realised, f.bias, f.median, f.covered, f.stated, f.upper_bounds_held,
+		      100 * f.pixel_coverage, c->chains ? f.b_covered : 0, s.cpu_seconds / RENDERS);
+	repeats_fini(&s);
+	assert_true(has_right_coverage(&f));
 	assert_true(fabs(f.median - 1) <= c->median);
-	assert_true(f.pixels >= 0.87 && f.pixels <= 0.975);
+	assert_true(f.pixel_coverage >= 0.87 && f.pixel_coverage <= 0.975);
 	if (c->chains)
-		assert_true(f.b_held >= 170 && f.b_held <= 199);
-	assert_false(interval_is_right(&planted) && fabs(planted.median - 1) <= c->median);
+		assert_true(f.b_covered >= 170 && f.b_covered <= 199);
+	assert_false(has_right_coverage(&planted) && fabs(planted.median - 1) <= c->median);
 }
 
-#define CASE(function, ...)                         \
-	static void function(void **unused)         \
-	{                                           \
-		(void)unused;                       \
-		check(&(struct kase){__VA_ARGS__}); \
+#define CASE(function, ...)                                     \
+	static void function(void **unused)                     \
+	{                                                       \
+		(void)unused;                                   \
+		check(&(struct calibration_case){__VA_ARGS__}); \
 	}
 CASE(room_path, "diffuse room", "path", DIFFUSE, 32, 1, 1024, 0, 0.1)
 CASE(room_pssmlt, "diffuse room", "pssmlt", DIFFUSE, 160, 60, 4096, 16, 0.1)
@@ -232,6 +235,6 @@ int main(void)
 		cmocka_unit_test(glass_erpt), cmocka_unit_test(glass_erpt4),  cmocka_unit_test(room_pssmlt),
 		cmocka_unit_test(room_hslt),  cmocka_unit_test(glass_pssmlt),
 	};
-	return _cmocka_run_group_tests("calibration", tests, test_full() ? sizeof tests / sizeof *tests : SHORT, NULL,
-				       free_references);
+	return _cmocka_run_group_tests("calibration", tests, test_is_full() ? sizeof tests / sizeof *tests : SHORT,
+				       NULL, free_references);
 }

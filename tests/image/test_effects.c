@@ -3,11 +3,11 @@
  * An effect that a scene does not call for changes nothing: each effect is forced on where it is off, and the image
  * stays the same. Bit for bit (sums of each block of each group) if the effect draws nothing different; otherwise the
  * two images agree by t over 32 groups, level 1e-6 per comparison, with a power that finds 2 % on a block and 0.5 % on
- * the mean (agree.h prints both). The cases after "all in chains" take minutes, and run only with FULL=1.
+ * the mean (agreement.h prints both). The cases after "all in chains" take minutes, and run only with FULL=1.
  */
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -57,19 +57,19 @@
 	"<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
 /* clang-format on */
 
-static struct world *world_with(const char *scene, const char *effects)
+static struct world *build_with_effects(const char *scene, const char *effects)
 {
 	worlds_effects = effects;
-	struct world *w = world_of_text(16, 16, "%s", scene);
+	struct world *w = world_from_text(16, 16, "%s", scene);
 	worlds_effects = NULL;
 	return w;
 }
 
-static bool is_on(const struct world *w, const char *name)
+static bool is_effect_on(const struct world *w, const char *name)
 {
 	struct render_summary s;
 	world_summary(w, &s);
-	return render_effect_on(&s, name);
+	return render_effect_is_on(&s, name);
 }
 
 /* ---- bits ---- */
@@ -78,7 +78,7 @@ enum { BITS_BOOTSTRAP = 256 };
 
 static const struct {
 	const char *integrator, *mutations;
-} ways[] = {
+} integrators[] = {
 	{"path", NULL},
 	{"bdpt", NULL},
 	{"pssmlt", NULL},
@@ -87,20 +87,22 @@ static const struct {
 
 static void check_bits(const char *scene, const char *effect)
 {
-	static struct agree_image plain, forced;
+	static struct agreement_image plain, forced;
 	char text[64];
 	snprintf(text, sizeof text, "+%s", effect);
-	struct world *a = world_with(scene, NULL), *b = world_with(scene, text);
-	assert_false(is_on(a, effect));
-	assert_true(is_on(b, effect));
-	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-		const struct agree_side how = {ways[i].integrator, 256, 16, 1, 4};
-		agree_render_chains(a, effect, "bits", &how, BITS_BOOTSTRAP, ways[i].mutations, &plain);
-		agree_render_chains(b, effect, "bits", &how, BITS_BOOTSTRAP, ways[i].mutations, &forced);
+	struct world *a = build_with_effects(scene, NULL), *b = build_with_effects(scene, text);
+	assert_false(is_effect_on(a, effect));
+	assert_true(is_effect_on(b, effect));
+	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
+		const struct agreement_options options = {integrators[i].integrator, 256, 16, 1, 4};
+		agreement_render_with_mutations(a, effect, "bits", &options, BITS_BOOTSTRAP, integrators[i].mutations,
+						&plain);
+		agreement_render_with_mutations(b, effect, "bits", &options, BITS_BOOTSTRAP, integrators[i].mutations,
+						&forced);
 		if (memcmp(plain.mean, forced.mean, sizeof plain.mean) != 0)
-			fail_msg("%s forced on changes bits of %s", effect, ways[i].integrator);
+			fail_msg("%s forced on changes bits of %s", effect, integrators[i].integrator);
 		assert_int_equal(plain.counters[COUNT_ACCEPTED], forced.counters[COUNT_ACCEPTED]);
-		assert_true(plain.mean[0][AGREE_CELLS] > 0);
+		assert_true(plain.mean[0][AGREEMENT_CELLS] > 0);
 	}
 	world_free(a);
 	world_free(b);
@@ -109,11 +111,11 @@ static void check_bits(const char *scene, const char *effect)
 static void test_bits(void **state)
 {
 	(void)state;
-	static const char *const in_a_grey_room[] = {"aperture",     "half-vectors", "specular",
+	static const char *const unused_effects[] = {"aperture",     "half-vectors", "specular",
 						     "glossy",	     "transmission", "textures",
 						     "displacement", "environment",  "delta-light"};
-	for (size_t i = 0; i < sizeof in_a_grey_room / sizeof *in_a_grey_room; i++)
-		check_bits(VIEW WALLS LAMP, in_a_grey_room[i]);
+	for (size_t i = 0; i < sizeof unused_effects / sizeof *unused_effects; i++)
+		check_bits(VIEW WALLS LAMP, unused_effects[i]);
 	check_bits(VIEW WALLS POINT, "area-light");
 	check_bits(VIEW WALLS POINT, "emitter-move");
 	check_bits(VIEW BALL("<bsdf type='conductor'><string name='material' value='none'/></bsdf>") LAMP, "diffuse");
@@ -149,8 +151,8 @@ static void test_bits(void **state)
 static const struct comparison {
 	const char *name, *scene, *effects, *effect, *integrator;
 	uint64_t spp, forced_spp; /* one wavelength per path is noisier than four, and four are noisier than grey */
-	const char *mutations, *forced; /* half of the mutations are independent, so that blocks agree to 2 % within
-					 * seconds */
+	const char *mutations, *forced_mutations; /* half of the mutations are independent, so that blocks agree to 2 %
+						   * within seconds */
 } comparisons[] = {
 	{"colour", VIEW WALLS LAMP, "+colour", "colour", "path", 1536, 1536, NULL, NULL},
 	{"dispersion", GLASS_UNDER_THE_SKY, "+dispersion", "dispersion", "path", 256, 512, NULL, NULL},
@@ -165,15 +167,16 @@ static const struct comparison {
 static void test_agreement(void **state)
 {
 	const struct comparison *t = *state;
-	static struct agree_image plain, forced;
-	struct world *a = world_with(t->scene, NULL), *b = world_with(t->scene, t->effects);
-	const struct agree_side how = {t->integrator, t->spp, 32, 0, 0},
-				more = {t->integrator, t->forced_spp, 32, 0, 0};
-	assert_false(is_on(a, t->effect));
-	assert_true(is_on(b, t->effect));
-	agree_render_chains(a, t->name, "plain", &how, AGREE_BOOTSTRAP, t->mutations, &plain);
-	agree_render_chains(b, t->name, "forced", &more, AGREE_BOOTSTRAP, t->forced, &forced);
-	agree_check(t->name, &forced, &plain);
+	static struct agreement_image plain, forced;
+	struct world *a = build_with_effects(t->scene, NULL), *b = build_with_effects(t->scene, t->effects);
+	const struct agreement_options options = {t->integrator, t->spp, 32, 0, 0},
+				       forced_options = {t->integrator, t->forced_spp, 32, 0, 0};
+	assert_false(is_effect_on(a, t->effect));
+	assert_true(is_effect_on(b, t->effect));
+	agreement_render_with_mutations(a, t->name, "plain", &options, AGREEMENT_BOOTSTRAP, t->mutations, &plain);
+	agreement_render_with_mutations(b, t->name, "forced", &forced_options, AGREEMENT_BOOTSTRAP, t->forced_mutations,
+					&forced);
+	agreement_check(t->name, &forced, &plain);
 	world_free(a);
 	world_free(b);
 }
@@ -185,5 +188,5 @@ int main(void)
 	for (size_t i = 0; i < COMPARED; i++)
 		tests[i + 1] = (struct CMUnitTest){comparisons[i].name, test_agreement, NULL, NULL,
 						   (void *)(uintptr_t)&comparisons[i]};
-	return _cmocka_run_group_tests("effects", tests, (test_full() ? COMPARED : SHORT) + 1, NULL, NULL);
+	return _cmocka_run_group_tests("effects", tests, (test_is_full() ? COMPARED : SHORT) + 1, NULL, NULL);
 }

@@ -13,7 +13,7 @@
  * samples give a quarter of it.
  */
 #include "common/base/color.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/render_picture.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/image/compare.h"
@@ -32,10 +32,10 @@ static const double mean_tolerance = 0.03, trim = 0.001;
 /* Samples for each pixel that is compared, and the relMSE that is allowed with them, most of which is noise. */
 static uint32_t samples_per_pixel(void)
 {
-	return test_full() ? 256 : 128;
+	return test_is_full() ? 256 : 128;
 }
 
-static double most_rel_mse(void)
+static double max_rel_mse(void)
 {
 	return 2.56 / samples_per_pixel();
 }
@@ -64,54 +64,56 @@ static void read_reference(const char *folder, struct picture *p)
 	shrink_picture(p);
 }
 
-static void render(const struct world *w, const struct subject *s, uint64_t fewer, struct picture *xyz)
+static void render_xyz(const struct world *w, const struct subject *s, uint64_t divisor, struct picture *xyz)
 {
 	uint32_t box = w->settings.width / WIDTH;
-	uint64_t full = (samples_per_pixel() + box * box - 1) / (box * box), spp = full / (fewer * test_scale());
-	struct render_picture_how how = {"path", s->folder, spp ? spp : 1, s->max_depth};
-	render_picture_xyz(w, &how, xyz);
+	uint64_t samples_per_box_pixel = (samples_per_pixel() + box * box - 1) / (box * box),
+		 spp = samples_per_box_pixel / (divisor * test_scale());
+	struct render_picture_options options = {"path", s->folder, spp ? spp : 1, s->max_depth};
+	render_picture_xyz(w, &options, xyz);
 	shrink_picture(xyz);
 }
 
 /* accuracy: NULL, or a setting other than the default. */
-static void render_in_colour(const struct subject *s, const char *accuracy, uint64_t fewer, struct picture *rgb)
+static void render_rgb(const struct subject *s, const char *accuracy, uint64_t divisor, struct picture *rgb)
 {
 	worlds_accuracy = accuracy;
-	struct world *w = world_of_public_scene(s->folder, "scene.xml", 0, 0);
+	struct world *w = world_from_public_scene(s->folder, "scene.xml", 0, 0);
 	worlds_accuracy = NULL;
-	render(w, s, fewer, rgb);
+	render_xyz(w, s, divisor, rgb);
 	world_free(w);
 	for (size_t i = 0; i < (size_t)rgb->image.width * rgb->image.height; i++) {
-		double from[3] = {(double)rgb->rgb[0][i], (double)rgb->rgb[1][i], (double)rgb->rgb[2][i]}, to[3];
-		rec709_from_xyz(from, to);
+		double xyz[3] = {(double)rgb->rgb[0][i], (double)rgb->rgb[1][i], (double)rgb->rgb[2][i]}, to[3];
+		rec709_from_xyz(xyz, to);
 		for (int c = 0; c < 3; c++)
 			rgb->image.planes[c][i] = (float)to[c];
 	}
 }
 
-/* Prints the comparison; what: names the pictures. */
-static struct compare_result measure(const struct picture *ours, const struct picture *reference,
-				     const struct subject *s, const char *what)
+/* Prints the comparison; label: names the pictures. */
+static struct compare_result compare_pictures(const struct picture *rendered, const struct picture *reference,
+					      const struct subject *s, const char *label)
 {
-	struct compare_result all, r;
+	struct compare_result untrimmed, r;
 	struct error e = {""};
-	if (compare(ours, reference, 0, &all, &e) || compare(ours, reference, trim, &r, &e))
+	if (compare_to_reference(rendered, reference, 0, &untrimmed, &e) ||
+	    compare_to_reference(rendered, reference, trim, &r, &e))
 		fail_msg("%s", e.text);
-	print_message("%s, %s: mean luminance x %.4f, relMSE %.4f, trimmed %.4f\n", s->folder, what, r.luminance_ratio,
-		      all.rel_mse, r.rel_mse);
+	print_message("%s, %s: mean luminance x %.4f, relMSE %.4f, trimmed %.4f\n", s->folder, label, r.luminance_ratio,
+		      untrimmed.rel_mse, r.rel_mse);
 	return r;
 }
 
 static void check_result(const struct compare_result *r)
 {
-	if (test_scaled())
+	if (test_is_scaled())
 		return;
 	assert_true(fabs(r->luminance_ratio - 1) <= mean_tolerance);
-	assert_true(r->rel_mse <= most_rel_mse());
+	assert_true(r->rel_mse <= max_rel_mse());
 }
 
 /* Replaces all channels by the luminance, so that errors over three channels are those of one. */
-static void keep_luminance(struct picture *p)
+static void replace_by_luminance(struct picture *p)
 {
 	for (size_t i = 0; i < (size_t)p->image.width * p->image.height; i++) {
 		double y =
@@ -133,30 +135,31 @@ static void compare_in_rgb(const struct subject *s)
 {
 	static const double channel_tolerance = 0.002; /* about seven standard errors of a mean */
 	skip_without_scenes();
-	struct picture ours, reference;
+	struct picture rendered, reference;
 	read_reference(s->folder, &reference);
-	render_in_colour(s, "colour=rgb", 1, &ours);
-	struct compare_result r = measure(&ours, &reference, s, "rgb");
-	picture_fini(&ours);
+	render_rgb(s, "colour=rgb", 1, &rendered);
+	struct compare_result r = compare_pictures(&rendered, &reference, s, "rgb");
+	picture_fini(&rendered);
 	picture_fini(&reference);
 	check_result(&r);
 	for (int c = 0; c < 3; c++) {
 		print_message("channel %d: mean x %.5f\n", c, r.mean_a[c] / r.mean_b[c]);
-		assert_true(test_scaled() || fabs(r.mean_a[c] / r.mean_b[c] - 1) <= channel_tolerance);
+		assert_true(test_is_scaled() || fabs(r.mean_a[c] / r.mean_b[c] - 1) <= channel_tolerance);
 	}
 }
 
 static void compare_in_colour(const struct subject *s)
 {
 	skip_without_scenes();
-	struct picture ours, reference;
+	struct picture rendered, reference;
 	read_reference(s->folder, &reference);
-	render_in_colour(s, NULL, 1, &ours);
-	measure(&ours, &reference, s, "spectral, all of it (not tested: an RGB renderer has other colours)");
-	keep_luminance(&ours);
-	keep_luminance(&reference);
-	struct compare_result r = measure(&ours, &reference, s, "spectral, luminance");
-	picture_fini(&ours);
+	render_rgb(s, NULL, 1, &rendered);
+	compare_pictures(&rendered, &reference, s,
+			 "spectral, all of it (not tested: an RGB renderer has other colours)");
+	replace_by_luminance(&rendered);
+	replace_by_luminance(&reference);
+	struct compare_result r = compare_pictures(&rendered, &reference, s, "spectral, luminance");
+	picture_fini(&rendered);
 	picture_fini(&reference);
 	check_result(&r);
 }
@@ -189,14 +192,14 @@ static void veach_mis_in_colour(void **state)
 {
 	(void)state;
 	compare_in_colour(&veach_mis);
-	struct picture ours, reference;
+	struct picture rendered, reference;
 	read_reference(veach_mis.folder, &reference);
-	render_in_colour(&veach_mis_as_written, NULL, 4, &ours);
-	keep_luminance(&ours);
-	keep_luminance(&reference);
-	measure(&ours, &reference, &veach_mis,
-		"spectral, luminance, at the scene's own depth (not tested: the reference is direct light)");
-	picture_fini(&ours);
+	render_rgb(&veach_mis_as_written, NULL, 4, &rendered);
+	replace_by_luminance(&rendered);
+	replace_by_luminance(&reference);
+	compare_pictures(&rendered, &reference, &veach_mis,
+			 "spectral, luminance, at the scene's own depth (not tested: the reference is direct light)");
+	picture_fini(&rendered);
 	picture_fini(&reference);
 }
 
@@ -210,8 +213,8 @@ int main(void)
 	};
 	size_t count = sizeof tests / sizeof *tests;
 	return _cmocka_run_group_tests("reference", tests,
-				       test_scaled() ? 1
-				       : test_full() ? count
-						     : count - 1,
+				       test_is_scaled() ? 1
+				       : test_is_full() ? count
+							: count - 1,
 				       NULL, NULL);
 }

@@ -24,19 +24,19 @@
 #include <time.h>
 #include <unistd.h>
 
-#define GRACE 10.0 /* seconds between SIGTERM and SIGKILL */
+#define GRACE_SECONDS 10.0 /* seconds between SIGTERM and SIGKILL */
 
 struct process {
 	pid_t pid, parent;
 	char state; /* as in proc(5) */
 	char name[32];
-	double cpu; /* seconds: its own and those of its children that it waited for */
-	bool ours;
+	double cpu_seconds; /* seconds: its own and those of its children that it waited for */
+	bool is_descendant;
 };
 
-struct table {
-	struct process *of;
-	size_t n, room;
+struct process_table {
+	struct process *processes;
+	size_t count, capacity;
 };
 
 static double seconds_now(void)
@@ -64,14 +64,14 @@ static bool read_stat(const char *path, struct process *p)
 		   &user, &system, &user_children, &system_children) != 6)
 		return false;
 	snprintf(p->name, sizeof p->name, "%.*s", (int)(close - open - 1), open + 1);
-	p->cpu = (double)(user + system + (unsigned long)user_children + (unsigned long)system_children) /
-		 (double)sysconf(_SC_CLK_TCK);
+	p->cpu_seconds = (double)(user + system + (unsigned long)user_children + (unsigned long)system_children) /
+			 (double)sysconf(_SC_CLK_TCK);
 	return true;
 }
 
-static void read_table(struct table *t)
+static void read_process_table(struct process_table *t)
 {
-	t->n = 0;
+	t->count = 0;
 	DIR *d = opendir("/proc");
 	if (!d)
 		return;
@@ -80,33 +80,34 @@ static void read_table(struct table *t)
 		pid_t pid = atoi(e->d_name);
 		if (pid <= 0)
 			continue;
-		if (t->n == t->room) {
-			size_t room = t->room ? 2 * t->room : 256;
-			struct process *grown = realloc(t->of, room * sizeof *grown);
+		if (t->count == t->capacity) {
+			size_t capacity = t->capacity ? 2 * t->capacity : 256;
+			struct process *grown = realloc(t->processes, capacity * sizeof *grown);
 			if (!grown)
 				break;
-			t->of = grown;
-			t->room = room;
+			t->processes = grown;
+			t->capacity = capacity;
 		}
 		snprintf(path, sizeof path, "/proc/%d/stat", pid);
-		struct process *p = &t->of[t->n];
+		struct process *p = &t->processes[t->count];
 		*p = (struct process){.pid = pid};
 		if (read_stat(path, p))
-			t->n++;
+			t->count++;
 	}
 	closedir(d);
 	/* Descendants: until a pass finds no more. */
-	for (bool more = true; more;) {
-		more = false;
-		for (size_t i = 0; i < t->n; i++) {
-			for (size_t k = 0; !t->of[i].ours && k < t->n; k++)
-				if (t->of[k].pid == t->of[i].parent && (t->of[k].ours || t->of[k].pid == getpid()))
-					t->of[i].ours = more = true;
+	for (bool found_more = true; found_more;) {
+		found_more = false;
+		for (size_t i = 0; i < t->count; i++) {
+			for (size_t k = 0; !t->processes[i].is_descendant && k < t->count; k++)
+				if (t->processes[k].pid == t->processes[i].parent &&
+				    (t->processes[k].is_descendant || t->processes[k].pid == getpid()))
+					t->processes[i].is_descendant = found_more = true;
 		}
 	}
 }
 
-static bool wants_to_run(char state)
+static bool is_runnable_state(char state)
 {
 	return state == 'R' || state == 'D';
 }
@@ -121,45 +122,47 @@ static bool has_runnable_thread(pid_t pid)
 	for (struct dirent *e; d && !any && (e = readdir(d));) {
 		struct process thread;
 		snprintf(path, sizeof path, "/proc/%d/task/%.20s/stat", pid, e->d_name);
-		any = e->d_name[0] != '.' && read_stat(path, &thread) && wants_to_run(thread.state);
+		any = e->d_name[0] != '.' && read_stat(path, &thread) && is_runnable_state(thread.state);
 	}
 	if (d)
 		closedir(d);
 	return any;
 }
 
-static bool any_runnable(const struct table *t)
+static bool has_runnable_process(const struct process_table *t)
 {
-	for (size_t i = 0; i < t->n; i++)
-		if (t->of[i].ours && (wants_to_run(t->of[i].state) || has_runnable_thread(t->of[i].pid)))
+	for (size_t i = 0; i < t->count; i++)
+		if (t->processes[i].is_descendant &&
+		    (is_runnable_state(t->processes[i].state) || has_runnable_thread(t->processes[i].pid)))
 			return true;
 	return false;
 }
 
 /* Seconds that the tree has used so far: the living, and those that were waited for. */
-static double total_cpu(const struct table *t)
+static double tree_cpu_seconds(const struct process_table *t)
 {
 	double sum = 0, own_children = 0;
-	struct timespec mine;
-	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &mine);
-	for (size_t i = 0; i < t->n; i++) {
-		if (t->of[i].ours)
-			sum += t->of[i].cpu;
-		else if (t->of[i].pid == getpid())
-			own_children = t->of[i].cpu - ((double)mine.tv_sec + 1e-9 * (double)mine.tv_nsec);
+	struct timespec own_cpu;
+	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &own_cpu);
+	for (size_t i = 0; i < t->count; i++) {
+		if (t->processes[i].is_descendant)
+			sum += t->processes[i].cpu_seconds;
+		else if (t->processes[i].pid == getpid())
+			own_children =
+				t->processes[i].cpu_seconds - ((double)own_cpu.tv_sec + 1e-9 * (double)own_cpu.tv_nsec);
 	}
 	return sum + (own_children > 0 ? own_children : 0);
 }
 
-static void signal_all(const struct table *t, int sig)
+static void signal_all(const struct process_table *t, int sig)
 {
-	for (size_t i = 0; i < t->n; i++)
-		if (t->of[i].ours)
-			kill(t->of[i].pid, sig);
+	for (size_t i = 0; i < t->count; i++)
+		if (t->processes[i].is_descendant)
+			kill(t->processes[i].pid, sig);
 }
 
 /* Reaps what ended; the command's status once it has. */
-static bool has_ended(pid_t command, int *status)
+static bool reap_children(pid_t command, int *status)
 {
 	bool ended = false;
 	int s;
@@ -172,85 +175,85 @@ static bool has_ended(pid_t command, int *status)
 	return ended;
 }
 
-static void end_all(struct table *t)
+static void terminate_all(struct process_table *t)
 {
 	int status;
-	bool killing = false;
+	bool is_killing = false;
 	double begin = seconds_now();
-	read_table(t);
+	read_process_table(t);
 	signal_all(t, SIGTERM);
 	signal_all(t, SIGCONT);
 	for (;;) {
-		has_ended(0, &status);
-		read_table(t);
+		reap_children(0, &status);
+		read_process_table(t);
 		bool any = false;
-		for (size_t i = 0; i < t->n && !any; i++)
-			any = t->of[i].ours;
+		for (size_t i = 0; i < t->count && !any; i++)
+			any = t->processes[i].is_descendant;
 		if (!any)
 			return;
-		killing = killing || seconds_now() - begin > GRACE;
-		if (killing)
+		is_killing = is_killing || seconds_now() - begin > GRACE_SECONDS;
+		if (is_killing)
 			signal_all(t, SIGKILL);
 		nanosleep(&(struct timespec){0, 50000000}, NULL);
 	}
 }
 
-static void print_processes(const struct table *t, const char *command, const char *what, double seconds)
+static void print_processes(const struct process_table *t, const char *command, const char *reason, double seconds)
 {
 	fprintf(stderr, "limit: %s: %s for %.0f s; its processes, their states and seconds of processor time:\n",
-		command, what, seconds);
-	for (size_t i = 0; i < t->n; i++)
-		if (t->of[i].ours)
-			fprintf(stderr, "limit:   %d %s %c %.1f\n", t->of[i].pid, t->of[i].name, t->of[i].state,
-				t->of[i].cpu);
+		command, reason, seconds);
+	for (size_t i = 0; i < t->count; i++)
+		if (t->processes[i].is_descendant)
+			fprintf(stderr, "limit:   %d %s %c %.1f\n", t->processes[i].pid, t->processes[i].name,
+				t->processes[i].state, t->processes[i].cpu_seconds);
 }
 
 /* Ends when the command has, or a limit is reached. */
 static int watch_command(pid_t command, const char *name, double cpu_limit, double idle_limit, const sigset_t *signals)
 {
-	struct table t = {0};
+	struct process_table t = {0};
 	double period = cpu_limit < idle_limit ? cpu_limit / 8 : idle_limit / 8, cpu = 0, idle = 0,
-	       last = seconds_now();
+	       last_check = seconds_now();
 	off_t output = 0;
-	int status, over = 0;
+	int status, over_count = 0;
 	if (period > 1)
 		period = 1;
 	for (;;) {
 		struct timespec wait = {(time_t)period, (long)(1e9 * (period - (double)(time_t)period))};
 		int sig = sigtimedwait(signals, NULL, &wait);
-		if (has_ended(command, &status)) {
-			free(t.of);
+		if (reap_children(command, &status)) {
+			free(t.processes);
 			return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
 		}
 		if (sig > 0 && sig != SIGCHLD) {
-			end_all(&t);
+			terminate_all(&t);
 			return 128 + sig;
 		}
-		double passed = seconds_now() - last;
-		if (passed < period)
+		double elapsed = seconds_now() - last_check;
+		if (elapsed < period)
 			continue;
-		last += passed;
-		read_table(&t);
-		double before = cpu;
-		cpu = total_cpu(&t);
+		last_check += elapsed;
+		read_process_table(&t);
+		double previous_cpu = cpu;
+		cpu = tree_cpu_seconds(&t);
 		struct stat st;
 		if (fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode) && st.st_size != output) {
 			output = st.st_size;
 			idle = 0;
 		}
 		/* After a pause of this program itself only one period is known of. */
-		double used = cpu > before ? cpu - before : 0;
-		if (used < period && !any_runnable(&t))
+		double used = cpu > previous_cpu ? cpu - previous_cpu : 0;
+		if (used < period && !has_runnable_process(&t))
 			idle += period - used;
 		/* Twice: a process that ends while the table is read may count as itself and as its parent's. */
-		over = cpu >= cpu_limit ? over + 1 : 0;
-		if (over >= 2 || idle >= idle_limit) {
-			if (over >= 2)
+		over_count = cpu >= cpu_limit ? over_count + 1 : 0;
+		if (over_count >= 2 || idle >= idle_limit) {
+			if (over_count >= 2)
 				print_processes(&t, name, "it has used the processor", cpu);
 			else
 				print_processes(&t, name, "it has been idle and written nothing", idle);
-			end_all(&t);
-			free(t.of);
+			terminate_all(&t);
+			free(t.processes);
 			return 124;
 		}
 	}
@@ -263,17 +266,17 @@ int main(int argc, char **argv)
 		fputs("usage: limit CPU-SECONDS IDLE-SECONDS COMMAND [ARGUMENT...]\n", stderr);
 		return 2;
 	}
-	sigset_t signals, before;
+	sigset_t signals, old_mask;
 	sigemptyset(&signals);
 	sigaddset(&signals, SIGCHLD);
 	sigaddset(&signals, SIGINT);
 	sigaddset(&signals, SIGTERM);
 	sigaddset(&signals, SIGHUP);
-	sigprocmask(SIG_BLOCK, &signals, &before);
+	sigprocmask(SIG_BLOCK, &signals, &old_mask);
 	prctl(PR_SET_CHILD_SUBREAPER, 1);
 	pid_t command = fork();
 	if (command == 0) {
-		sigprocmask(SIG_SETMASK, &before, NULL);
+		sigprocmask(SIG_SETMASK, &old_mask, NULL);
 		execvp(argv[3], argv + 3);
 		fprintf(stderr, "limit: %s: %s\n", argv[3], strerror(errno));
 		_exit(127);

@@ -3,8 +3,8 @@
 # check, followed by the violations.
 cd "$(dirname "$0")/../.." || exit 1
 LIST=tests/lint/includes.txt
-MOST_LINES=620
-MOST_LINES_TEST=620
+MOST_LINES=640
+MOST_LINES_TEST=640
 FOLDERS="common coordinator worker"
 SOURCES=$(find $FOLDERS -name '*.[ch]' | sort)
 failed=0

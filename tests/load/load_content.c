@@ -7,7 +7,7 @@
 
 enum { STATE_BYTES = 1024 };
 
-struct kind {
+struct prepared_result {
 	struct envelope env; /* the message; only its key changes */
 	unsigned char *frame;
 	const unsigned char *payload;
@@ -15,28 +15,28 @@ struct kind {
 };
 
 struct load_content {
-	struct kind bootstrap, render;
+	struct prepared_result bootstrap, render;
 };
 
-static void pack(struct kind *k, const struct batch *b, const struct plan *p)
+static void prepare_result(struct prepared_result *k, const struct batch *b, const struct plan *p)
 {
 	struct error e;
 	size_t size;
-	struct batch again;
+	struct batch parsed;
 	if (batch_check(b, p, &e) || batch_pack(b, p, &k->frame, &size, &e))
 		load_die("the batch: %s", e.text);
 	uint32_t header =
 		(uint32_t)k->frame[0] << 24 | (uint32_t)k->frame[1] << 16 | (uint32_t)k->frame[2] << 8 | k->frame[3];
-	if (envelope_unpack(&k->env, k->frame + FRAME_PREFIX, header, &e))
+	if (envelope_unpack(&k->env, k->frame + FRAME_PREFIX_SIZE, header, &e))
 		load_die("the batch: %s", e.text);
-	k->payload = k->frame + FRAME_PREFIX + header;
-	k->payload_size = size - FRAME_PREFIX - header;
-	if (batch_unpack(&again, p, k->env.message->lease_result, k->payload, k->payload_size, &e))
+	k->payload = k->frame + FRAME_PREFIX_SIZE + header;
+	k->payload_size = size - FRAME_PREFIX_SIZE - header;
+	if (batch_unpack(&parsed, p, k->env.message->lease_result, k->payload, k->payload_size, &e))
 		load_die("the batch: %s", e.text);
-	batch_fini(&again);
+	batch_fini(&parsed);
 }
 
-static void *require(size_t count, size_t size)
+static void *alloc_or_die(size_t count, size_t size)
 {
 	void *p = mem_alloc(count, size);
 	if (!p)
@@ -48,15 +48,15 @@ static void *require(size_t count, size_t size)
 static void make_tiles(struct batch *b, const struct plan *p)
 {
 	float mean = (float)((double)p->epoch / (double)plan_extended_pixels(p));
-	uint32_t count = batch_film_tiles(p), random = 1;
-	b->tiles = require(count, sizeof *b->tiles);
+	uint32_t count = batch_film_tile_count(p), random = 1;
+	b->tiles = alloc_or_die(count, sizeof *b->tiles);
 	for (uint32_t y = 0; y < p->crop_height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < p->crop_width; x += TILE_SIZE) {
 			struct tile *t = &b->tiles[b->tile_count++];
 			*t = (struct tile){x, y, p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE,
 					   p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE, NULL};
 			size_t n = (size_t)t->width * t->height * TILE_CHANNELS;
-			t->xyz = require(n, sizeof *t->xyz);
+			t->xyz = alloc_or_die(n, sizeof *t->xyz);
 			for (size_t i = 0; i < n; i++) {
 				random = random * 1664525u + 1013904223u;
 				t->xyz[i] = mean * (float)(random >> 8) * 0x1p-23f;
@@ -64,7 +64,7 @@ static void make_tiles(struct batch *b, const struct plan *p)
 		}
 }
 
-static void make_render(struct kind *k, const struct plan *p)
+static void make_render_result(struct prepared_result *k, const struct plan *p)
 {
 	struct batch b = {.key = {1, LEASE_RENDER, 0, 0, 0}};
 	uint32_t chains = p->chains / (p->groups * p->parts);
@@ -73,32 +73,32 @@ static void make_render(struct kind *k, const struct plan *p)
 	b.counters[COUNT_ACCEPTED] = b.counters[COUNT_SAMPLES] / 2;
 	b.strategy_count = (uint32_t)plan_strategy_count(p->mutations);
 	for (uint32_t i = 0; i < b.strategy_count; i++)
-		b.strategy[i][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] / b.strategy_count;
+		b.strategies[i][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] / b.strategy_count;
 	b.classes[0] = 0.5 * (double)b.counters[COUNT_SAMPLES];
 	b.cpu_seconds = 20;
 	b.state_count = chains;
-	b.states = require(chains, sizeof *b.states);
+	b.states = alloc_or_die(chains, sizeof *b.states);
 	for (uint32_t i = 0; i < chains; i++) {
-		b.states[i].bytes = require(STATE_BYTES, 1);
+		b.states[i].bytes = alloc_or_die(STATE_BYTES, 1);
 		b.states[i].size = STATE_BYTES;
 	}
 	b.moment_count = batch_moment_count(p, LEASE_RENDER);
-	b.moments = require(b.moment_count, sizeof *b.moments);
-	uint64_t tiles = batch_film_tiles(p), sequences = batch_sequences(p);
+	b.moments = alloc_or_die(b.moment_count, sizeof *b.moments);
+	uint64_t tiles = batch_film_tile_count(p), sequences = batch_sequence_count(p);
 	for (uint64_t i = 0; i < sequences * tiles; i++)
 		b.moments[i] = 0.9f * (float)p->epoch / (float)tiles;
 	for (uint64_t i = 0; i < tiles; i++)
 		b.moments[sequences * tiles + i] = 0.5f * (float)p->epoch / (float)tiles;
-	pack(k, &b, p);
+	prepare_result(k, &b, p);
 	batch_fini(&b);
 }
 
-static void make_bootstrap(struct kind *k, const struct plan *p)
+static void make_bootstrap_result(struct prepared_result *k, const struct plan *p)
 {
 	struct batch b = {.key = {1, LEASE_BOOTSTRAP, 0, 0, 0}};
 	struct plan_range r = plan_bootstrap_range(p, 0, 0);
 	b.weight_count = r.end - r.begin;
-	b.weights = require(b.weight_count, sizeof *b.weights);
+	b.weights = alloc_or_die(b.weight_count, sizeof *b.weights);
 	for (uint64_t i = 0; i < b.weight_count; i++) {
 		b.weights[i] = 1 + 0.5f * (float)(i % 3);
 		b.independent_sum += (double)b.weights[i];
@@ -106,15 +106,15 @@ static void make_bootstrap(struct kind *k, const struct plan *p)
 	}
 	b.counters[COUNT_INDEPENDENT] = b.weight_count;
 	b.classes[0] = 0.5 * b.independent_sum;
-	pack(k, &b, p);
+	prepare_result(k, &b, p);
 	batch_fini(&b);
 }
 
 struct load_content *load_content_new(const struct plan *p)
 {
-	struct load_content *c = require(1, sizeof *c);
-	make_bootstrap(&c->bootstrap, p);
-	make_render(&c->render, p);
+	struct load_content *c = alloc_or_die(1, sizeof *c);
+	make_bootstrap_result(&c->bootstrap, p);
+	make_render_result(&c->render, p);
 	return c;
 }
 
@@ -122,7 +122,7 @@ void load_content_free(struct load_content *c)
 {
 	if (!c)
 		return;
-	struct kind *kinds[] = {&c->bootstrap, &c->render};
+	struct prepared_result *kinds[] = {&c->bootstrap, &c->render};
 	for (int i = 0; i < 2; i++) {
 		envelope_fini(&kinds[i]->env);
 		mem_free(kinds[i]->frame);
@@ -130,14 +130,14 @@ void load_content_free(struct load_content *c)
 	mem_free(c);
 }
 
-size_t load_content_bytes(const struct load_content *c)
+size_t load_content_payload_bytes(const struct load_content *c)
 {
 	return c->render.payload_size;
 }
 
 unsigned char *load_content_frame(const struct load_content *c, const struct lease_key *k, size_t *size)
 {
-	const struct kind *kind = k->kind == LEASE_BOOTSTRAP ? &c->bootstrap : &c->render;
+	const struct prepared_result *kind = k->kind == LEASE_BOOTSTRAP ? &c->bootstrap : &c->render;
 	Farm__LeaseKey key;
 	unsigned char *frame;
 	struct error e;

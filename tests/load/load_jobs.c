@@ -13,7 +13,7 @@
 enum { EPOCH = 1 << 20 };
 
 /* A job that does not end and whose error is never estimated: rounds of long epochs. */
-static struct plan_request request_of(const struct load_settings *s, unsigned index)
+static struct plan_request make_plan_request(const struct load_settings *s, unsigned index)
 {
 	return (struct plan_request){.integrator = "hslt",
 				     .kind = PLAN_CHAINS,
@@ -35,23 +35,23 @@ static struct plan_request request_of(const struct load_settings *s, unsigned in
 void load_submit(struct load *l, const char *host_port, const char *tls, unsigned index)
 {
 	static struct render_arguments args;
-	char folder[] = "tests/load", scene[] = "load.xml", text[PLAN_TEXT], name[32];
+	char folder[] = "tests/load", scene[] = "load.xml", text[PLAN_TEXT_MAX], name[32];
 	struct scene_file file = {.name = scene};
 	struct scene_files files = {.folder = folder,
-				    .folders = asset_folders_of(folder, NULL, 0),
+				    .folders = asset_folders_make(folder, NULL, 0),
 				    .scene = scene,
-				    .count = 1,
-				    .list = &file};
+				    .file_count = 1,
+				    .files = &file};
 	struct submit_request request = {.name = name, .output = "", .args = &args};
 	struct load_job *j = &l->jobs[index];
-	struct asset_source assets = asset_folder(folder);
+	struct asset_source assets = asset_source_for_folder(folder);
 	struct asset a;
 	struct client *cl;
-	struct submitted job;
+	struct submitted_job job;
 	struct error e;
 	snprintf(name, sizeof name, "load %u", index);
-	args.plan = request_of(&l->s, index);
-	files.summary.brightest = 1;
+	args.plan = make_plan_request(&l->settings, index);
+	files.summary.brightness_bound = 1;
 	int rc = plan_make(&args.plan, &j->plan, &e);
 	if (!rc)
 		rc = assets.open(assets.user, scene, &a, &e);
@@ -61,21 +61,21 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 		assets.close(assets.user, &a);
 	}
 	if (!rc)
-		rc = client_open(&cl, host_port, tls, l->s.insecure, "load", &e);
+		rc = client_open(&cl, host_port, tls, l->settings.insecure, "load", &e);
 	if (rc)
 		load_die("%s", e.text);
 	rc = submit_send(cl, &request, &files, &job, text, sizeof text, &e);
 	client_close(cl);
 	j->id = job.job;
-	j->acknowledged = mem_alloc((size_t)j->plan.groups * j->plan.parts, sizeof *j->acknowledged);
-	if (rc || !j->acknowledged)
+	j->acknowledged_epochs = mem_alloc((size_t)j->plan.groups * j->plan.parts, sizeof *j->acknowledged_epochs);
+	if (rc || !j->acknowledged_epochs)
 		load_die("%s", rc ? e.text : "no memory for a job");
 }
 
-double load_counted(const struct load *l, const char *socket, uint64_t job)
+double load_counted_mutations(const struct load *l, const char *socket, uint64_t job)
 {
 	char command[4096];
-	snprintf(command, sizeof command, "%s/hslt-status --socket %s --json j%llu", l->s.bin, socket,
+	snprintf(command, sizeof command, "%s/hslt-status --socket %s --json j%llu", l->settings.bin, socket,
 		 (unsigned long long)job);
 	FILE *f = popen(command, "r");
 	json_error_t fault;

@@ -8,28 +8,28 @@
 
 void load_times_add(struct load_times *t, double ms)
 {
-	if (t->count == t->room) {
-		size_t room = t->room ? 2 * t->room : 4096;
-		float *v = mem_grow(t->v, t->room * sizeof *v, room * sizeof *v);
+	if (t->count == t->capacity) {
+		size_t capacity = t->capacity ? 2 * t->capacity : 4096;
+		float *v = mem_grow(t->ms, t->capacity * sizeof *v, capacity * sizeof *v);
 		if (!v)
 			load_die("no memory for times");
-		t->v = v;
-		t->room = room;
+		t->ms = v;
+		t->capacity = capacity;
 	}
-	t->v[t->count++] = (float)ms;
+	t->ms[t->count++] = (float)ms;
 }
 
-static int by_value(const void *a, const void *b)
+static int compare_floats(const void *a, const void *b)
 {
 	const float *x = a, *y = b;
 	return (*x > *y) - (*x < *y);
 }
 
-double load_times_at(struct load_times *t, double share)
+double load_times_quantile(struct load_times *t, double fraction)
 {
 	if (t->count == 0)
 		return NAN;
-	qsort(t->v, t->count, sizeof *t->v, by_value);
-	size_t i = (size_t)(share * (double)t->count);
-	return (double)t->v[i < t->count ? i : t->count - 1];
+	qsort(t->ms, t->count, sizeof *t->ms, compare_floats);
+	size_t i = (size_t)(fraction * (double)t->count);
+	return (double)t->ms[i < t->count ? i : t->count - 1];
 }

@@ -14,34 +14,35 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { HOARD = 4096 };
-enum { LEASES = 8, WISHES = 8, HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
+enum { HOARDED_THREADS = 4096 };
+enum { LEASES_MAX = 8, REQUESTS_MAX = 8, HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
 enum lease_state { FREE, WAITING, WORKING, SENDING, SENT };
 
-struct held {
+struct held_lease {
 	enum lease_state state;
 	struct lease_key key;
-	double since; /* s; SENDING: when sending began; SENT: when all of it was handed over */
+	double state_since; /* s; SENDING: when sending began; SENT: when all of it was handed over */
 };
 
 struct load_worker {
 	struct load *load;
 	struct conn *conn; /* NULL: not connected */
-	uv_timer_t work, beat;
+	uv_timer_t work_timer, heartbeat_timer;
 	unsigned index;
-	int closing; /* timers of the closed connection that still have to close */
-	enum load_kind kind;
-	bool hangs;
+	int closing_timers; /* timers of the closed connection that still have to close */
+	enum load_behaviour kind;
+	bool is_hanging;
 	uint64_t jobs_ready; /* bit set: jobs whose files the worker has */
-	uint64_t jobs_asked;
-	struct held held[LEASES];
-	double wish[WISHES]; /* for each lease it waits for, when it could have been granted; NAN: not yet */
-	unsigned wishes;
-	double beat_at; /* 0: the heartbeat was answered */
-	bool first, asked;
+	uint64_t jobs_requested;
+	struct held_lease held[LEASES_MAX];
+	double request_times[REQUESTS_MAX]; /* for each lease it waits for, when it could have been granted; NAN: not
+					       yet */
+	unsigned request_count;
+	double heartbeat_sent; /* 0: the heartbeat was answered */
+	bool is_first_render, has_had_grant;
 };
 
-static void work_on(struct load_worker *w);
+static void begin_next_lease(struct load_worker *w);
 
 static void send_message(struct load_worker *w, Farm__Envelope *m, Farm__Envelope__BodyCase body)
 {
@@ -54,13 +55,13 @@ static void fail_worker(struct load_worker *w, const char *text)
 {
 	struct load *l = w->load;
 	if (!l->faults++)
-		snprintf(l->fault, sizeof l->fault, "worker %u: %s", w->index, text);
+		snprintf(l->first_fault, sizeof l->first_fault, "worker %u: %s", w->index, text);
 }
 
-static void add_wish(struct load_worker *w, double at)
+static void add_request(struct load_worker *w, double time)
 {
-	if (w->wishes < WISHES)
-		w->wish[w->wishes++] = at;
+	if (w->request_count < REQUESTS_MAX)
+		w->request_times[w->request_count++] = time;
 }
 
 static void request_leases(struct load_worker *w, unsigned want)
@@ -74,7 +75,7 @@ static void request_leases(struct load_worker *w, unsigned want)
 	send_message(w, &m, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 }
 
-static void give_back(struct load_worker *w, struct held *h)
+static void return_lease(struct load_worker *w, struct held_lease *h)
 {
 	char nothing[] = "";
 	Farm__LeaseKey key;
@@ -88,12 +89,12 @@ static void give_back(struct load_worker *w, struct held *h)
 	m.lease_failed = &f;
 	send_message(w, &m, FARM__ENVELOPE__BODY_LEASE_FAILED);
 	h->state = FREE;
-	w->load->given_back++;
+	w->load->returned++;
 }
 
 /* ---- jobs and their files */
 
-static struct load_job *job_of(const struct load *l, uint64_t id, unsigned *index)
+static struct load_job *find_job(const struct load *l, uint64_t id, unsigned *index)
 {
 	for (unsigned i = 0; i < l->job_count; i++)
 		if (l->jobs[i].id == id) {
@@ -103,7 +104,7 @@ static struct load_job *job_of(const struct load *l, uint64_t id, unsigned *inde
 	return NULL;
 }
 
-static void ask_job(struct load_worker *w, uint64_t job)
+static void request_job(struct load_worker *w, uint64_t job)
 {
 	Farm__JobGet get;
 	Farm__Envelope m;
@@ -114,7 +115,7 @@ static void ask_job(struct load_worker *w, uint64_t job)
 	send_message(w, &m, FARM__ENVELOPE__BODY_JOB_GET);
 }
 
-static void ask_file(struct load_worker *w, const Farm__File *f)
+static void request_file(struct load_worker *w, const Farm__File *f)
 {
 	Farm__BlobGet get;
 	Farm__Envelope m;
@@ -126,31 +127,31 @@ static void ask_file(struct load_worker *w, const Farm__File *f)
 }
 
 /* Each scene is one small file. */
-static void take_job(struct load_worker *w, const Farm__JobInfo *info)
+static void handle_job_info(struct load_worker *w, const Farm__JobInfo *info)
 {
 	struct load *l = w->load;
 	struct error e;
 	unsigned i;
-	struct load_job *j = job_of(l, info->job, &i);
+	struct load_job *j = find_job(l, info->job, &i);
 	struct plan p;
 	if (!j || info->n_files != 1 || plan_from_wire(info->plan, &p, &e)) {
 		fail_worker(w, "a job that is not one of ours");
 		return;
 	}
-	if (!j->known && (p.groups * p.parts != j->plan.groups * j->plan.parts || p.epoch != j->plan.epoch))
+	if (!j->has_plan && (p.groups * p.parts != j->plan.groups * j->plan.parts || p.epoch != j->plan.epoch))
 		load_die("the coordinator has made another plan");
-	j->known = true;
-	ask_file(w, info->files[0]);
+	j->has_plan = true;
+	request_file(w, info->files[0]);
 	w->jobs_ready |= UINT64_C(1) << i;
-	work_on(w);
+	begin_next_lease(w);
 }
 
 /* ---- leases */
 
-static struct held *find(struct load_worker *w, const struct lease_key *k)
+static struct held_lease *find_lease(struct load_worker *w, const struct lease_key *k)
 {
-	for (int i = 0; i < LEASES; i++) {
-		struct held *h = &w->held[i];
+	for (int i = 0; i < LEASES_MAX; i++) {
+		struct held_lease *h = &w->held[i];
 		if (h->state != FREE && h->key.job == k->job && h->key.kind == k->kind && h->key.group == k->group &&
 		    h->key.part == k->part && h->key.epoch == k->epoch)
 			return h;
@@ -158,27 +159,27 @@ static struct held *find(struct load_worker *w, const struct lease_key *k)
 	return NULL;
 }
 
-static struct held *in_state(struct load_worker *w, enum lease_state state)
+static struct held_lease *find_in_state(struct load_worker *w, enum lease_state state)
 {
-	for (int i = 0; i < LEASES; i++)
+	for (int i = 0; i < LEASES_MAX; i++)
 		if (w->held[i].state == state)
 			return &w->held[i];
 	return NULL;
 }
 
-static void send_result(struct load_worker *w, struct held *h)
+static void send_result(struct load_worker *w, struct held_lease *h)
 {
 	struct load *l = w->load;
 	size_t size;
 	unsigned char *frame = load_content_frame(l->content, &h->key, &size);
 	h->state = SENDING;
-	h->since = load_now();
-	add_wish(w, NAN);
-	if (w->kind == LOAD_LIES) {
+	h->state_since = load_now();
+	add_request(w, NAN);
+	if (w->kind == LOAD_LYING) {
 		memset(frame + size / 2, 0xff, 64); /* pixels that are not numbers */
 		l->lies++;
 	}
-	if (l->measuring) {
+	if (l->is_measuring) {
 		l->batches++;
 		l->bytes += size;
 	}
@@ -187,150 +188,151 @@ static void send_result(struct load_worker *w, struct held *h)
 
 /* Returns true if the worker disconnects instead of sending a finished result. It does not do so while the answer to
  * another result is under way, which would not be counted. */
-static bool ends_badly(struct load_worker *w)
+static bool misbehaves(struct load_worker *w)
 {
 	struct load *l = w->load;
-	if ((w->kind != LOAD_DIES && w->kind != LOAD_HANGS) || in_state(w, SENDING) || in_state(w, SENT) ||
+	if ((w->kind != LOAD_DYING && w->kind != LOAD_HANGING) || find_in_state(w, SENDING) || find_in_state(w, SENT) ||
 	    load_uniform(l) > 1. / 3)
 		return false;
-	if (w->kind == LOAD_DIES) {
+	if (w->kind == LOAD_DYING) {
 		l->deaths++;
 		conn_close(w->conn, "dies");
 	} else {
 		l->hangs++;
-		w->hangs = true;
-		uv_timer_stop(&w->beat);
+		w->is_hanging = true;
+		uv_timer_stop(&w->heartbeat_timer);
 	}
 	return true;
 }
 
-static void on_worked(uv_timer_t *t)
+static void on_work_done(uv_timer_t *t)
 {
 	struct load_worker *w = t->data;
-	struct held *h = in_state(w, WORKING);
-	if (w->hangs || (h && w->conn && ends_badly(w)))
+	struct held_lease *h = find_in_state(w, WORKING);
+	if (w->is_hanging || (h && w->conn && misbehaves(w)))
 		return;
 	if (h && w->conn)
 		send_result(w, h);
-	work_on(w);
+	begin_next_lease(w);
 }
 
-static void work_on(struct load_worker *w)
+static void begin_next_lease(struct load_worker *w)
 {
 	struct load *l = w->load;
 	unsigned i = 0;
-	struct held *h = l->leaving || w->hangs || in_state(w, WORKING) ? NULL : in_state(w, WAITING);
-	if (!h || !job_of(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
+	struct held_lease *h =
+		l->is_leaving || w->is_hanging || find_in_state(w, WORKING) ? NULL : find_in_state(w, WAITING);
+	if (!h || !find_job(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
 		return;
 	h->state = WORKING;
 	/* Leases of the bootstrap are short; workers begin their first render lease at different times, which spreads
 	 * the crowd over the interval. */
-	double seconds = l->s.interval * (0.9 + 0.2 * load_uniform(l));
+	double seconds = l->settings.interval_seconds * (0.9 + 0.2 * load_uniform(l));
 	if (h->key.kind == LEASE_BOOTSTRAP)
 		seconds = fmin(1, seconds) * (0.5 + 0.5 * load_uniform(l));
-	else if (w->first)
-		seconds += l->s.interval * load_uniform(l);
-	w->first = w->first && h->key.kind == LEASE_BOOTSTRAP;
-	uv_timer_start(&w->work, on_worked, (uint64_t)(1000 * seconds) + 1, 0);
+	else if (w->is_first_render)
+		seconds += l->settings.interval_seconds * load_uniform(l);
+	w->is_first_render = w->is_first_render && h->key.kind == LEASE_BOOTSTRAP;
+	uv_timer_start(&w->work_timer, on_work_done, (uint64_t)(1000 * seconds) + 1, 0);
 }
 
-static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
+static void handle_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 {
 	struct load *l = w->load;
 	struct error e;
 	unsigned i;
-	struct held *h = in_state(w, FREE);
+	struct held_lease *h = find_in_state(w, FREE);
 	struct lease_key k;
-	if (w->kind == LOAD_HOARDS) {
+	if (w->kind == LOAD_HOARDING) {
 		l->hoarded++;
 		return;
 	}
-	if (!h || lease_key_from_wire(m->key, &k, &e) || !job_of(l, k.job, &i)) {
+	if (!h || lease_key_from_wire(m->key, &k, &e) || !find_job(l, k.job, &i)) {
 		fail_worker(w, "a lease that cannot be");
 		return;
 	}
-	if (find(w, &k)) { /* the lease was overdue, and no other worker is free */
-		l->again++;
+	if (find_lease(w, &k)) { /* the lease was overdue, and no other worker is free */
+		l->granted_again++;
 		return;
 	}
 	l->grants++;
 	double now = load_now();
-	if (w->wishes) {
-		double at = w->wish[0], ms = isnan(at) ? 0 : 1000 * (now - at);
-		memmove(w->wish, w->wish + 1, --w->wishes * sizeof *w->wish);
-		if (l->measuring)
-			load_times_add(w->asked ? &l->grant : &l->first_grant, ms);
-		else if (!w->asked)
-			load_times_add(&l->first_grant, ms);
-		w->asked = true;
+	if (w->request_count) {
+		double request_time = w->request_times[0], ms = isnan(request_time) ? 0 : 1000 * (now - request_time);
+		memmove(w->request_times, w->request_times + 1, --w->request_count * sizeof *w->request_times);
+		if (l->is_measuring)
+			load_times_add(w->has_had_grant ? &l->grant_times : &l->first_grant_times, ms);
+		else if (!w->has_had_grant)
+			load_times_add(&l->first_grant_times, ms);
+		w->has_had_grant = true;
 	}
-	*h = (struct held){.state = WAITING, .key = k};
-	if (!(w->jobs_asked >> i & 1)) {
-		w->jobs_asked |= UINT64_C(1) << i;
-		ask_job(w, k.job);
+	*h = (struct held_lease){.state = WAITING, .key = k};
+	if (!(w->jobs_requested >> i & 1)) {
+		w->jobs_requested |= UINT64_C(1) << i;
+		request_job(w, k.job);
 	}
-	work_on(w);
+	begin_next_lease(w);
 }
 
 /* Each epoch of a slot must come once, in order. */
 static void count_merged(struct load *l, const struct lease_key *k)
 {
 	unsigned i;
-	struct load_job *j = job_of(l, k->job, &i);
+	struct load_job *j = find_job(l, k->job, &i);
 	if (k->kind == LEASE_BOOTSTRAP) {
 		l->bootstrap_merged++;
 		return;
 	}
 	l->merged++;
-	uint64_t *epoch = &j->acknowledged[k->group * j->plan.parts + k->part];
-	l->disordered += k->epoch != *epoch;
+	uint64_t *epoch = &j->acknowledged_epochs[k->group * j->plan.parts + k->part];
+	l->out_of_order += k->epoch != *epoch;
 	*epoch = k->epoch + 1;
 }
 
-static void take_ack(struct load_worker *w, const Farm__LeaseAck *m)
+static void handle_ack(struct load_worker *w, const Farm__LeaseAck *m)
 {
 	struct load *l = w->load;
 	struct error e;
 	struct lease_key k;
-	struct held *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find(w, &k);
+	struct held_lease *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(w, &k);
 	if (!h || h->state < SENDING) {
 		fail_worker(w, "an answer to nothing");
 		return;
 	}
-	l->lies_merged += w->kind == LOAD_LIES && m->verdict == FARM__VERDICT__VERDICT_MERGED;
+	l->lies_merged += w->kind == LOAD_LYING && m->verdict == FARM__VERDICT__VERDICT_MERGED;
 	if (m->verdict == FARM__VERDICT__VERDICT_MERGED)
 		count_merged(l, &k);
 	else if (m->verdict == FARM__VERDICT__VERDICT_REPEATED)
 		l->repeated++;
-	else if (w->kind == LOAD_LIES)
+	else if (w->kind == LOAD_LYING)
 		l->lies_refused++;
 	else {
 		l->refused++;
 		fail_worker(w, m->text);
 	}
-	if (l->measuring)
-		load_times_add(&l->ack, 1000 * (load_now() - h->since));
+	if (l->is_measuring)
+		load_times_add(&l->ack_times, 1000 * (load_now() - h->state_since));
 	h->state = FREE;
 }
 
-static void take_revoke(struct load_worker *w, const Farm__LeaseRevoke *m)
+static void handle_revoke(struct load_worker *w, const Farm__LeaseRevoke *m)
 {
 	struct error e;
 	struct lease_key k;
-	struct held *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find(w, &k);
+	struct held_lease *h = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(w, &k);
 	if (!h || h->state > WORKING) /* its result is under way and will count as a repeat */
 		return;
 	if (h->state == WORKING)
-		uv_timer_stop(&w->work);
+		uv_timer_stop(&w->work_timer);
 	h->state = FREE;
 	w->load->revoked++;
-	add_wish(w, load_now());
-	work_on(w);
+	add_request(w, load_now());
+	begin_next_lease(w);
 }
 
 /* ---- the connection */
 
-static void on_beat(uv_timer_t *t)
+static void on_heartbeat_timer(uv_timer_t *t)
 {
 	struct load_worker *w = t->data;
 	Farm__Heartbeat b;
@@ -338,35 +340,35 @@ static void on_beat(uv_timer_t *t)
 	farm__heartbeat__init(&b);
 	farm__envelope__init(&m);
 	m.heartbeat = &b;
-	w->beat_at = load_now();
+	w->heartbeat_sent = load_now();
 	send_message(w, &m, FARM__ENVELOPE__BODY_HEARTBEAT);
 }
 
-static void take_welcome(struct load_worker *w, const Farm__HelloAck *ack)
+static void handle_hello_ack(struct load_worker *w, const Farm__HelloAck *ack)
 {
 	struct load *l = w->load;
 	if (!ack->accepted) {
 		fail_worker(w, ack->text);
 		return;
 	}
-	l->connected++;
-	if (w->kind == LOAD_HOARDS) {
-		uv_timer_start(&w->beat, on_beat, ack->heartbeat_ms, ack->heartbeat_ms);
-		request_leases(w, HOARD + 1);
+	l->connected_count++;
+	if (w->kind == LOAD_HOARDING) {
+		uv_timer_start(&w->heartbeat_timer, on_heartbeat_timer, ack->heartbeat_ms, ack->heartbeat_ms);
+		request_leases(w, HOARDED_THREADS + 1);
 		return;
 	}
-	uv_timer_start(&w->beat, on_beat, (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1,
-		       ack->heartbeat_ms);
-	for (unsigned i = 0; i < l->s.want; i++)
-		add_wish(w, load_now());
-	request_leases(w, l->s.want);
+	uv_timer_start(&w->heartbeat_timer, on_heartbeat_timer,
+		       (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1, ack->heartbeat_ms);
+	for (unsigned i = 0; i < l->settings.leases_per_worker; i++)
+		add_request(w, load_now());
+	request_leases(w, l->settings.leases_per_worker);
 }
 
-static void take_beat(struct load_worker *w)
+static void handle_heartbeat(struct load_worker *w)
 {
-	if (w->load->measuring && w->beat_at > 0)
-		load_times_add(&w->load->beat, 1000 * (load_now() - w->beat_at));
-	w->beat_at = 0;
+	if (w->load->is_measuring && w->heartbeat_sent > 0)
+		load_times_add(&w->load->heartbeat_times, 1000 * (load_now() - w->heartbeat_sent));
+	w->heartbeat_sent = 0;
 }
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
@@ -377,29 +379,29 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	(void)size;
 	switch (m->body_case) {
 	case FARM__ENVELOPE__BODY_HELLO_ACK:
-		take_welcome(w, m->hello_ack);
+		handle_hello_ack(w, m->hello_ack);
 		break;
 	case FARM__ENVELOPE__BODY_HEARTBEAT:
-		take_beat(w);
+		handle_heartbeat(w);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_GRANT:
-		take_grant(w, m->lease_grant);
+		handle_grant(w, m->lease_grant);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_ACK:
-		take_ack(w, m->lease_ack);
+		handle_ack(w, m->lease_ack);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_REVOKE:
-		take_revoke(w, m->lease_revoke);
+		handle_revoke(w, m->lease_revoke);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_INFO:
-		take_job(w, m->job_info);
+		handle_job_info(w, m->job_info);
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
 		if (*m->blob_chunk->error)
 			fail_worker(w, m->blob_chunk->error);
 		break;
 	case FARM__ENVELOPE__BODY_FAULT:
-		if (w->kind != LOAD_HANGS) /* a worker that hangs must time out */
+		if (w->kind != LOAD_HANGING) /* a worker that hangs must time out */
 			fail_worker(w, m->fault->text);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:
@@ -423,7 +425,7 @@ static void on_opened(void *user)
 	h.role = FARM__ROLE__ROLE_WORKER;
 	h.name = name;
 	h.fingerprint = fingerprint;
-	h.threads = w->kind == LOAD_HOARDS ? HOARD : 1;
+	h.threads = w->kind == LOAD_HOARDING ? HOARDED_THREADS : 1;
 	m.hello = &h;
 	send_message(w, &m, FARM__ENVELOPE__BODY_HELLO);
 }
@@ -432,16 +434,16 @@ static void on_drained(void *user)
 {
 	struct load_worker *w = user;
 	double now = load_now();
-	for (int i = 0; i < LEASES; i++)
+	for (int i = 0; i < LEASES_MAX; i++)
 		if (w->held[i].state == SENDING) {
-			if (w->load->measuring)
-				load_times_add(&w->load->send, 1000 * (now - w->held[i].since));
+			if (w->load->is_measuring)
+				load_times_add(&w->load->send_times, 1000 * (now - w->held[i].state_since));
 			w->held[i].state = SENT;
-			w->held[i].since = now;
+			w->held[i].state_since = now;
 		}
-	for (unsigned i = 0; i < w->wishes; i++)
-		if (isnan(w->wish[i]))
-			w->wish[i] = now;
+	for (unsigned i = 0; i < w->request_count; i++)
+		if (isnan(w->request_times[i]))
+			w->request_times[i] = now;
 }
 
 /* Called for both timers: a worker that died or hung connects again, as a restart of the same worker. */
@@ -450,7 +452,7 @@ static void on_timer_closed(uv_handle_t *h)
 	struct load_worker *w = h->data;
 	struct load *l = w->load;
 	unsigned index = w->index;
-	if (--w->closing || l->leaving || (w->kind != LOAD_DIES && w->kind != LOAD_HANGS))
+	if (--w->closing_timers || l->is_leaving || (w->kind != LOAD_DYING && w->kind != LOAD_HANGING))
 		return;
 	*w = (struct load_worker){0};
 	load_connect(l, index);
@@ -461,15 +463,15 @@ static void on_closed(void *user, const char *why)
 	struct load_worker *w = user;
 	struct load *l = w->load;
 	w->conn = NULL;
-	w->closing = 2;
-	uv_close((uv_handle_t *)&w->work, on_timer_closed);
-	uv_close((uv_handle_t *)&w->beat, on_timer_closed);
-	if (w->kind == LOAD_DIES || w->kind == LOAD_HANGS) {
-		l->connected--;
+	w->closing_timers = 2;
+	uv_close((uv_handle_t *)&w->work_timer, on_timer_closed);
+	uv_close((uv_handle_t *)&w->heartbeat_timer, on_timer_closed);
+	if (w->kind == LOAD_DYING || w->kind == LOAD_HANGING) {
+		l->connected_count--;
 		return;
 	}
-	if (!l->leaving) {
-		l->closed++;
+	if (!l->is_leaving) {
+		l->disconnected++;
 		fail_worker(w, why);
 	}
 }
@@ -479,13 +481,13 @@ struct load_worker *load_workers_new(unsigned count)
 	return mem_alloc(count, sizeof(struct load_worker));
 }
 
-static enum load_kind kind_of(const struct load_settings *s, unsigned index)
+static enum load_behaviour worker_behaviour(const struct load_settings *s, unsigned index)
 {
 	unsigned from_last = s->workers - 1 - index;
-	for (int k = LOAD_KINDS - 1; k > LOAD_HONEST; k--) {
-		if (from_last < s->bad[k])
-			return (enum load_kind)k;
-		from_last -= s->bad[k];
+	for (int k = LOAD_BEHAVIOURS - 1; k > LOAD_HONEST; k--) {
+		if (from_last < s->misbehaving[k])
+			return (enum load_behaviour)k;
+		from_last -= s->misbehaving[k];
 	}
 	return LOAD_HONEST;
 }
@@ -499,42 +501,42 @@ void load_connect(struct load *l, unsigned index)
 	struct error e;
 	w->load = l;
 	w->index = index;
-	w->first = true;
-	w->kind = kind_of(&l->s, index);
-	uv_timer_init(&l->loop, &w->work);
-	uv_timer_init(&l->loop, &w->beat);
-	w->work.data = w->beat.data = w;
+	w->is_first_render = true;
+	w->kind = worker_behaviour(&l->settings, index);
+	uv_timer_init(&l->loop, &w->work_timer);
+	uv_timer_init(&l->loop, &w->heartbeat_timer);
+	w->work_timer.data = w->heartbeat_timer.data = w;
 	if (conn_connect(&w->conn, &l->loop, &l->address, &config, &events, w, &e))
 		load_die("%s", e.text);
 }
 
-void load_leave(struct load *l)
+void load_wind_down(struct load *l)
 {
-	l->leaving = true;
-	for (unsigned i = 0; i < l->s.workers; i++) {
+	l->is_leaving = true;
+	for (unsigned i = 0; i < l->settings.workers; i++) {
 		struct load_worker *w = &l->workers[i];
 		if (!w->conn)
 			continue;
-		uv_timer_stop(&w->work);
+		uv_timer_stop(&w->work_timer);
 		request_leases(w, 0);
-		for (int k = 0; k < LEASES; k++)
+		for (int k = 0; k < LEASES_MAX; k++)
 			if (w->held[k].state == WAITING || w->held[k].state == WORKING)
-				give_back(w, &w->held[k]);
+				return_lease(w, &w->held[k]);
 	}
 }
 
-unsigned load_unanswered(const struct load *l)
+unsigned load_unacknowledged_count(const struct load *l)
 {
 	unsigned n = 0;
-	for (unsigned i = 0; i < l->s.workers; i++)
-		for (int k = 0; k < LEASES; k++)
+	for (unsigned i = 0; i < l->settings.workers; i++)
+		for (int k = 0; k < LEASES_MAX; k++)
 			n += l->workers[i].held[k].state >= SENDING;
 	return n;
 }
 
-void load_close(struct load *l)
+void load_disconnect_all(struct load *l)
 {
-	for (unsigned i = 0; i < l->s.workers; i++)
+	for (unsigned i = 0; i < l->settings.workers; i++)
 		if (l->workers[i].conn)
 			conn_close(l->workers[i].conn, "over");
 }

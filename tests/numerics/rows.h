@@ -6,7 +6,7 @@
 #ifndef TESTS_NUMERICS_ROWS_H
 #define TESTS_NUMERICS_ROWS_H
 
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 
 #include <stdbool.h>
 #include <stdio.h>
@@ -16,8 +16,8 @@ struct rows {
 	unsigned cases, failed;
 };
 
-static inline void row(struct rows *r, const char *topic, const char *name, const char *measured, const char *bound,
-		       bool ok)
+static inline void rows_add(struct rows *r, const char *topic, const char *name, const char *measured,
+			    const char *bound, bool ok)
 {
 	r->cases++;
 	r->failed += !ok;

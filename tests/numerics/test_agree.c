@@ -2,14 +2,14 @@
 /*
  * Numerically hard scenes by four integrators that reach the same light in different ways: an error in one of them is
  * seldom shared by the others. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at the
- * level of tests/support/agree.h. The row states the smallest bias that is found with 95 % probability: at most 2 % of
- * the mean for the table (HSLT_TEST_ROWS=1) unless the case says otherwise, and a third of that with FULL=1, which
+ * level of tests/support/agreement.h. The row states the smallest bias that is found with 95 % probability: at most 2 %
+ * of the mean for the table (HSLT_TEST_ROWS=1) unless the case says otherwise, and a third of that with FULL=1, which
  * takes 16 times the samples. A plain run takes a sixty-fourth of the samples and finds only gross errors.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
-#include "tests/support/agree.h"
-#include "tests/support/agree_scenes.h"
+#include "tests/support/agreement.h"
+#include "tests/support/agreement_scenes.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,66 +24,71 @@ static struct rows rows;
 /* Scales a case's number of samples, and the least bias that must be found. */
 static uint64_t scaled_samples(uint64_t spp)
 {
-	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 16;
+	uint64_t n = test_is_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 16;
 	return n < 32 ? 32 : n;
 }
 
-static bool is_table(void)
+static bool is_table_run(void)
 {
-	return getenv("HSLT_TEST_ROWS") || test_full();
+	return getenv("HSLT_TEST_ROWS") || test_is_full();
 }
 
 /* Runs for the table have as many groups as possible, because t needs less with more degrees of freedom; and enough
  * independent paths that b, which scales the whole image of chains, is known to about a fifth of a percent. */
-static void render(const struct agree_case *k, const char *name, const char *integrator, uint64_t spp, struct world *w,
-		   struct agree_image *out)
+static void render_case(const struct agreement_case *k, const char *name, const char *integrator, uint64_t spp,
+			struct world *w, struct agreement_image *out)
 {
-	struct agree_side side = {integrator, scaled_samples(spp), is_table() ? AGREE_MAX_GROUPS : 16, 1, k->max_depth};
+	struct agreement_options side = {integrator, scaled_samples(spp), is_table_run() ? AGREEMENT_GROUPS_MAX : 16, 1,
+					 k->max_depth};
 	uint64_t paths = 32 * k->spp > 1 << 14 ? 32 * k->spp : 1 << 14;
-	if (is_table())
-		agree_render_chains(w, name, integrator, &side, test_full() ? 16 * paths : paths, NULL, out);
+	if (is_table_run())
+		agreement_render_with_mutations(w, name, integrator, &side, test_is_full() ? 16 * paths : paths, NULL,
+						out);
 	else
-		agree_render(w, name, integrator, &side, out);
+		agreement_render(w, name, integrator, &side, out);
 }
 
-static double must_find(const struct agree_case *k)
+static double required_detectable_bias(const struct agreement_case *k)
 {
-	return test_scaled() ? INFINITY : k->find * (test_full() ? 0.3 : getenv("HSLT_TEST_ROWS") ? 1 : 50);
+	return test_is_scaled() ? INFINITY
+				: k->detectable_bias * (test_is_full()		   ? 0.3
+							: getenv("HSLT_TEST_ROWS") ? 1
+										   : 50);
 }
 
-static void compare(const struct agree_case *k, const char *integrator, struct world *w,
-		    const struct agree_image *reference)
+static void compare_integrator(const struct agreement_case *k, const char *integrator, struct world *w,
+			       const struct agreement_image *reference)
 {
-	static struct agree_image other;
-	struct agree_difference d;
+	static struct agreement_image other;
+	struct agreement_difference d;
 	char name[128], measured[300], bound[80];
 	snprintf(name, sizeof name, "%s, %s", k->name, integrator);
-	render(k, name, integrator, k->spp, w, &other);
-	agree_measure(&other, reference, &d);
+	render_case(k, name, integrator, k->spp, w, &other);
+	agreement_measure(&other, reference, &d);
 	snprintf(measured, sizeof measured,
 		 "differs from path by %+.2f %% +- %.2f %%; finds %.1f %% of the mean, %.1f %% of a block",
-		 100 * d.mean, 100 * d.error, 100 * d.found, 100 * d.found_block);
-	snprintf(bound, sizeof bound, "the same image; finds %.2g %% of the mean", 100 * must_find(k));
-	row(&rows, k->topic, name, measured, bound, d.holds && d.found <= must_find(k));
+		 100 * d.mean, 100 * d.error, 100 * d.detectable_bias, 100 * d.detectable_block_bias);
+	snprintf(bound, sizeof bound, "the same image; finds %.2g %% of the mean", 100 * required_detectable_bias(k));
+	rows_add(&rows, k->topic, name, measured, bound, d.agrees && d.detectable_bias <= required_detectable_bias(k));
 }
 
-static void run_case(const struct agree_case *k)
+static void run_case(const struct agreement_case *k)
 {
-	static struct agree_image reference;
+	static struct agreement_image reference;
 	const char *only = getenv("CASE");
 	if (only && !strstr(k->topic, only) && !strstr(k->name, only))
 		return;
-	struct world *w = k->make(k);
-	render(k, k->name, "path", k->path_spp, w, &reference);
-	for (size_t i = 0; i < sizeof k->against / sizeof *k->against && k->against[i]; i++)
-		compare(k, k->against[i], w, &reference);
+	struct world *w = k->build(k);
+	render_case(k, k->name, "path", k->path_spp, w, &reference);
+	for (size_t i = 0; i < sizeof k->integrators / sizeof *k->integrators && k->integrators[i]; i++)
+		compare_integrator(k, k->integrators[i], w, &reference);
 	world_free(w);
 }
 
 static void test_agree(void **state)
 {
 	(void)state;
-	for (const struct agree_case *k = agree_cases; k->topic; k++)
+	for (const struct agreement_case *k = agreement_cases; k->topic; k++)
 		run_case(k);
 	printf("integrators on hard scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);

@@ -18,28 +18,28 @@
 #include <cmocka.h>
 
 static struct {
-	uint64_t mutations, film, counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
-} sum;
+	uint64_t mutations, invalid_film_values, counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
+} totals;
 
 static void run_chains(struct world *w, const char *name, unsigned depth, uint64_t mutations)
 {
 	enum { CHAINS = 16, PIECE = 1 << 20 };
 	struct chains_result r;
 	for (uint64_t done = 0; done < mutations; done += PIECE) {
-		uint64_t now = mutations - done < PIECE ? mutations - done : PIECE;
-		struct chains_how how = {.min_depth = 1,
-					 .max_depth = depth,
-					 .chains = CHAINS,
-					 .bootstrap = 2048,
-					 .steps = now / CHAINS + 1,
-					 .seed = stats_seed(name) + done};
-		chains_run(w, &how, &r);
-		sum.film += r.film_invalid;
-		sum.mutations += r.counters[COUNT_SAMPLES];
+		uint64_t piece = mutations - done < PIECE ? mutations - done : PIECE;
+		struct chains_options options = {.min_depth = 1,
+						 .max_depth = depth,
+						 .chains = CHAINS,
+						 .bootstrap = 2048,
+						 .steps = piece / CHAINS + 1,
+						 .seed = stats_seed(name) + done};
+		chains_run(w, &options, &r);
+		totals.invalid_film_values += r.invalid_film_values;
+		totals.mutations += r.counters[COUNT_SAMPLES];
 		for (int i = 0; i < BATCH_COUNTERS; i++)
-			sum.counters[i] += r.counters[i];
+			totals.counters[i] += r.counters[i];
 		for (int i = 0; i < STRATEGY_COUNTERS; i++)
-			sum.strategy[i] += r.strategy[i];
+			totals.strategy[i] += r.strategy[i];
 		free(r.xyz);
 	}
 	world_free(w);
@@ -52,26 +52,28 @@ static void test_many(void **state)
 					      "singular", "diverged", "iterations", "reverse",
 					      "specular", "emitter",  "dark",	    "inapplicable"};
 	uint64_t scenes = TEST_SCENES,
-		 total = test_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / test_scale();
+		 total = test_is_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / test_scale();
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		scenes++;
 	for (int i = 0; i < TEST_SCENES; i++)
 		run_chains(test_world(test_scenes[i].name), test_scenes[i].name, 12, total / scenes + 1);
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
-		run_chains(h->make(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
+		run_chains(h->build(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
 	struct rows rows = {0, 0};
 	char measured[600];
 	int n = snprintf(
 		measured, sizeof measured,
 		"%llu invalid values in films; caught %llu NaN, %llu infinite, %llu negative; proposals that failed:",
-		(unsigned long long)sum.film, (unsigned long long)sum.counters[COUNT_NAN],
-		(unsigned long long)sum.counters[COUNT_INFINITE], (unsigned long long)sum.counters[COUNT_NEGATIVE]);
+		(unsigned long long)totals.invalid_film_values, (unsigned long long)totals.counters[COUNT_NAN],
+		(unsigned long long)totals.counters[COUNT_INFINITE],
+		(unsigned long long)totals.counters[COUNT_NEGATIVE]);
 	for (int i = STRATEGY_FAIL_FIRST; i < STRATEGY_COUNTERS && n < (int)sizeof measured; i++)
 		n += snprintf(measured + n, sizeof measured - (size_t)n, " %s %.2g %%",
-			      reasons[i - STRATEGY_FAIL_FIRST], 100 * (double)sum.strategy[i] / (double)sum.mutations);
+			      reasons[i - STRATEGY_FAIL_FIRST],
+			      100 * (double)totals.strategy[i] / (double)totals.mutations);
 	char name[64];
-	snprintf(name, sizeof name, "%.3g in %llu scenes", (double)sum.mutations, (unsigned long long)scenes);
-	row(&rows, "many mutations", name, measured, "0 in films", sum.film == 0);
+	snprintf(name, sizeof name, "%.3g in %llu scenes", (double)totals.mutations, (unsigned long long)scenes);
+	rows_add(&rows, "many mutations", name, measured, "0 in films", totals.invalid_film_values == 0);
 	printf("%s: %s\n", name, measured);
 	assert_int_equal(rows.failed, 0);
 }

@@ -7,7 +7,7 @@
 #include "tests/numerics/rows.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
-#include "worker/render/chain/path_place.h"
+#include "worker/render/chain/path_state.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/path/integrator.h"
@@ -54,7 +54,7 @@ struct precision_case {
 	const char *name;
 	double index, alpha;
 	unsigned edges;
-	double allowed; /* allowed error of the program, in the logarithm of the acceptance ratio */
+	double max_error; /* allowed error of the program, in the logarithm of the acceptance ratio */
 };
 
 static const struct precision_case cases[] = {
@@ -69,62 +69,62 @@ static const struct precision_case cases[] = {
 };
 
 struct errors {
-	unsigned count, wrong; /* wrong: cases in which float's acceptance is off by more than 1 % */
-	double program, in_double, in_float, *of_float;
+	unsigned count, wrong_in_float; /* wrong: cases in which float's acceptance is off by more than 1 % */
+	double max_program_error, max_double_error, in_float, *float_errors;
 };
 
-static int by_size(const void *a, const void *b)
+static int compare_errors(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x > y) - (x < y);
 }
 
-static void note(struct errors *e, double program, const struct world *w, const struct full_path *x,
-		 const struct full_path *y)
+static void record_errors(struct errors *e, double program, const struct world *w, const struct full_path *x,
+			  const struct full_path *y)
 {
 	long double truth = in_long_log_weight(w, y) - in_long_log_weight(w, x);
-	double twice = in_double_log_weight(w, y) - in_double_log_weight(w, x);
-	double once = (double)(in_float_log_weight(w, y) - in_float_log_weight(w, x));
-	double accept = (double)exp(fmin(truth, 0.0L)), off = fabs((double)(once - truth));
+	double double_value = in_double_log_weight(w, y) - in_double_log_weight(w, x);
+	double float_value = (double)(in_float_log_weight(w, y) - in_float_log_weight(w, x));
+	double accept = (double)exp(fmin(truth, 0.0L)), float_error = fabs((double)(float_value - truth));
 	/* A NaN counts as infinite. */
-	double wrong = (double)fabs(program - truth);
-	e->program = fmax(e->program, isfinite(wrong) ? wrong : INFINITY);
-	e->in_double = fmax(e->in_double, (double)fabs(twice - truth));
-	e->of_float[e->count++] = isfinite(off) ? off : INFINITY;
-	e->wrong += !(fabs(exp(fmin(once, 0.0)) - accept) <= 0.01);
+	double program_error = (double)fabs(program - truth);
+	e->max_program_error = fmax(e->max_program_error, isfinite(program_error) ? program_error : INFINITY);
+	e->max_double_error = fmax(e->max_double_error, (double)fabs(double_value - truth));
+	e->float_errors[e->count++] = isfinite(float_error) ? float_error : INFINITY;
+	e->wrong_in_float += !(fabs(exp(fmin(float_value, 0.0)) - accept) <= 0.01);
 }
 
-static void run_case(const struct precision_case *p, unsigned most, struct errors *e)
+static void run_case(const struct precision_case *p, unsigned max_proposals, struct errors *e)
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
 	static struct full_path x, y;
 	static uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
 	const struct mutation_ops *ops = mutation_find("hslt", 4);
-	const struct mutation_setting how = {(int)p->edges, 0};
-	struct world *w = world_of_text(32, 32, SCENE, p->index, p->alpha);
+	const struct mutation_forced_choice setting = {(int)p->edges, 0};
+	struct world *w = world_from_text(32, 32, SCENE, p->index, p->alpha);
 	uint64_t seed = stats_seed(p->name);
 	c = (struct path_context){
 		.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
 	m = (struct mutation_ctx){
-		.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
-	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
+		.path = &c, .seed = seed, .counters = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
+	for (uint64_t i = 0; e->count < max_proposals && i < 400 * max_proposals; i++) {
 		struct move move = {0};
-		bool through = false;
-		if (!path_start(&c, seed, i, &x) || x.edges == 0)
+		bool is_refracted = false;
+		if (!path_choose_seed(&c, seed, i, &x) || x.edges == 0)
 			continue;
 		for (unsigned j = 1; j < p->edges; j++)
-			through |= x.v[j].bsdf->eta != 1;
-		if (!through)
+			is_refracted |= x.v[j].bsdf->eta != 1;
+		if (!is_refracted)
 			continue;
 		full_path_copy(&y, &x, 0, x.edges);
 		m.chain = i;
-		if (ops->propose(ops, &m, &how, &x, &y, &move))
+		if (ops->propose(ops, &m, &setting, &x, &y, &move))
 			continue;
 		double to_y = ops->log_weight(&m, &y, &move, X_TO_Y), to_x = ops->log_weight(&m, &x, &move, Y_TO_X);
 		double program = to_y - to_x + move.log_density[X_TO_Y] - move.log_density[Y_TO_X];
 		if (isfinite(program))
-			note(e, program, w, &x, &y);
+			record_errors(e, program, w, &x, &y);
 	}
 	world_free(w);
 }
@@ -133,24 +133,24 @@ static void test_precision(void **state)
 {
 	(void)state;
 	struct rows rows = {0, 0};
-	unsigned most = (test_full() ? 20000 : 1000) / test_scale();
-	double *of_float = calloc(most, sizeof *of_float);
+	unsigned max_proposals = (test_is_full() ? 20000 : 1000) / test_scale();
+	double *float_errors = calloc(max_proposals, sizeof *float_errors);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct errors e = {.of_float = of_float};
+		struct errors e = {.float_errors = float_errors};
 		char measured[300], bound[64];
-		run_case(&cases[i], most, &e);
-		qsort(of_float, e.count, sizeof *of_float, by_size);
+		run_case(&cases[i], max_proposals, &e);
+		qsort(float_errors, e.count, sizeof *float_errors, compare_errors);
 		snprintf(
 			measured, sizeof measured,
 			"%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float "
 			"by %.1e in the median, at most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
-			e.count, e.program, e.in_double, e.count ? of_float[e.count / 2] : 0,
-			e.count ? of_float[e.count - 1] : 0, 100.0 * e.wrong / (e.count ? e.count : 1));
-		snprintf(bound, sizeof bound, "%.0e", cases[i].allowed);
-		row(&rows, "precision", cases[i].name, measured, bound,
-		    e.count > most / 4 && e.program <= cases[i].allowed);
+			e.count, e.max_program_error, e.max_double_error, e.count ? float_errors[e.count / 2] : 0,
+			e.count ? float_errors[e.count - 1] : 0, 100.0 * e.wrong_in_float / (e.count ? e.count : 1));
+		snprintf(bound, sizeof bound, "%.0e", cases[i].max_error);
+		rows_add(&rows, "precision", cases[i].name, measured, bound,
+			 e.count > max_proposals / 4 && e.max_program_error <= cases[i].max_error);
 	}
-	free(of_float);
+	free(float_errors);
 	printf("precision: %u cases, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

@@ -17,35 +17,35 @@
 
 #include <cmocka.h>
 
-enum { SIDE = PLACED_SIDE };
+enum { SIDE = PLACED_SCENE_SIDE };
 
-static struct world *world_at(double s, double m)
+static struct world *make_world(double scale, double offset)
 {
-	return placed_scene(s, m, "<bsdf type='roughdielectric'><float name='alpha' value='0.1'/></bsdf>",
-			    "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>");
+	return placed_scene_make(scale, offset, "<bsdf type='roughdielectric'><float name='alpha' value='0.1'/></bsdf>",
+				 "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>");
 }
 
 static void render(struct world *w, uint64_t seed, struct chains_result *out)
 {
-	struct chains_how how = {.min_depth = 1,
-				 .max_depth = 6,
-				 .chains = 64,
-				 .bootstrap = 4096,
-				 .steps = 2000 / test_scale(),
-				 .seed = seed};
-	chains_run(w, &how, out);
+	struct chains_options options = {.min_depth = 1,
+					 .max_depth = 6,
+					 .chains = 64,
+					 .bootstrap = 4096,
+					 .steps = 2000 / test_scale(),
+					 .seed = seed};
+	chains_run(w, &options, out);
 	world_free(w);
 }
 
 /* Returns the sum of the absolute differences over the sum; films are in units of b. */
-static double difference(const struct chains_result *a, const struct chains_result *b)
+static double relative_difference(const struct chains_result *a, const struct chains_result *b)
 {
-	double off = 0, sum = 0;
+	double deviation = 0, sum = 0;
 	for (int i = 0; i < 3 * SIDE * SIDE; i++) {
-		off += fabs((double)a->xyz[i] * a->b - (double)b->xyz[i] * b->b);
-		sum += (double)b->xyz[i] * b->b;
+		deviation += fabs((double)a->xyz[i] * a->normalization - (double)b->xyz[i] * b->normalization);
+		sum += (double)b->xyz[i] * b->normalization;
 	}
-	return off / sum;
+	return deviation / sum;
 }
 
 static void test_same(void **state)
@@ -53,8 +53,8 @@ static void test_same(void **state)
 	(void)state;
 	static const struct {
 		const char *name;
-		double scale, move;
-		bool exact;
+		double scale, translation;
+		bool is_exact;
 	} cases[] = {
 		{"in units 2^-13 as large", 0x1p-13, 0, true},
 		{"in units 2^13 as large", 0x1p13, 0, true},
@@ -66,25 +66,27 @@ static void test_same(void **state)
 		{"scaled by 1e4, moved by 1e9", 1e4, 1e9, false},
 	};
 	struct rows rows = {0, 0};
-	static struct chains_result here, other, there;
+	static struct chains_result original, reseeded, moved;
 	uint64_t seed = stats_seed("the same scene");
 	char measured[200];
-	render(world_at(1, 0), seed, &here);
-	render(world_at(1, 0), seed + 1, &other);
-	double noise = difference(&other, &here);
+	render(make_world(1, 0), seed, &original);
+	render(make_world(1, 0), seed + 1, &reseeded);
+	double noise = relative_difference(&reseeded, &original);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		render(world_at(cases[i].scale, cases[i].move), seed, &there);
-		double off = difference(&there, &here), b = there.b / here.b - 1;
+		render(make_world(cases[i].scale, cases[i].translation), seed, &moved);
+		double film_difference = relative_difference(&moved, &original),
+		       b = moved.normalization / original.normalization - 1;
 		snprintf(measured, sizeof measured,
-			 "film differs by %.2g of itself, b by %.1g (another seed: %.2g, %.1g)", off, b, noise,
-			 other.b / here.b - 1);
-		bool ok = cases[i].exact ? off == 0 && b == 0 : off <= 0.01 && fabs(b) < 1e-3;
-		row(&rows, "same image", cases[i].name, measured,
-		    cases[i].exact ? "the same bits" : "film 0.01, b 1e-3", ok);
-		free(there.xyz);
+			 "film differs by %.2g of itself, b by %.1g (another seed: %.2g, %.1g)", film_difference, b,
+			 noise, reseeded.normalization / original.normalization - 1);
+		bool ok =
+			cases[i].is_exact ? film_difference == 0 && b == 0 : film_difference <= 0.01 && fabs(b) < 1e-3;
+		rows_add(&rows, "same image", cases[i].name, measured,
+			 cases[i].is_exact ? "the same bits" : "film 0.01, b 1e-3", ok);
+		free(moved.xyz);
 	}
-	free(here.xyz);
-	free(other.xyz);
+	free(original.xyz);
+	free(reseeded.xyz);
 	printf("the same scene elsewhere: %u cases, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

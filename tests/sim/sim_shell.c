@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static struct worker *worker_of(struct world *w, uint64_t peer, uint32_t *index)
+static struct sim_worker *find_worker(struct sim_world *w, uint64_t peer, uint32_t *index)
 {
 	for (*index = 0; *index < w->worker_count; ++*index)
 		if (w->workers[*index].peer == peer)
@@ -20,89 +20,91 @@ static struct worker *worker_of(struct world *w, uint64_t peer, uint32_t *index)
 	return NULL;
 }
 
-static uint32_t slot_of(const struct sim_job *j, struct lease_key k)
+static uint32_t slot_index(const struct sim_job *j, struct lease_key k)
 {
 	return k.group * j->plan.parts + k.part;
 }
 
-static void check_holders(struct world *w, struct lease_key key)
+static void check_holders(struct sim_world *w, struct lease_key key)
 {
 	int holders = 0;
 	struct lease_status s;
 	for (uint64_t p = farm_next_peer(w->farm, 0); p; p = farm_next_peer(w->farm, p))
-		for (uint32_t i = 0; farm_lease(w->farm, p, i, &s); i++)
+		for (uint32_t i = 0; farm_lease_status(w->farm, p, i, &s); i++)
 			holders += !s.overdue && sim_same_key(s.key, key);
 	if (holders > 2)
-		sim_wrong(w, "%d workers hold one lease", holders);
+		sim_report_violation(w, "%d workers hold one lease", holders);
 }
 
-static void send_lease(struct world *w, const struct action *a)
+static void send_lease(struct sim_world *w, const struct action *a)
 {
 	struct sim_job *j = sim_job_by_id(w, a->job);
 	struct peer_status p;
-	uint32_t slot = j ? slot_of(j, a->key) : 0, index;
-	if (!j || j->over || !farm_peer(w->farm, a->peer, &p)) {
-		sim_wrong(w, "a lease of an ended job or to an unknown worker");
+	uint32_t slot = j ? slot_index(j, a->key) : 0, index;
+	if (!j || j->ended || !farm_peer_status(w->farm, a->peer, &p)) {
+		sim_report_violation(w, "a lease of an ended job or to an unknown worker");
 		return;
 	}
-	if (j->held[HOLD_STORAGE] || j->held[HOLD_ORDERED])
-		sim_wrong(w, "a lease of a job that is held");
+	if (j->held[HOLD_STORAGE] || j->held[HOLD_BY_USER])
+		sim_report_violation(w, "a lease of a job that is held");
 	if (p.state != PEER_ACTIVE)
-		sim_wrong(w, "a lease for a worker that is silent or quarantined");
+		sim_report_violation(w, "a lease for a worker that is silent or quarantined");
 	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
-		sim_wrong(w, "a lease of j%" PRIu64 " for a worker of fingerprint %s", a->job, p.fingerprint);
+		sim_report_violation(w, "a lease of j%" PRIu64 " for a worker of fingerprint %s", a->job,
+				     p.fingerprint);
 	if (a->key.kind == LEASE_RENDER &&
 	    (!j->prepared || a->key.epoch != j->next[slot] || a->key.epoch > j->rounds + 1))
-		sim_wrong(w, "epoch %" PRIu64 " was handed out too early or too late", a->key.epoch);
+		sim_report_violation(w, "epoch %" PRIu64 " was handed out too early or too late", a->key.epoch);
 	check_holders(w, a->key);
-	if (worker_of(w, a->peer, &index) && w->liars && j->answered[slot] >> index & 1)
-		sim_wrong(w, "w%u gets a lease of which its answer is noted", index);
-	if (worker_of(w, a->peer, &index))
-		sim_post(w, (struct message){.kind = LEASE,
-					     .worker = index,
-					     .peer = a->peer,
-					     .key = a->key,
-					     .value = j->state[slot]});
+	if (find_worker(w, a->peer, &index) && w->has_liars && j->answered_by[slot] >> index & 1)
+		sim_report_violation(w, "w%u gets a lease of which its answer is noted", index);
+	if (find_worker(w, a->peer, &index))
+		sim_post_message(w, (struct sim_message){.kind = LEASE,
+							 .worker = index,
+							 .peer = a->peer,
+							 .key = a->key,
+							 .value = j->state[slot]});
 }
 
-static void merge(struct world *w, const struct action *a, uint64_t value)
+static void merge_result(struct sim_world *w, const struct action *a, uint64_t value)
 {
 	struct sim_job *j = sim_job_by_id(w, a->job);
 	struct peer_status p;
 	w->result.merged++;
-	if (!j || j->over || !farm_peer(w->farm, a->peer, &p)) {
-		sim_wrong(w, "a batch of an ended job or of an unknown worker is merged");
+	if (!j || j->ended || !farm_peer_status(w->farm, a->peer, &p)) {
+		sim_report_violation(w, "a batch of an ended job or of an unknown worker is merged");
 		return;
 	}
 	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
-		sim_wrong(w, "batches of two fingerprints are merged");
+		sim_report_violation(w, "batches of two fingerprints are merged");
 	snprintf(j->fingerprint, sizeof j->fingerprint, "%s", p.fingerprint);
-	uint32_t slot = slot_of(j, a->key);
-	if (value != sim_result_of(a->key, j->state[slot]))
-		sim_wrong(w, "a wrong result is merged, verified: %d", (int)a->verified);
+	uint32_t slot = slot_index(j, a->key);
+	if (value != sim_correct_result(a->key, j->state[slot]))
+		sim_report_violation(w, "a wrong result is merged, verified: %d", (int)a->verified);
 	if (a->verified != (j->verify >= 1) && (j->verify >= 1 || j->verify <= 0))
-		sim_wrong(w, "verified with a share of %g: %d", j->verify, (int)a->verified);
-	j->answered[slot] = 0;
+		sim_report_violation(w, "verified with a share of %g: %d", j->verify, (int)a->verified);
+	j->answered_by[slot] = 0;
 	if (a->key.kind == LEASE_BOOTSTRAP) {
-		if (j->boot & 1u << slot)
-			sim_wrong(w, "a bootstrap batch is merged twice");
-		j->boot |= 1u << slot;
+		if (j->bootstrap_slots & 1u << slot)
+			sim_report_violation(w, "a bootstrap batch is merged twice");
+		j->bootstrap_slots |= 1u << slot;
 		j->state[slot] = value;
 		return;
 	}
 	if (a->key.epoch != j->next[slot] || !j->prepared)
-		sim_wrong(w, "epoch %" PRIu64 " is merged where %" PRIu64 " is next", a->key.epoch, j->next[slot]);
+		sim_report_violation(w, "epoch %" PRIu64 " is merged where %" PRIu64 " is next", a->key.epoch,
+				     j->next[slot]);
 	if (a->key.epoch > j->rounds + 1 || a->key.epoch >= ROUNDS) {
-		sim_wrong(w, "more than two rounds are open");
+		sim_report_violation(w, "more than two rounds are open");
 		return;
 	}
 	j->next[slot]++;
 	j->state[slot] = value;
 	j->round_sum[a->key.epoch] += value;
-	uint64_t least = UINT64_MAX;
+	uint64_t min_next = UINT64_MAX;
 	for (uint32_t i = 0; i < j->plan.groups * j->plan.parts; i++)
-		least = j->next[i] < least ? j->next[i] : least;
-	j->rounds = least;
+		min_next = j->next[i] < min_next ? j->next[i] : min_next;
+	j->rounds = min_next;
 }
 
 double sim_error_after(const struct sim_job *j, uint64_t rounds)
@@ -125,10 +127,10 @@ static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
 	uint64_t sum = 0;
 	for (uint32_t i = 0; i < j->plan.groups * j->plan.parts; i++) {
 		struct lease_key k = {j->id, LEASE_BOOTSTRAP, i / j->plan.parts, i % j->plan.parts, 0};
-		uint64_t state = sim_result_of(k, 0);
+		uint64_t state = sim_correct_result(k, 0);
 		k.kind = LEASE_RENDER;
 		for (k.epoch = 0; k.epoch < rounds; k.epoch++) {
-			state = sim_result_of(k, state);
+			state = sim_correct_result(k, state);
 			sum += state;
 		}
 	}
@@ -136,28 +138,28 @@ static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
 }
 
 /* A job whose time has run out is evaluated once more, and may then end by its error after any number of rounds. */
-static bool ended_by_time(enum job_end end, const struct sim_job *j)
+static bool is_ended_by_time(enum job_end end, const struct sim_job *j)
 {
-	bool over = j->plan.seconds > 0 && j->elapsed >= j->plan.seconds;
+	bool over = j->plan.seconds > 0 && j->elapsed_seconds >= j->plan.seconds;
 	return end == END_TIME || (end == END_ERROR && over && sim_error_after(j, j->rounds) <= j->plan.target_error);
 }
 
-static void on_job_ended(struct world *w, const struct action *a, struct sim_job *j)
+static void on_job_ended(struct sim_world *w, const struct action *a, struct sim_job *j)
 {
-	if (j->over)
-		sim_wrong(w, "j%" PRIu64 " ended twice", a->job);
-	j->over = true;
+	if (j->ended)
+		sim_report_violation(w, "j%" PRIu64 " ended twice", a->job);
+	j->ended = true;
 	j->done = a->state == JOB_DONE;
-	j->elapsed = farm_elapsed(w->farm, a->job, w->now);
+	j->elapsed_seconds = farm_job_elapsed(w->farm, a->job, w->now);
 	w->result.done += a->state == JOB_DONE;
 	w->result.failed += a->state == JOB_FAILED;
 	w->result.cancelled += a->state == JOB_CANCELLED;
 	struct job_status s;
-	if (!farm_job(w->farm, a->job, w->now, &s)) {
-		sim_wrong(w, "an ended job is forgotten");
+	if (!farm_job_status(w->farm, a->job, w->now, &s)) {
+		sim_report_violation(w, "an ended job is forgotten");
 		return;
 	}
-	w->result.copies += s.counts.duplicates;
+	w->result.duplicates += s.counts.duplicates;
 	w->result.timeouts += s.counts.timeouts;
 	w->result.repeats += s.counts.repeats;
 	w->result.refused += s.counts.refused;
@@ -166,37 +168,38 @@ static void on_job_ended(struct world *w, const struct action *a, struct sim_job
 	if (a->state != JOB_DONE)
 		return;
 	if (s.rounds != j->rounds)
-		sim_wrong(w, "the core counts %" PRIu64 " rounds, the canvas %" PRIu64, s.rounds, j->rounds);
-	if (!ended_by_time(a->end, j) && j->rounds != sim_undisturbed_rounds(j))
-		sim_wrong(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds,
-			  sim_undisturbed_rounds(j));
+		sim_report_violation(w, "the core counts %" PRIu64 " rounds, the canvas %" PRIu64, s.rounds, j->rounds);
+	if (!is_ended_by_time(a->end, j) && j->rounds != sim_undisturbed_rounds(j))
+		sim_report_violation(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds,
+				     sim_undisturbed_rounds(j));
 	uint64_t sum = 0;
 	for (uint64_t r = 0; r < j->rounds; r++)
 		sum += j->round_sum[r];
 	if (sum != undisturbed_sum(j, j->rounds))
-		sim_wrong(w, "j%" PRIu64 " has another sum than undisturbed", a->job);
+		sim_report_violation(w, "j%" PRIu64 " has another sum than undisturbed", a->job);
 }
 
-static void evaluate(struct world *w, const struct action *a, const struct sim_job *j)
+static void evaluate_error(struct sim_world *w, const struct action *a, const struct sim_job *j)
 {
 	if (a->rounds != j->rounds)
-		sim_wrong(w, "asked for the error after %" PRIu64 " rounds of %" PRIu64, a->rounds, j->rounds);
+		sim_report_violation(w, "asked for the error after %" PRIu64 " rounds of %" PRIu64, a->rounds,
+				     j->rounds);
 	struct event ev = {
-		.kind = EVENT_ERROR_KNOWN,
-		.error_known = {.job = a->job, .rounds = a->rounds, .rel_error = sim_error_after(j, a->rounds)}};
-	sim_push(w, (struct message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
+		.kind = EVENT_ERROR_ESTIMATED,
+		.error_estimated = {.job = a->job, .rounds = a->rounds, .rel_error = sim_error_after(j, a->rounds)}};
+	sim_push_message(w, (struct sim_message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
 }
 
-static void prepare(struct world *w, const struct action *a, struct sim_job *j)
+static void prepare_job(struct sim_world *w, const struct action *a, struct sim_job *j)
 {
-	if (j->boot != (1u << (j->plan.groups * j->plan.parts)) - 1)
-		sim_wrong(w, "the bootstrap is not complete");
+	if (j->bootstrap_slots != (1u << (j->plan.groups * j->plan.parts)) - 1)
+		sim_report_violation(w, "the bootstrap is not complete");
 	j->prepared = true;
 	struct event ev = {.kind = EVENT_PREPARED, .prepared = {.job = a->job, .ok = true}};
-	sim_push(w, (struct message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
+	sim_push_message(w, (struct sim_message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
 }
 
-static void trace_action(const struct world *w, const struct action *a)
+static void trace_action(const struct sim_world *w, const struct action *a)
 {
 	printf("[%.3f]   action %d peer %" PRIu64 " j%" PRIu64 " kind %d g%u p%u e%" PRIu64 " rounds %" PRIu64
 	       " ack %d state %d %s\n",
@@ -204,7 +207,7 @@ static void trace_action(const struct world *w, const struct action *a)
 	       a->rounds, (int)a->ack, (int)a->state, a->text);
 }
 
-static void perform_action(struct world *w, const struct action *a, uint64_t value)
+static void perform_action(struct sim_world *w, const struct action *a, uint64_t value)
 {
 	struct sim_job *j = sim_job_by_id(w, a->job);
 	uint32_t index;
@@ -215,43 +218,45 @@ static void perform_action(struct world *w, const struct action *a, uint64_t val
 		send_lease(w, a);
 		break;
 	case ACTION_REVOKE:
-		if (worker_of(w, a->peer, &index))
-			sim_post(w, (struct message){.kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key});
+		if (find_worker(w, a->peer, &index))
+			sim_post_message(w, (struct sim_message){
+						    .kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key});
 		break;
 	case ACTION_MERGE:
-		merge(w, a, value);
+		merge_result(w, a, value);
 		break;
 	case ACTION_ACK:
-		if (a->ack == ACK_NOTED && worker_of(w, a->peer, &index))
-			j->answered[slot_of(j, a->key)] |= 1u << index;
+		if (a->ack == ACK_NOTED && find_worker(w, a->peer, &index))
+			j->answered_by[slot_index(j, a->key)] |= 1u << index;
 		break;
-	case ACTION_CHAINS_ANEW:
+	case ACTION_RESTART_CHAINS:
 		break;
-	case ACTION_WRONG:
+	case ACTION_WRONG_RESULT:
 		w->result.lies++;
 		break;
 	case ACTION_QUARANTINE:
 		w->result.quarantined++;
 		break;
 	case ACTION_BOOTSTRAP_DONE:
-		prepare(w, a, j);
+		prepare_job(w, a, j);
 		break;
 	case ACTION_EVALUATE_ERROR:
-		evaluate(w, a, j);
+		evaluate_error(w, a, j);
 		break;
 	case ACTION_ROUND_DONE:
-		j->completed = farm_elapsed(w->farm, a->job, w->now);
+		j->completed_seconds = farm_job_elapsed(w->farm, a->job, w->now);
 		if (a->rounds != j->rounds)
-			sim_wrong(w, "round %" PRIu64 " said to be complete, %" PRIu64 " are", a->rounds, j->rounds);
+			sim_report_violation(w, "round %" PRIu64 " said to be complete, %" PRIu64 " are", a->rounds,
+					     j->rounds);
 		break;
 	case ACTION_JOB_CHANGED:
 		if (job_state_is_end(a->state))
 			on_job_ended(w, a, j);
 		break;
 	case ACTION_CLOSE_PEER:
-		if (worker_of(w, a->peer, &index)) {
+		if (find_worker(w, a->peer, &index)) {
 			w->workers[index].peer = 0;
-			sim_push(w, (struct message){.kind = START, .time = w->now + 1, .worker = index});
+			sim_push_message(w, (struct sim_message){.kind = START, .time = w->now + 1, .worker = index});
 		}
 		break;
 	default:
@@ -261,34 +266,35 @@ static void perform_action(struct world *w, const struct action *a, uint64_t val
 
 static bool is_held(const struct sim_job *j)
 {
-	for (int i = 0; i < JOB_HOLDS; i++)
+	for (int i = 0; i < JOB_HOLD_COUNT; i++)
 		if (j->held[i])
 			return true;
 	return false;
 }
 
-static void check_progress(struct world *w)
+static void check_progress(struct sim_world *w)
 {
 	for (uint32_t i = 0; i < w->job_count; i++) {
 		struct sim_job *j = &w->jobs[i];
 		struct job_status s;
-		if (!j->submitted || !farm_job(w->farm, j->id, w->now, &s))
+		if (!j->submitted || !farm_job_status(w->farm, j->id, w->now, &s))
 			continue;
-		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && is_held(j)))
-			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority,
-				  job_state_name(s.state));
+		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->ended && is_held(j)))
+			sim_report_violation(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority,
+					     job_state_name(s.state));
 		if (s.workers > s.leases || !(s.share >= 0 && s.share <= s.machines))
-			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases, s.workers, s.share,
-				  s.machines);
+			sim_report_violation(w, "%u leases at %u workers, %g machines of %u due", s.leases, s.workers,
+					     s.share, s.machines);
 		if (!job_state_is_end(s.state) && !s.leases && (!*s.waiting || !*s.owners_waiting))
-			sim_wrong(w, "j%" PRIu64 " waits, and nobody says why", j->id);
-		if (!(s.progress >= j->progress && s.progress <= 1))
-			sim_wrong(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->progress, s.progress);
-		j->progress = s.progress;
+			sim_report_violation(w, "j%" PRIu64 " waits, and nobody says why", j->id);
+		if (!(s.progress >= j->last_progress && s.progress <= 1))
+			sim_report_violation(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->last_progress,
+					     s.progress);
+		j->last_progress = s.progress;
 	}
 }
 
-void sim_step(struct world *w, struct event *ev, uint64_t value)
+void sim_step(struct sim_world *w, struct event *ev, uint64_t value)
 {
 	struct update u;
 	ev->time = w->now;
@@ -302,12 +308,12 @@ void sim_step(struct world *w, struct event *ev, uint64_t value)
 		w->jobs[ev->tag].id = u.actions[0].job;
 		w->jobs[ev->tag].submitted = true;
 	}
-	for (size_t i = 0; i < u.count && !*w->wrong; i++)
+	for (size_t i = 0; i < u.count && !*w->violation; i++)
 		perform_action(w, &u.actions[i], value);
 	check_progress(w);
-	if (u.wake < w->tick_at || w->tick_at <= w->now) {
-		w->tick_at = u.wake;
-		if (isfinite(u.wake))
-			sim_push(w, (struct message){.kind = TICK, .time = fmax(u.wake, w->now)});
+	if (u.wake_time < w->tick_at || w->tick_at <= w->now) {
+		w->tick_at = u.wake_time;
+		if (isfinite(u.wake_time))
+			sim_push_message(w, (struct sim_message){.kind = TICK, .time = fmax(u.wake_time, w->now)});
 	}
 }

@@ -21,11 +21,11 @@
 #include <stdint.h>
 
 struct sim_result {
-	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts,
+	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, duplicates, timeouts, restarts,
 		extended;
 	uint64_t verified, mismatched, lies, quarantined; /* lies: wrong results that were detected */
-	uint64_t hung, hoarded; /* hung: how often workers froze; hoarded: leases of workers that never answer */
-	double time;		/* virtual seconds */
+	uint64_t hangs, hoarded; /* hangs: how often workers froze; hoarded: leases of workers that never answer */
+	double time;		 /* virtual seconds */
 };
 
 /* Returns NULL, or a sentence that says what is wrong. */

@@ -14,7 +14,7 @@
 
 enum { SEEDS = 200, SEEDS_FULL = 10000 };
 
-static void add(struct sim_result *sum, const struct sim_result *r)
+static void add_result(struct sim_result *sum, const struct sim_result *r)
 {
 	sum->steps += r->steps;
 	sum->merged += r->merged;
@@ -24,7 +24,7 @@ static void add(struct sim_result *sum, const struct sim_result *r)
 	sum->done += r->done;
 	sum->failed += r->failed;
 	sum->cancelled += r->cancelled;
-	sum->copies += r->copies;
+	sum->duplicates += r->duplicates;
 	sum->timeouts += r->timeouts;
 	sum->restarts += r->restarts;
 	sum->extended += r->extended;
@@ -32,22 +32,22 @@ static void add(struct sim_result *sum, const struct sim_result *r)
 	sum->mismatched += r->mismatched;
 	sum->lies += r->lies;
 	sum->quarantined += r->quarantined;
-	sum->hung += r->hung;
+	sum->hangs += r->hangs;
 	sum->hoarded += r->hoarded;
 }
 
 static void simulate(void **state)
 {
 	(void)state;
-	const char *one = getenv("HSLT_SIM_SEED"), *full = getenv("FULL");
-	uint64_t first = one ? strtoull(one, NULL, 10) : 1;
-	uint64_t count = one ? 1 : full && strcmp(full, "1") == 0 ? SEEDS_FULL : SEEDS;
+	const char *single_seed = getenv("HSLT_SIM_SEED"), *full = getenv("FULL");
+	uint64_t first = single_seed ? strtoull(single_seed, NULL, 10) : 1;
+	uint64_t count = single_seed ? 1 : full && strcmp(full, "1") == 0 ? SEEDS_FULL : SEEDS;
 	struct sim_result sum = {0}, r;
 	for (uint64_t seed = first; seed < first + count; seed++) {
-		const char *wrong = sim_run(seed, one != NULL, &r);
-		if (wrong)
-			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, wrong);
-		add(&sum, &r);
+		const char *violation = sim_run(seed, single_seed != NULL, &r);
+		if (violation)
+			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, violation);
+		add_result(&sum, &r);
 	}
 	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64
 		      " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, %" PRIu64 " of them hangs, %" PRIu64
@@ -55,15 +55,15 @@ static void simulate(void **state)
 		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " extended, %" PRIu64
 		      " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " quarantined; jobs: %" PRIu64
 		      " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
-		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung,
-		      sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched,
-		      sum.lies, sum.quarantined, sum.done, sum.failed, sum.cancelled);
+		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hangs,
+		      sum.hoarded, sum.duplicates, sum.timeouts, sum.restarts, sum.extended, sum.verified,
+		      sum.mismatched, sum.lies, sum.quarantined, sum.done, sum.failed, sum.cancelled);
 	/* The simulated worlds must have enough trouble to be meaningful. */
-	if (!one) {
-		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
+	if (!single_seed) {
+		assert_true(sum.repeats > count && sum.duplicates > count / 4 && sum.timeouts > count / 4);
 		assert_true(sum.restarts > count / 2 && sum.extended > count / 2);
 		assert_true(sum.verified > 5 * count && sum.lies > count / 4 && sum.quarantined > count / 20);
-		assert_true(sum.hung > count / 2 && sum.hoarded > count);
+		assert_true(sum.hangs > count / 2 && sum.hoarded > count);
 		assert_true(sum.crashes > count && sum.done > count && sum.cancelled > count / 20);
 	}
 }

@@ -38,7 +38,7 @@ enum {
 	FUNCTION_BACK,
 };
 
-static const char *const functions[BALANCE_FUNCTIONS] = {
+static const char *const function_names[BALANCE_FUNCTIONS] = {
 	"film x",
 	"film y",
 	"film's centre",
@@ -71,27 +71,27 @@ static const char *const functions[BALANCE_FUNCTIONS] = {
 
 /* The ray that found a vertex and the ray that tests its visibility end at points that differ by rounding, so at the
  * edge of a triangle the answers may differ. Allowed for about one in 100,000 accepted proposals. */
-#define MOST_DOUBTS 2
+#define DOUBTS_MAX 2
 
 /* The way back is tested for one in so many proposals. */
-enum { WAYS_BACK = 4 };
+enum { WAY_BACK_INTERVAL = 4 };
 
 /* Half vectors, and values derived from them, are as exact as walks are: smaller differences are meaningless. */
-#define WALK_BLUR 0.003
+#define WALK_TOLERANCE 0.003
 /* Rounding error of numbers that should be equal. */
 #define ROUNDING 1e-9
 
 /* Returns |h_j| and its accuracy; 0 at exactly specular vertices and events in a medium. */
-static double slope(const struct full_path *x, unsigned j, double *blur)
+static double half_vector_length(const struct full_path *x, unsigned j, double *tolerance)
 {
 	if (j == 0 || j >= x->edges || x->v[j].delta || x->v[j].kind == VERTEX_MEDIUM)
 		return 0;
 	vec2 h = halfvec_of(x, j);
-	*blur = WALK_BLUR * fmin(x->v[j].bsdf->alpha, 1);
+	*tolerance = WALK_TOLERANCE * fmin(x->v[j].bsdf->min_alpha, 1);
 	return hypot(h.x, h.y);
 }
 
-static void measure(struct path_context *c, struct full_path *x, double *g, double *blur)
+static void evaluate_functions(struct path_context *c, struct full_path *x, double *g, double *tolerance)
 {
 	unsigned k = x->edges;
 	double lengths = 0, roughness = 0;
@@ -99,23 +99,23 @@ static void measure(struct path_context *c, struct full_path *x, double *g, doub
 		lengths += log(x->edge[e].distance2);
 	for (unsigned j = 1; j < k; j++)
 		if (x->v[j].kind == VERTEX_SURFACE)
-			roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->alpha_mean, 1);
-	double at_light = 0, at_camera = 0;
-	double first = slope(x, 1, &at_light), last = slope(x, k - 1, &at_camera);
-	vec3 near = x->v[k - 1].x.p, far = x->v[k > 1 ? 1 : 0].x.p, light = x->v[0].x.p;
-	const double all[BALANCE_FUNCTIONS] = {
+			roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->mean_alpha, 1);
+	double first_tolerance = 0, last_tolerance = 0;
+	double first = half_vector_length(x, 1, &first_tolerance), last = half_vector_length(x, k - 1, &last_tolerance);
+	vec3 last_point = x->v[k - 1].x.p, first_point = x->v[k > 1 ? 1 : 0].x.p, light_point = x->v[0].x.p;
+	const double values[BALANCE_FUNCTIONS] = {
 		x->film[0],
 		x->film[1],
 		hypot(x->film[0] - 16, x->film[1] - 16),
 		fmod(floor(x->film[0]), 2),
 		full_path_log_f(c, x),
-		x->wavelength,
-		near.x,
-		near.z,
-		far.y,
-		far.z,
-		light.x,
-		light.z,
+		x->wavelength_u,
+		last_point.x,
+		last_point.z,
+		first_point.y,
+		first_point.z,
+		light_point.x,
+		light_point.z,
 		lengths,
 		x->edge[k - 1].distance2,
 		first,
@@ -124,35 +124,35 @@ static void measure(struct path_context *c, struct full_path *x, double *g, doub
 		k,
 		x->v[k].x.p.x,
 		k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0,
-		x->wavelength,
+		x->wavelength_u,
 	};
 	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
-		g[i] = all[i];
-		blur[i] = ROUNDING * fabs(all[i]);
+		g[i] = values[i];
+		tolerance[i] = ROUNDING * fabs(values[i]);
 	}
-	blur[FUNCTION_H_1] += at_light;
-	blur[FUNCTION_H_K_1] += at_camera;
+	tolerance[FUNCTION_H_1] += first_tolerance;
+	tolerance[FUNCTION_H_K_1] += last_tolerance;
 }
 
-struct run {
+struct trial_run {
 	const char *test;
 	struct path_context *c;
 	struct mutation_ctx *m;
 	struct full_path *x, *y;
 	double weight, strict_weight; /* weight: of strategies that keep the number of edges; strict_weight: of all */
-	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* values for x */
+	double values[BALANCE_FUNCTIONS], tolerance[BALANCE_FUNCTIONS]; /* values for x */
 	uint64_t checked, doubts;
 };
 
-static bool fault_applies(const struct balance_trial *t, unsigned k)
+static bool trial_applies(const struct balance_trial *t, unsigned k)
 {
-	int b = t->how.b, c = t->how.c;
+	int b = t->setting.b, c = t->setting.c;
 	if (b > (int)k || (b > 0 && c >= b) || (t->side == BALANCE_CAMERA && b != (int)k))
 		return false;
 	return !(t->side == BALANCE_TRACED && b == (int)k);
 }
 
-static bool is_sound(const struct balance_trial *t, double log_weight)
+static bool is_positive_weight(const struct balance_trial *t, double log_weight)
 {
 	if (isnan(log_weight) || log_weight == INFINITY)
 		fail_msg("%s: a weight of %g", t->ops->name, log_weight);
@@ -160,26 +160,26 @@ static bool is_sound(const struct balance_trial *t, double log_weight)
 }
 
 /* Computes the acceptance probability as the chain does. */
-static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
+static double acceptance_probability(struct trial_run *r, struct balance_trial *t, struct move *move)
 {
-	enum proposal_end end = t->ops->propose(t->ops, r->m, &t->how, r->x, r->y, move);
+	enum proposal_result end = t->ops->propose(t->ops, r->m, &t->setting, r->x, r->y, move);
 	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
-	if (!end && !is_sound(t, to_y))
+	if (!end && !is_positive_weight(t, to_y))
 		end = PROPOSAL_DARK;
-	t->count[proposal_counter(end)]++;
+	t->counters[proposal_counter(end)]++;
 	if (end)
 		return 0;
 	double to_x = t->ops->log_weight(r->m, r->x, move, Y_TO_X);
-	if (!is_sound(t, to_x))
+	if (!is_positive_weight(t, to_x))
 		fail_msg("%s: from y the path x is black", t->ops->name);
 	return exp(fmin(to_y - to_x, 0));
 }
 
-static void check_accepted(struct run *r, struct balance_trial *t)
+static void check_accepted(struct trial_run *r, struct balance_trial *t)
 {
 	char text[200], name[48];
 	t->accepted++;
-	if (t->broken)
+	if (t->is_broken)
 		return;
 	r->checked++;
 	if (path_check(r->c, r->y, text, sizeof text))
@@ -188,18 +188,18 @@ static void check_accepted(struct run *r, struct balance_trial *t)
 		r->doubts++;
 		return;
 	}
-	balance_name(t, name);
+	balance_format_name(t, name);
 	fail_msg("%s, %s: %s", r->test, name, text);
 }
 
-static bool same_media(const struct path_edge *a, const struct path_edge *b)
+static bool is_same_media(const struct path_edge *a, const struct path_edge *b)
 {
-	return a->medium == b->medium && a->before == b->before && a->fits == b->fits &&
-	       memcmp(&a->free, &b->free, sizeof a->free) == 0;
+	return a->medium == b->medium && a->previous_medium == b->previous_medium && a->media_match == b->media_match &&
+	       memcmp(&a->free_flight, &b->free_flight, sizeof a->free_flight) == 0;
 }
 
 /* Turns y back into x, by the vertices that the move names. */
-static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
+static void restore_path(struct trial_run *r, const struct balance_trial *t, const struct move *move)
 {
 	const struct full_path *x = r->x;
 	struct full_path *y = r->y;
@@ -210,34 +210,34 @@ static void restore(struct run *r, const struct balance_trial *t, const struct m
 		bool same = memcmp(&a->x.p, &b->x.p, sizeof a->x.p) == 0 && a->kind == b->kind && a->mode == b->mode &&
 			    a->delta == b->delta && a->bsdf == b->bsdf && a->emitter == b->emitter &&
 			    (i == x->edges || (memcmp(&x->edge[i], &y->edge[i], sizeof x->edge[i]) == 0 &&
-					       same_media(&a->edge, &b->edge)));
+					       is_same_media(&a->edge, &b->edge)));
 		if (!same)
 			fail_msg("%s, %s: vertex %u of %u is not what it was", r->test, t->ops->name, i, x->edges);
 	}
 	assert_true(y->edges == x->edges && y->film[0] == x->film[0] && y->film[1] == x->film[1] &&
-		    y->wavelength == x->wavelength);
+		    y->wavelength_u == x->wavelength_u);
 }
 
-static double clamp(double d)
+static double clamp_to_unit(double d)
 {
 	return isnan(d) ? 0 : fmin(fmax(d, -1), 1);
 }
 
-static void compare(const struct run *r, const double *g, const double *blur, double *phi)
+static void compare_functions(const struct trial_run *r, const double *g, const double *tolerance, double *phi)
 {
 	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
-		double d = g[i] - r->g[i];
+		double d = g[i] - r->values[i];
 		/* An angle enters by its sine, so that about half of the pairs from each x have either sign. */
 		if (i == FUNCTION_TURN)
 			d = sin(2 * M_PI * d);
-		phi[i] = fabs(d) > blur[i] + r->blur[i] ? copysign(1, d) : 0;
+		phi[i] = fabs(d) > tolerance[i] + r->tolerance[i] ? copysign(1, d) : 0;
 	}
 }
 
 /* Returns log P(b) P(c | b) by the heuristic. */
-static double log_choice(struct run *r, const struct full_path *x, const struct move *move)
+static double log_choice_probability(struct trial_run *r, const struct full_path *x, const struct move *move)
 {
-	double weight[FULL_PATH_MAX_VERTICES], p;
+	double weight[FULL_PATH_VERTICES_MAX], p;
 	heuristic_roughness.weigh_b(r->c, x, weight);
 	p = heuristic_probability(weight, x->edges + 1, move->b);
 	if (move->b > 0) {
@@ -247,7 +247,7 @@ static double log_choice(struct run *r, const struct full_path *x, const struct 
 	return log(p);
 }
 
-static double log_fixed(struct run *r, struct full_path *x, const struct move *move)
+static double log_fixed_part(struct trial_run *r, struct full_path *x, const struct move *move)
 {
 	double sum = 0;
 	for (unsigned j = 0; j < move->c; j++)
@@ -256,96 +256,98 @@ static double log_fixed(struct run *r, struct full_path *x, const struct move *m
 }
 
 /* Returns whether a walk from y towards the half vectors of x fails to lead to x: there is no way back. */
-static bool stays_away(struct run *r, const struct move *move)
+static bool has_no_way_back(struct trial_run *r, const struct move *move)
 {
 	static struct full_path back;
 	static struct walk_scratch scratch;
-	struct walk_target target[FULL_PATH_MAX_VERTICES];
+	struct walk_target target[FULL_PATH_VERTICES_MAX];
 	const struct full_path *x = r->x, *y = r->y;
 	unsigned b = move->b, c = move->c;
 	full_path_copy(&back, y, 0, y->edges);
 	back.v[b] = x->v[b];
 	back.v[c] = x->v[c];
 	back.wl = x->wl;
-	back.wavelength = x->wavelength;
-	double farthest = 0;
+	back.wavelength_u = x->wavelength_u;
+	double max_distance = 0;
 	for (unsigned j = c + 1; j < b; j++) {
-		farthest = fmax(farthest, vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)));
+		max_distance = fmax(max_distance, vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)));
 		bool delta = x->v[j].delta;
 		target[j].h = delta ? (vec2){0, 0} : halfvec_of(x, j);
 		const double *sigma = r->m->scratch.step[X_TO_Y][j].sigma;
 		target[j].tolerance =
-			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
+			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->min_alpha, 1), fmin(sigma[0], sigma[1]));
 	}
-	if (halfvec_walk(r->c, &back, b, c, target, true, &r->m->limits, WALK_STALE, &scratch) != WALK_OK)
+	if (halfvec_walk(r->c, &back, b, c, target, true, &r->m->limits, WALK_STALE_ALL, &scratch) != WALK_OK)
 		return true;
 	for (unsigned j = c + 1; j < b; j++)
-		if (vec3_length(vec3_sub(back.v[j].x.p, x->v[j].x.p)) > 0.01 * farthest + 1e-9)
+		if (vec3_length(vec3_sub(back.v[j].x.p, x->v[j].x.p)) > 0.01 * max_distance + 1e-9)
 			return true;
 	return false;
 }
 
 /* Adds the differences of the parts of the densities, in which an omission from the ratio shows first, and whether
  * there is a way back: if there is none phi is 1, and the pair for which it is -1 is never proposed. */
-static void compare_moves(struct run *r, const struct balance_trial *t, double log_f, const struct move *move,
-			  double *phi)
+static void compare_densities(struct trial_run *r, const struct balance_trial *t, double log_f, const struct move *move,
+			      double *phi)
 {
 	for (int i = FUNCTION_TRANSFER; i < BALANCE_FUNCTIONS; i++)
 		phi[i] = 0;
-	phi[FUNCTION_F] = clamp(log_f - r->g[FUNCTION_INTENSITY]);
+	phi[FUNCTION_F] = clamp_to_unit(log_f - r->values[FUNCTION_INTENSITY]);
 	double emitter = log(path_pdf_emitter(r->c, &r->y->v[0]) / path_pdf_emitter(r->c, &r->x->v[0]));
-	phi[FUNCTION_EMITTER] = fabs(emitter) > ROUNDING ? clamp(emitter) : 0;
+	phi[FUNCTION_EMITTER] = fabs(emitter) > ROUNDING ? clamp_to_unit(emitter) : 0;
 	if (t->ops->independent)
 		return;
-	phi[FUNCTION_TRANSFER] = clamp(move->log_transfer[X_TO_Y] - move->log_transfer[Y_TO_X]);
-	phi[FUNCTION_STEPS] = clamp(move->log_density[X_TO_Y] - move->log_density[Y_TO_X]);
-	phi[FUNCTION_CHOICE] = clamp(log_choice(r, r->y, move) - log_choice(r, r->x, move));
-	phi[FUNCTION_FIXED] = clamp(log_fixed(r, r->y, move) - log_fixed(r, r->x, move));
-	if (move->b > move->c + 1 && r->m->step % WAYS_BACK == 0)
-		phi[FUNCTION_BACK] = stays_away(r, move);
+	phi[FUNCTION_TRANSFER] = clamp_to_unit(move->log_transfer[X_TO_Y] - move->log_transfer[Y_TO_X]);
+	phi[FUNCTION_STEPS] = clamp_to_unit(move->log_density[X_TO_Y] - move->log_density[Y_TO_X]);
+	phi[FUNCTION_CHOICE] =
+		clamp_to_unit(log_choice_probability(r, r->y, move) - log_choice_probability(r, r->x, move));
+	phi[FUNCTION_FIXED] = clamp_to_unit(log_fixed_part(r, r->y, move) - log_fixed_part(r, r->x, move));
+	if (move->b > move->c + 1 && r->m->step % WAY_BACK_INTERVAL == 0)
+		phi[FUNCTION_BACK] = has_no_way_back(r, move);
 }
 
-static void propose(struct run *r, struct balance_trial *t, unsigned group)
+static void test_proposal(struct trial_run *r, struct balance_trial *t, unsigned group)
 {
 	struct move move = {0};
-	double u[4], h[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS];
-	r->m->count = t->count;
+	double u[4], h[BALANCE_FUNCTIONS], tolerance[BALANCE_FUNCTIONS];
+	r->m->counters = t->counters;
 	r->m->step++;
 	t->pairs++;
-	double a = acceptance(r, t, &move), w = a * (t->ops->independent ? r->strict_weight : r->weight);
+	double a = acceptance_probability(r, t, &move), w = a * (t->ops->independent ? r->strict_weight : r->weight);
 	if (a > 0) {
 		double phi[BALANCE_FUNCTIONS];
-		t->expected += a;
-		measure(r->c, r->y, h, blur);
-		compare(r, h, blur, phi);
-		compare_moves(r, t, h[FUNCTION_INTENSITY], &move, phi);
+		t->acceptance_sum += a;
+		evaluate_functions(r->c, r->y, h, tolerance);
+		compare_functions(r, h, tolerance, phi);
+		compare_densities(r, t, h[FUNCTION_INTENSITY], &move, phi);
 		for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
-			t->sum[group][i] += w * phi[i];
-			t->size[group][i] += w * fabs(phi[i]);
+			t->phi_sum[group][i] += w * phi[i];
+			t->abs_phi_sum[group][i] += w * fabs(phi[i]);
 		}
 		mutation_random(r->m, BLOCK_STRATEGY, u);
 		if (u[1] < a)
 			check_accepted(r, t);
 	}
-	restore(r, t, &move);
+	restore_path(r, t, &move);
 }
 
-static void run_group(struct run *r, unsigned group, struct starts *s, struct balance_trial *trials, size_t count,
+static void run_group(struct trial_run *r, unsigned group, struct starts *s, struct balance_trial *trials, size_t count,
 		      size_t starts, const double *scale)
 {
-	for (unsigned k = 1; k <= BALANCE_EDGES; k++) {
-		double u[4], weight = starts_weight(s, k);
+	for (unsigned k = 1; k <= BALANCE_EDGES_MAX; k++) {
+		double u[4], weight = starts_contribution(s, k);
 		rng_uniform4(r->m->seed, RNG_TEST, group, k, 0, u);
 		for (size_t i = 0; i < starts && weight > 0; i++) {
-			if (!starts_path(s, k, ((double)i + u[0]) / (double)starts, r->x))
+			if (!starts_make_path(s, k, ((double)i + u[0]) / (double)starts, r->x))
 				continue;
 			full_path_copy(r->y, r->x, 0, k);
 			r->strict_weight = weight;
 			r->weight = weight / scale[k];
-			measure(r->c, r->x, r->g, r->blur);
+			evaluate_functions(r->c, r->x, r->values, r->tolerance);
 			for (size_t j = 0; j < count; j++)
-				for (unsigned n = 0; n < trials[j].repeat && fault_applies(&trials[j], k); n++)
-					propose(r, &trials[j], group);
+				for (unsigned n = 0; n < trials[j].proposals_per_start && trial_applies(&trials[j], k);
+				     n++)
+					test_proposal(r, &trials[j], group);
 		}
 	}
 }
@@ -357,17 +359,17 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 	static struct mutation_ctx m;
 	static struct full_path x, y;
 	static uint64_t counters[BATCH_COUNTERS];
-	starts_context(&c, w, 1, BALANCE_EDGES, counters);
+	starts_init_context(&c, w, 1, BALANCE_EDGES_MAX, counters);
 	m.path = &c;
 	m.seed = stats_seed(test);
 	m.limits = walk_limits_of(&accuracy_settings_default);
-	struct run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
+	struct trial_run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
 	static struct starts s[BALANCE_GROUPS];
-	double scale[BALANCE_EDGES + 1] = {0}; /* gives all lengths equal weight */
+	double scale[BALANCE_EDGES_MAX + 1] = {0}; /* gives all lengths equal weight */
 	for (unsigned g = 0; g < BALANCE_GROUPS; g++) {
 		starts_init(&s[g], &c, m.seed, g, pairs);
-		for (unsigned k = 1; k <= BALANCE_EDGES; k++)
-			scale[k] += starts_weight(&s[g], k) / BALANCE_GROUPS;
+		for (unsigned k = 1; k <= BALANCE_EDGES_MAX; k++)
+			scale[k] += starts_contribution(&s[g], k) / BALANCE_GROUPS;
 	}
 	for (unsigned g = 0; g < BALANCE_GROUPS; g++) {
 		m.chain = g;
@@ -375,7 +377,7 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 		run_group(&r, g, &s[g], trials, count, starts, scale);
 		starts_fini(&s[g]);
 	}
-	if (r.doubts > MOST_DOUBTS + r.checked / 10000)
+	if (r.doubts > DOUBTS_MAX + r.checked / 10000)
 		fail_msg("%s: %llu of %llu accepted proposals have edges that are occluded", test,
 			 (unsigned long long)r.doubts, (unsigned long long)r.checked);
 }
@@ -395,12 +397,12 @@ static double critical_t(void)
 
 /* Estimates the ratio's relative fault from function i, with its standard error. Returns false if that is
  * impossible. */
-static bool fault_of(const struct balance_trial *t, int i, double *fault, double *error)
+static bool estimate_fault(const struct balance_trial *t, int i, double *fault, double *error)
 {
 	double column[BALANCE_GROUPS], size = 0;
 	for (int g = 0; g < BALANCE_GROUPS; g++) {
-		column[g] = t->sum[g][i];
-		size += t->size[g][i] / BALANCE_GROUPS;
+		column[g] = t->phi_sum[g][i];
+		size += t->abs_phi_sum[g][i] / BALANCE_GROUPS;
 	}
 	struct stats_mean s = stats_mean_test(column, BALANCE_GROUPS, 0);
 	if (!(s.error > 0) || !(size > 0))
@@ -419,19 +421,20 @@ static void add_verdict(struct balance_verdict *v, int i, double fault, double e
 		v->t = fault / error;
 		v->p = p;
 		v->fault = fault;
-		v->function = functions[i];
+		v->function_name = function_names[i];
 	}
-	v->balanced = !(v->p < LEVEL);
+	v->is_balanced = !(v->p < LEVEL);
 }
 
-static const struct balance_verdict nothing_known = {.p = 1, .power = INFINITY, .function = "", .balanced = true};
+static const struct balance_verdict initial_verdict = {
+	.p = 1, .power = INFINITY, .function_name = "", .is_balanced = true};
 
 struct balance_verdict balance_judge(const struct balance_trial *t)
 {
-	struct balance_verdict v = nothing_known;
+	struct balance_verdict v = initial_verdict;
 	double fault, error;
 	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
-		if (fault_of(t, i, &fault, &error))
+		if (estimate_fault(t, i, &fault, &error))
 			add_verdict(&v, i, fault, error);
 	return v;
 }
@@ -440,36 +443,37 @@ void balance_pool_add(struct balance_pool *p, const struct balance_trial *t)
 {
 	double fault, error;
 	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
-		if (fault_of(t, i, &fault, &error)) {
-			p->certainty[i] += 1 / (error * error);
-			p->weighted[i] += fault / (error * error);
+		if (estimate_fault(t, i, &fault, &error)) {
+			p->precision[i] += 1 / (error * error);
+			p->weighted_fault[i] += fault / (error * error);
 		}
 }
 
 struct balance_verdict balance_pool_judge(const struct balance_pool *p)
 {
-	struct balance_verdict v = nothing_known;
+	struct balance_verdict v = initial_verdict;
 	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
-		if (p->certainty[i] > 0)
-			add_verdict(&v, i, p->weighted[i] / p->certainty[i], 1 / sqrt(p->certainty[i]));
+		if (p->precision[i] > 0)
+			add_verdict(&v, i, p->weighted_fault[i] / p->precision[i], 1 / sqrt(p->precision[i]));
 	return v;
 }
 
-void balance_name(const struct balance_trial *t, char text[48])
+void balance_format_name(const struct balance_trial *t, char text[48])
 {
 	static const char *const sides[] = {"", " (b = k)", " (b < k)"};
 	char forced[16] = "";
-	if (t->how.b >= 0)
-		snprintf(forced, sizeof forced, t->how.b ? "@b%dc%d" : "@b%d", t->how.b % 100, t->how.c % 100);
+	if (t->setting.b >= 0)
+		snprintf(forced, sizeof forced, t->setting.b ? "@b%dc%d" : "@b%d", t->setting.b % 100,
+			 t->setting.c % 100);
 	snprintf(text, 48, "%.16s%s%s", t->ops->name, forced, sides[t->side]);
 }
 
 void balance_print(const char *test, const struct balance_trial *t, const struct balance_verdict *v)
 {
 	char name[48];
-	balance_name(t, name);
+	balance_format_name(t, name);
 	printf("%-14s %-22s %8llu pairs, accepted %.3f, reverse failed %.3f, worst t %+6.2f (%s), finds %5.1f %%%s\n",
-	       test, name, (unsigned long long)t->pairs, t->expected / (double)t->pairs,
-	       (double)t->count[STRATEGY_FAIL_REVERSE] / (double)t->pairs, v->t, v->function, 100 * v->power,
-	       v->balanced ? "" : " NOT BALANCED");
+	       test, name, (unsigned long long)t->pairs, t->acceptance_sum / (double)t->pairs,
+	       (double)t->counters[STRATEGY_FAIL_REVERSE] / (double)t->pairs, v->t, v->function_name, 100 * v->power,
+	       v->is_balanced ? "" : " NOT BALANCED");
 }

@@ -16,26 +16,27 @@
 #include "tests/support/starts.h"
 #include "worker/render/mutation/mutation.h"
 
-enum { BALANCE_GROUPS = 64, BALANCE_FUNCTIONS = 28, BALANCE_EDGES = 5 };
+enum { BALANCE_GROUPS = 64, BALANCE_FUNCTIONS = 28, BALANCE_EDGES_MAX = 5 };
 
 enum balance_side { BALANCE_ANY, BALANCE_CAMERA, BALANCE_TRACED }; /* the forced b: any path, b = k, b < k */
 
 struct balance_trial {
 	const struct mutation_ops *ops;
-	struct mutation_setting how;
+	struct mutation_forced_choice setting;
 	enum balance_side side;
-	unsigned repeat; /* number of proposals from each start */
-	bool broken;	 /* a deliberately broken mutation: paths are not checked */
-	uint64_t pairs, accepted, count[STRATEGY_COUNTERS];
-	double expected; /* sum of the acceptance probabilities a */
-	double sum[BALANCE_GROUPS][BALANCE_FUNCTIONS], size[BALANCE_GROUPS][BALANCE_FUNCTIONS]; /* of a phi, a |phi| */
+	unsigned proposals_per_start; /* number of proposals from each start */
+	bool is_broken;		      /* a deliberately broken mutation: paths are not checked */
+	uint64_t pairs, accepted, counters[STRATEGY_COUNTERS];
+	double acceptance_sum; /* sum of the acceptance probabilities a */
+	double phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS],
+		abs_phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS]; /* of a phi, a |phi| */
 };
 
 struct balance_verdict {
 	double t, p, power; /* t, p: of the worst function; power: the smallest fault that the best function finds */
 	double fault;	    /* the relative fault of the ratio that the worst function shows */
-	const char *function;
-	bool balanced;
+	const char *function_name;
+	bool is_balanced;
 };
 
 /* Runs all trials from the same starts: `starts` for each number of edges from each group, chosen among `pairs`
@@ -43,12 +44,12 @@ struct balance_verdict {
 void balance_run(const struct world *w, const char *test, struct balance_trial *trials, size_t count, size_t starts,
 		 size_t pairs);
 struct balance_verdict balance_judge(const struct balance_trial *t);
-void balance_name(const struct balance_trial *t, char text[48]);
+void balance_format_name(const struct balance_trial *t, char text[48]);
 /* Combines the same strategy's results in several worlds: a relative fault that all worlds share is found from all
  * of them together, each weighted by its precision. Initialize with zeros. */
 struct balance_pool {
-	double certainty[BALANCE_FUNCTIONS],
-		weighted[BALANCE_FUNCTIONS]; /* sums of 1 / error^2, and of the faults times that */
+	double precision[BALANCE_FUNCTIONS],
+		weighted_fault[BALANCE_FUNCTIONS]; /* sums of 1 / error^2, and of the faults times that */
 };
 void balance_pool_add(struct balance_pool *p, const struct balance_trial *t);
 struct balance_verdict balance_pool_judge(const struct balance_pool *p);

@@ -26,14 +26,14 @@ struct blob_hash blob_text_store(struct blob_store *s, const char *text)
 	struct blob_writer *w;
 	struct error e;
 	assert_int_equal(blob_write_begin(&w, s, &h, strlen(text), &e), 0);
-	assert_int_equal(blob_write_add(w, text, 1, &e), 0);
-	assert_int_equal(blob_write_at(w), 1);
-	assert_int_equal(blob_write_add(w, text + 1, strlen(text) - 1, &e), 0);
+	assert_int_equal(blob_write_append(w, text, 1, &e), 0);
+	assert_int_equal(blob_write_offset(w), 1);
+	assert_int_equal(blob_write_append(w, text + 1, strlen(text) - 1, &e), 0);
 	assert_int_equal(blob_write_commit(w, &e), 0);
 	return h;
 }
 
-uint64_t blob_text_bytes(const char *folder)
+uint64_t blob_text_folder_bytes(const char *folder)
 {
 	uint64_t sum = 0;
 	DIR *d = opendir(folder);

@@ -7,6 +7,6 @@
 
 struct blob_hash blob_text_hash(const char *text);
 struct blob_hash blob_text_store(struct blob_store *s, const char *text); /* stores the text in two pieces */
-uint64_t blob_text_bytes(const char *folder); /* total size of all files directly in the folder */
+uint64_t blob_text_folder_bytes(const char *folder); /* total size of all files directly in the folder */
 
 #endif

@@ -4,11 +4,11 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-bool bytes_read(uint64_t *bytes)
+bool bytes_read_count(uint64_t *bytes)
 {
 	FILE *f = fopen("/proc/self/io", "r");
-	bool known = f && fscanf(f, "rchar: %" SCNu64, bytes) == 1;
+	bool is_counted = f && fscanf(f, "rchar: %" SCNu64, bytes) == 1;
 	if (f)
 		fclose(f);
-	return known;
+	return is_counted;
 }

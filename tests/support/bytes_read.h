@@ -8,6 +8,6 @@
 
 /* Stores the number of bytes that read and pread have returned to this process so far. Returns false if the kernel
  * does not count them. */
-bool bytes_read(uint64_t *bytes);
+bool bytes_read_count(uint64_t *bytes);
 
 #endif

@@ -12,9 +12,10 @@
 unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *out_size);
 /* Like checksummed_frame(), for a header and a payload, which need not be valid. first: the frame is the first in
  * its direction, and a hello or its answer gets the checksum of its bytes. */
-unsigned char *checksummed_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
-				 bool first, size_t *out_size);
+unsigned char *checksummed_frame_from_parts(const void *header, size_t header_size, const void *payload,
+					    size_t payload_size, bool first, size_t *out_size);
 /* Like checksummed_frame(), for a message. */
-unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *out_size);
+unsigned char *checksummed_frame_from_message(const Farm__Envelope *m, const void *payload, size_t payload_size,
+					      size_t *out_size);
 
 #endif

@@ -15,8 +15,8 @@
 #include "worker/render/world/world.h"
 
 struct density_tally {
-	size_t betas, routes, with_delta, infinite, relabelled, passed, skipped, off;
-	double worst, worst_ratio;
+	size_t betas, routes, with_delta, from_infinity, relabelled, with_passed_vertices, skipped, off_ray;
+	double worst_error, worst_ratio_error;
 };
 
 /* Fails the test if a density differs. Frees the world. */

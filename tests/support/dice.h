@@ -14,17 +14,17 @@
 struct dice {
 	uint64_t seed, index;
 	double value[4];
-	unsigned left;
+	unsigned remaining;
 };
 
-struct dice dice_of(const char *test);
-double dice_throw(struct dice *d); /* in [0,1) */
+struct dice dice_for_test(const char *test);
+double dice_uniform(struct dice *d); /* in [0,1) */
 double dice_between(struct dice *d, double low, double high);
 uint32_t dice_below(struct dice *d, uint32_t n); /* 0 .. n-1 */
 vec3 dice_direction(struct dice *d);		 /* uniform on the sphere */
 double dice_normal(struct dice *d);		 /* mean 0, variance 1 */
 double dice_poisson(struct dice *d, double mean);
 
-size_t dice_count(size_t samples); /* scaled by the environment, at least 1 */
+size_t dice_scaled_count(size_t samples); /* scaled by the environment, at least 1 */
 
 #endif

@@ -6,43 +6,43 @@
 #include <errno.h>
 #include <string.h>
 
-static const char *failing;
-static int listed, most, fault;
+static const char *failing_path_part;
+static int listed_names, names_before_failure, failure_errno;
 static DIR *failing_folder;
 
-static DIR *own_opendir(const char *path)
+static DIR *failing_opendir(const char *path)
 {
 	DIR *d = disk_system.opendir(path);
-	if (d && strstr(path, failing)) {
+	if (d && strstr(path, failing_path_part)) {
 		failing_folder = d;
-		listed = 0;
+		listed_names = 0;
 	}
 	return d;
 }
 
-static struct dirent *own_readdir(DIR *d)
+static struct dirent *failing_readdir(DIR *d)
 {
 	struct dirent *f = disk_system.readdir(d);
-	if (d != failing_folder || (f && f->d_name[0] == '.') || listed++ < most)
+	if (d != failing_folder || (f && f->d_name[0] == '.') || listed_names++ < names_before_failure)
 		return f;
-	errno = fault;
+	errno = failure_errno;
 	return NULL;
 }
 
 void failing_list_begin(const char *part, int names, int error)
 {
-	static struct disk own;
-	own = disk_system;
-	own.opendir = own_opendir;
-	own.readdir = own_readdir;
-	failing = part;
-	most = names;
-	fault = error;
+	static struct disk failing_disk;
+	failing_disk = disk_system;
+	failing_disk.opendir = failing_opendir;
+	failing_disk.readdir = failing_readdir;
+	failing_path_part = part;
+	names_before_failure = names;
+	failure_errno = error;
 	failing_folder = NULL;
-	disk_use(&own);
+	disk_set_calls(&failing_disk);
 }
 
 void failing_list_end(void)
 {
-	disk_use(NULL);
+	disk_set_calls(NULL);
 }

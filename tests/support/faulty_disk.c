@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A tree of names and files in memory that holds what a loss of power would leave (faulty_disk.h). Calls are carried
- * out on the real disk and recorded here: writes go into a list of changes, which a flush applies to the safe bytes;
- * names go into a list of renamings, which a flush of their folder applies. When power is lost, the safe state and a
- * random part of the rest are written to the other folder.
+ * A tree of names and files in memory that holds what a loss of power would leave (faulty_disk.h). Calls are
+ * carried out on the real disk and recorded here: writes go into a list of changes, which a flush applies to the safe
+ * bytes; names go into a list of renamings, which a flush of their folder applies. When power is lost, the safe state
+ * and a random part of the rest are written to the other folder.
  *
  * The hooks are in faulty_disk_calls.c and, for SQLite, in faulty_disk_vfs.c. Running out of memory ends the process.
  */
@@ -20,17 +20,17 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { SECTOR = 512, PATH_MOST = 4400 };
+enum { SECTOR_BYTES = 512, PATH_SIZE_MAX = 4400 };
 
 /* A change to a file since its last flush. */
 struct change {
 	struct change *next;
-	uint64_t at, size;
-	unsigned char *bytes; /* NULL: the file was cut to `size` */
+	uint64_t offset, size;
+	unsigned char *bytes; /* NULL: the file was cut to `safe_size` */
 };
 
-struct name {
-	struct name *next;
+struct entry {
+	struct entry *next;
 	char *text;
 	struct faulty_disk_node *node;
 };
@@ -39,28 +39,28 @@ struct name {
  * NULL). */
 struct renaming {
 	struct renaming *next;
-	char *gone, *made;
+	char *old_name, *new_name;
 	struct faulty_disk_node *node;
 };
 
 struct faulty_disk_node {
-	bool folder;
-	char last[64];	      /* last component of its first name */
-	unsigned char *bytes; /* for a file: the safe bytes */
-	uint64_t size;
-	struct change *changes, **changes_last;
-	struct name *live, *safe; /* for a folder: its names */
-	struct renaming *renamings, **renamings_last;
+	bool is_folder;
+	char last_component[64];   /* last component of its first name */
+	unsigned char *safe_bytes; /* for a file: the safe bytes */
+	uint64_t safe_size;
+	struct change *changes, **changes_tail;
+	struct entry *current_names, *safe_names; /* for a folder: its names */
+	struct renaming *renamings, **renamings_tail;
 };
 
-static struct faulty_disk setup;
-static struct faulty_disk_node *root;
+static struct faulty_disk_options disk_options;
+static struct faulty_disk_node *root_node;
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static uint64_t calls, changing_calls, since_failure, dice;
-static atomic_bool failed;
-static _Atomic uint64_t unasked[FAULTY_DISK_COUNTS];
+static uint64_t call_count, modifying_calls, calls_since_failure, random_state;
+static atomic_bool has_failed;
+static _Atomic uint64_t unused_counts[FAULTY_DISK_COUNTS];
 
-static void *not_null(void *p)
+static void *check_allocated(void *p)
 {
 	if (!p)
 		abort();
@@ -69,7 +69,7 @@ static void *not_null(void *p)
 
 static double random_unit(void)
 {
-	uint64_t z = dice += UINT64_C(0x9e3779b97f4a7c15);
+	uint64_t z = random_state += UINT64_C(0x9e3779b97f4a7c15);
 	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
 	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
 	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
@@ -79,73 +79,74 @@ static double random_unit(void)
 
 static struct faulty_disk_node *node_new(bool folder, const char *last)
 {
-	struct faulty_disk_node *n = not_null(calloc(1, sizeof *n));
-	n->folder = folder;
-	memcpy(n->last, last, strnlen(last, sizeof n->last - 1));
-	n->changes_last = &n->changes;
-	n->renamings_last = &n->renamings;
+	struct faulty_disk_node *n = check_allocated(calloc(1, sizeof *n));
+	n->is_folder = folder;
+	memcpy(n->last_component, last, strnlen(last, sizeof n->last_component - 1));
+	n->changes_tail = &n->changes;
+	n->renamings_tail = &n->renamings;
 	return n;
 }
 
-static struct name **find(struct name **list, const char *text)
+static struct entry **find_name(struct entry **list, const char *text)
 {
 	while (*list && strcmp((*list)->text, text) != 0)
 		list = &(*list)->next;
 	return list;
 }
 
-static void forget_name(struct name **list, const char *text)
+static void remove_name(struct entry **list, const char *text)
 {
-	struct name **at = find(list, text), *gone = *at;
-	if (!gone)
+	struct entry **slot = find_name(list, text), *removed = *slot;
+	if (!removed)
 		return;
-	*at = gone->next;
-	free(gone->text);
-	free(gone);
+	*slot = removed->next;
+	free(removed->text);
+	free(removed);
 }
 
-static void set_name(struct name **list, const char *text, struct faulty_disk_node *node)
+static void set_name(struct entry **list, const char *text, struct faulty_disk_node *node)
 {
-	forget_name(list, text);
-	struct name *n = not_null(malloc(sizeof *n));
-	*n = (struct name){*list, not_null(strdup(text)), node};
+	remove_name(list, text);
+	struct entry *n = check_allocated(malloc(sizeof *n));
+	*n = (struct entry){*list, check_allocated(strdup(text)), node};
 	*list = n;
 }
 
-static struct name *copy_names(const struct name *from)
+static struct entry *copy_names(const struct entry *from)
 {
-	struct name *list = NULL;
+	struct entry *list = NULL;
 	for (; from; from = from->next)
 		set_name(&list, from->text, from->node);
 	return list;
 }
 
-static void apply_renaming(struct name **list, const struct renaming *r)
+static void apply_renaming(struct entry **list, const struct renaming *r)
 {
-	if (r->gone)
-		forget_name(list, r->gone);
-	if (r->made)
-		set_name(list, r->made, r->node);
+	if (r->old_name)
+		remove_name(list, r->old_name);
+	if (r->new_name)
+		set_name(list, r->new_name, r->node);
 }
 
-static void rename_in(struct faulty_disk_node *folder, const char *gone, const char *made,
-		      struct faulty_disk_node *node)
+static void record_renaming(struct faulty_disk_node *folder, const char *old_name, const char *new_name,
+			    struct faulty_disk_node *node)
 {
-	struct renaming *r = not_null(calloc(1, sizeof *r));
-	*r = (struct renaming){NULL, gone ? not_null(strdup(gone)) : NULL, made ? not_null(strdup(made)) : NULL, node};
-	apply_renaming(&folder->live, r);
-	*folder->renamings_last = r;
-	folder->renamings_last = &r->next;
+	struct renaming *r = check_allocated(calloc(1, sizeof *r));
+	*r = (struct renaming){NULL, old_name ? check_allocated(strdup(old_name)) : NULL,
+			       new_name ? check_allocated(strdup(new_name)) : NULL, node};
+	apply_renaming(&folder->current_names, r);
+	*folder->renamings_tail = r;
+	folder->renamings_tail = &r->next;
 }
 
 /* Returns the folder that contains the path's last component; NULL: the path is not below the root, or there is no
  * such folder. */
-static struct faulty_disk_node *parent_of(const char *path, const char **last)
+static struct faulty_disk_node *find_parent(const char *path, const char **last)
 {
-	size_t n = strlen(setup.root);
-	if (strncmp(path, setup.root, n) != 0 || (path[n] && path[n] != '/'))
+	size_t n = strlen(disk_options.root);
+	if (strncmp(path, disk_options.root, n) != 0 || (path[n] && path[n] != '/'))
 		return NULL;
-	struct faulty_disk_node *at = root;
+	struct faulty_disk_node *current = root_node;
 	const char *part = path + n;
 	for (;;) {
 		char text[256];
@@ -154,158 +155,159 @@ static struct faulty_disk_node *parent_of(const char *path, const char **last)
 		size_t size = strcspn(part, "/");
 		if (!part[size] || !part[size + strspn(part + size, "/")]) {
 			*last = part;
-			return at;
+			return current;
 		}
 		assert(size < sizeof text);
 		memcpy(text, part, size);
 		text[size] = 0;
-		struct name *next = *find(&at->live, text);
-		if (!next || !next->node->folder)
+		struct entry *next = *find_name(&current->current_names, text);
+		if (!next || !next->node->is_folder)
 			return NULL;
-		at = next->node;
+		current = next->node;
 		part += size;
 	}
 }
 
-static struct faulty_disk_node *node_at(const char *path, bool create, bool folder)
+static struct faulty_disk_node *find_node(const char *path, bool create, bool folder)
 {
 	const char *last;
-	struct faulty_disk_node *in = parent_of(path, &last);
-	if (!in || !*last)
-		return in;
-	struct name *n = *find(&in->live, last);
+	struct faulty_disk_node *parent = find_parent(path, &last);
+	if (!parent || !*last)
+		return parent;
+	struct entry *n = *find_name(&parent->current_names, last);
 	if (n || !create)
 		return n ? n->node : NULL;
-	struct faulty_disk_node *made = node_new(folder, last);
-	rename_in(in, NULL, last, made);
-	return made;
+	struct faulty_disk_node *created = node_new(folder, last);
+	record_renaming(parent, NULL, last, created);
+	return created;
 }
 
-struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create)
+struct faulty_disk_node *faulty_disk_find_node(const char *path, bool create)
 {
-	return node_at(path, create, false);
+	return find_node(path, create, false);
 }
 
-void faulty_disk_made_folder(const char *path)
+void faulty_disk_record_new_folder(const char *path)
 {
-	node_at(path, true, true);
+	find_node(path, true, true);
 }
 
-void faulty_disk_renamed(const char *from, const char *to)
+void faulty_disk_record_rename(const char *from, const char *to)
 {
-	const char *gone, *made;
-	struct faulty_disk_node *a = parent_of(from, &gone), *b = parent_of(to, &made);
+	const char *old_name, *new_name;
+	struct faulty_disk_node *a = find_parent(from, &old_name), *b = find_parent(to, &new_name);
 	if (!a)
 		return;
-	struct name *n = *find(&a->live, gone);
+	struct entry *n = *find_name(&a->current_names, old_name);
 	assert(n && b);
 	if (a != b) { /* the folders are separate: one of them may keep its change while the other does not */
-		rename_in(b, NULL, made, n->node);
-		rename_in(a, gone, NULL, NULL);
+		record_renaming(b, NULL, new_name, n->node);
+		record_renaming(a, old_name, NULL, NULL);
 	} else {
-		rename_in(a, gone, made, n->node);
+		record_renaming(a, old_name, new_name, n->node);
 	}
 }
 
 /* ---- what a flush makes safe ---- */
 
-static void resize(unsigned char **bytes, uint64_t *size, uint64_t want)
+static void resize_bytes(unsigned char **bytes, uint64_t *size, uint64_t new_size)
 {
-	*bytes = not_null(realloc(*bytes, want + 1));
-	if (want > *size)
-		memset(*bytes + *size, 0, want - *size);
-	*size = want;
+	*bytes = check_allocated(realloc(*bytes, new_size + 1));
+	if (new_size > *size)
+		memset(*bytes + *size, 0, new_size - *size);
+	*size = new_size;
 }
 
-static void write_at(unsigned char **bytes, uint64_t *size, const void *from, uint64_t n, uint64_t at)
+static void store_bytes(unsigned char **bytes, uint64_t *size, const void *from, uint64_t n, uint64_t offset)
 {
-	if (at + n > *size)
-		resize(bytes, size, at + n);
+	if (offset + n > *size)
+		resize_bytes(bytes, size, offset + n);
 	if (n)
-		memcpy(*bytes + at, from, n);
+		memcpy(*bytes + offset, from, n);
 }
 
-static bool is_forgotten(const struct faulty_disk_node *n, enum faulty_disk_forget kind)
+static bool is_flush_skipped(const struct faulty_disk_node *n, enum faulty_disk_forget kind)
 {
-	return (setup.forget & kind) &&
-	       (!setup.forget_name || strncmp(n->last, setup.forget_name, strlen(setup.forget_name)) == 0);
+	return (disk_options.forget & kind) &&
+	       (!disk_options.forget_name ||
+		strncmp(n->last_component, disk_options.forget_name, strlen(disk_options.forget_name)) == 0);
 }
 
-void faulty_disk_flushed(struct faulty_disk_node *n, bool database)
+void faulty_disk_record_flush(struct faulty_disk_node *n, bool database)
 {
-	if (!n || is_forgotten(n, database    ? FAULTY_DISK_FORGET_DATABASE
-				  : n->folder ? FAULTY_DISK_FORGET_FOLDERS
-					      : FAULTY_DISK_FORGET_FILES))
+	if (!n || is_flush_skipped(n, database	     ? FAULTY_DISK_FORGET_DATABASE
+				      : n->is_folder ? FAULTY_DISK_FORGET_FOLDERS
+						     : FAULTY_DISK_FORGET_FILES))
 		return;
 	for (struct change *c; (c = n->changes);) {
 		n->changes = c->next;
 		if (c->bytes)
-			write_at(&n->bytes, &n->size, c->bytes, c->size, c->at);
+			store_bytes(&n->safe_bytes, &n->safe_size, c->bytes, c->size, c->offset);
 		else
-			resize(&n->bytes, &n->size, c->size);
+			resize_bytes(&n->safe_bytes, &n->safe_size, c->size);
 		free(c->bytes);
 		free(c);
 	}
-	n->changes_last = &n->changes;
+	n->changes_tail = &n->changes;
 	for (struct renaming *r; (r = n->renamings);) {
 		n->renamings = r->next;
-		apply_renaming(&n->safe, r);
-		free(r->gone);
-		free(r->made);
+		apply_renaming(&n->safe_names, r);
+		free(r->old_name);
+		free(r->new_name);
 		free(r);
 	}
-	n->renamings_last = &n->renamings;
+	n->renamings_tail = &n->renamings;
 }
 
-void faulty_disk_failed(struct faulty_disk_node *n)
+void faulty_disk_record_failed_flush(struct faulty_disk_node *n)
 {
-	while (n && !n->folder && n->changes) {
+	while (n && !n->is_folder && n->changes) {
 		struct change *c = n->changes;
 		n->changes = c->next;
 		free(c->bytes);
 		free(c);
 	}
-	if (n && !n->folder)
-		n->changes_last = &n->changes;
+	if (n && !n->is_folder)
+		n->changes_tail = &n->changes;
 }
 
-void faulty_disk_flushed_folder_of(const char *path)
+void faulty_disk_record_folder_flush(const char *path)
 {
 	const char *last;
-	faulty_disk_flushed(parent_of(path, &last), true);
+	faulty_disk_record_flush(find_parent(path, &last), true);
 }
 
-static void add_change(struct faulty_disk_node *n, const void *bytes, uint64_t size, uint64_t at)
+static void add_change(struct faulty_disk_node *n, const void *bytes, uint64_t size, uint64_t offset)
 {
-	struct change *c = not_null(calloc(1, sizeof *c));
-	c->at = at;
+	struct change *c = check_allocated(calloc(1, sizeof *c));
+	c->offset = offset;
 	c->size = size;
 	if (bytes) {
-		c->bytes = not_null(malloc(size + 1));
+		c->bytes = check_allocated(malloc(size + 1));
 		memcpy(c->bytes, bytes, size);
 	}
-	*n->changes_last = c;
-	n->changes_last = &c->next;
+	*n->changes_tail = c;
+	n->changes_tail = &c->next;
 }
 
-void faulty_disk_wrote(struct faulty_disk_node *n, const void *bytes, size_t size, uint64_t at)
+void faulty_disk_record_write(struct faulty_disk_node *n, const void *bytes, size_t size, uint64_t offset)
 {
 	if (n && size)
-		add_change(n, bytes, size, at);
+		add_change(n, bytes, size, offset);
 }
 
-void faulty_disk_cut(struct faulty_disk_node *n, uint64_t size)
+void faulty_disk_record_truncate(struct faulty_disk_node *n, uint64_t size)
 {
 	if (n)
 		add_change(n, NULL, size, 0);
 }
 
-void faulty_disk_removed(const char *path)
+void faulty_disk_record_removal(const char *path)
 {
 	const char *last;
-	struct faulty_disk_node *in = parent_of(path, &last);
-	if (in)
-		rename_in(in, last, NULL, NULL);
+	struct faulty_disk_node *parent = find_parent(path, &last);
+	if (parent)
+		record_renaming(parent, last, NULL, NULL);
 }
 
 /* ---- loss of power ---- */
@@ -314,24 +316,25 @@ struct odds {
 	double bytes, lengths, names; /* probabilities that unflushed changes survive */
 };
 
-static void write_out(const struct faulty_disk_node *n, const char *path, const struct odds *p, uint64_t *lost)
+static void write_surviving_file(const struct faulty_disk_node *n, const char *path, const struct odds *p,
+				 uint64_t *lost)
 {
 	unsigned char *bytes = NULL;
 	uint64_t size = 0;
-	write_at(&bytes, &size, n->bytes ? n->bytes : (const unsigned char *)"", n->size, 0);
+	store_bytes(&bytes, &size, n->safe_bytes ? n->safe_bytes : (const unsigned char *)"", n->safe_size, 0);
 	for (const struct change *c = n->changes; c; c = c->next) {
 		if (!c->bytes) {
 			if (random_unit() < p->lengths)
-				resize(&bytes, &size, c->size);
+				resize_bytes(&bytes, &size, c->size);
 			continue;
 		}
-		if (random_unit() < p->lengths && c->at + c->size > size)
-			resize(&bytes, &size, c->at + c->size);
-		for (uint64_t at = c->at, end; at < c->at + c->size; at = end) {
-			end = at / SECTOR * SECTOR + SECTOR;
-			end = end < c->at + c->size ? end : c->at + c->size;
+		if (random_unit() < p->lengths && c->offset + c->size > size)
+			resize_bytes(&bytes, &size, c->offset + c->size);
+		for (uint64_t at = c->offset, end; at < c->offset + c->size; at = end) {
+			end = at / SECTOR_BYTES * SECTOR_BYTES + SECTOR_BYTES;
+			end = end < c->offset + c->size ? end : c->offset + c->size;
 			if (random_unit() < p->bytes)
-				write_at(&bytes, &size, c->bytes + (at - c->at), end - at, at);
+				store_bytes(&bytes, &size, c->bytes + (at - c->offset), end - at, at);
 			else
 				++*lost;
 		}
@@ -348,9 +351,10 @@ static void write_out(const struct faulty_disk_node *n, const char *path, const 
 	free(bytes);
 }
 
-static void write_folder(const struct faulty_disk_node *n, const char *path, const struct odds *p, uint64_t *lost)
+static void write_surviving_folder(const struct faulty_disk_node *n, const char *path, const struct odds *p,
+				   uint64_t *lost)
 {
-	struct name *names = copy_names(n->safe);
+	struct entry *names = copy_names(n->safe_names);
 	if (mkdir(path, 0700))
 		abort();
 	for (const struct renaming *r = n->renamings; r; r = r->next) {
@@ -359,27 +363,27 @@ static void write_folder(const struct faulty_disk_node *n, const char *path, con
 		else
 			++*lost;
 	}
-	for (const struct name *m = names; m; m = m->next) {
-		char below[PATH_MOST];
+	for (const struct entry *m = names; m; m = m->next) {
+		char below[PATH_SIZE_MAX];
 		snprintf(below, sizeof below, "%s/%s", path, m->text);
-		if (m->node->folder)
-			write_folder(m->node, below, p, lost);
+		if (m->node->is_folder)
+			write_surviving_folder(m->node, below, p, lost);
 		else
-			write_out(m->node, below, p, lost);
+			write_surviving_file(m->node, below, p, lost);
 	}
 }
 
 static void lose_power(void)
 {
-	static const double shares[] = {0, 0.1, 0.5, 0.9, 1};
+	static const double probabilities[] = {0, 0.1, 0.5, 0.9, 1};
 	uint64_t lost = 0;
 	struct odds p;
-	p.bytes = shares[(int)(5 * random_unit())];
-	p.lengths = shares[(int)(5 * random_unit())];
-	p.names = shares[(int)(5 * random_unit())];
-	write_folder(root, setup.after, &p, &lost);
-	atomic_fetch_add(&setup.counts[3], lost);
-	_exit(FAULTY_DISK_EXIT);
+	p.bytes = probabilities[(int)(5 * random_unit())];
+	p.lengths = probabilities[(int)(5 * random_unit())];
+	p.names = probabilities[(int)(5 * random_unit())];
+	write_surviving_folder(root_node, disk_options.remains, &p, &lost);
+	atomic_fetch_add(&disk_options.counts[3], lost);
+	_exit(FAULTY_DISK_EXIT_CODE);
 }
 
 void faulty_disk_power_off(void)
@@ -388,27 +392,29 @@ void faulty_disk_power_off(void)
 	lose_power();
 }
 
-int faulty_disk_enter(enum faulty_disk_call what)
+int faulty_disk_begin_call(enum faulty_disk_call kind)
 {
 	pthread_mutex_lock(&mutex);
-	atomic_store(&setup.counts[1], ++calls);
-	if (what != FAULTY_DISK_READS) {
-		atomic_store(&setup.counts[0], ++changing_calls);
-		since_failure += setup.lose_after && atomic_load(&failed);
-		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) ||
-		    atomic_load(&setup.counts[4]))
+	atomic_store(&disk_options.counts[1], ++call_count);
+	if (kind != FAULTY_DISK_READ) {
+		atomic_store(&disk_options.counts[0], ++modifying_calls);
+		calls_since_failure += disk_options.power_loss_after && atomic_load(&has_failed);
+		if (modifying_calls == disk_options.power_loss_at ||
+		    (disk_options.power_loss_after && calls_since_failure == disk_options.power_loss_after) ||
+		    atomic_load(&disk_options.counts[4]))
 			lose_power();
 	}
-	if (!setup.fail_from || calls < setup.fail_from || calls - setup.fail_from >= setup.fail_count)
+	if (!disk_options.first_failing_call || call_count < disk_options.first_failing_call ||
+	    call_count - disk_options.first_failing_call >= disk_options.failing_call_count)
 		return 0;
-	if (setup.fail_writes_only && what != FAULTY_DISK_WRITES && what != FAULTY_DISK_FLUSHES)
+	if (disk_options.fail_writes_only && kind != FAULTY_DISK_WRITE && kind != FAULTY_DISK_FLUSH)
 		return 0;
-	atomic_fetch_add(&setup.counts[2], 1);
-	atomic_store(&failed, true);
-	return setup.fail_with;
+	atomic_fetch_add(&disk_options.counts[2], 1);
+	atomic_store(&has_failed, true);
+	return disk_options.failure_errno;
 }
 
-void faulty_disk_leave(void)
+void faulty_disk_end_call(void)
 {
 	pthread_mutex_unlock(&mutex);
 }
@@ -421,16 +427,16 @@ static void load_file(struct faulty_disk_node *n, const char *path)
 	ssize_t got;
 	int fd = open(path, O_RDONLY);
 	while (fd >= 0 && (got = read(fd, part, sizeof part)) > 0)
-		write_at(&n->bytes, &n->size, part, (uint64_t)got, n->size);
+		store_bytes(&n->safe_bytes, &n->safe_size, part, (uint64_t)got, n->safe_size);
 	if (fd < 0 || close(fd))
 		abort();
 }
 
 static void load_folder(struct faulty_disk_node *n, const char *path)
 {
-	DIR *d = not_null(opendir(path));
+	DIR *d = check_allocated(opendir(path));
 	for (struct dirent *f; (f = readdir(d));) {
-		char below[PATH_MOST];
+		char below[PATH_SIZE_MAX];
 		struct stat st;
 		if (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0)
 			continue;
@@ -438,9 +444,9 @@ static void load_folder(struct faulty_disk_node *n, const char *path)
 		if (lstat(below, &st))
 			abort();
 		struct faulty_disk_node *m = node_new(S_ISDIR(st.st_mode), f->d_name);
-		set_name(&n->live, f->d_name, m);
-		set_name(&n->safe, f->d_name, m);
-		if (m->folder)
+		set_name(&n->current_names, f->d_name, m);
+		set_name(&n->safe_names, f->d_name, m);
+		if (m->is_folder)
 			load_folder(m, below);
 		else
 			load_file(m, below);
@@ -448,14 +454,14 @@ static void load_folder(struct faulty_disk_node *n, const char *path)
 	closedir(d);
 }
 
-void faulty_disk_begin(const struct faulty_disk *l)
+void faulty_disk_begin(const struct faulty_disk_options *options)
 {
-	setup = *l;
-	if (!setup.counts)
-		setup.counts = unasked;
-	dice = setup.seed;
-	root = node_new(true, "");
-	load_folder(root, setup.root);
-	disk_use(&faulty_disk_calls);
-	faulty_disk_vfs_begin();
+	disk_options = *options;
+	if (!disk_options.counts)
+		disk_options.counts = unused_counts;
+	random_state = disk_options.seed;
+	root_node = node_new(true, "");
+	load_folder(root_node, disk_options.root);
+	disk_set_calls(&faulty_disk_calls);
+	faulty_disk_register_vfs();
 }

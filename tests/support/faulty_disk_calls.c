@@ -9,197 +9,197 @@
 #include <stdio.h>
 #include <unistd.h>
 
-enum { FDS = 4096 };
-static struct faulty_disk_node *open_files[FDS];
+enum { FDS_MAX = 4096 };
+static struct faulty_disk_node *nodes_by_fd[FDS_MAX];
 
-static bool is_refused(enum faulty_disk_call what)
+static bool is_refused(enum faulty_disk_call kind)
 {
-	int code = faulty_disk_enter(what);
+	int code = faulty_disk_begin_call(kind);
 	if (!code)
 		return false;
-	faulty_disk_leave();
+	faulty_disk_end_call();
 	errno = code;
 	return true;
 }
 
 /* Preserves errno. */
-static long leave_with(long result)
+static long end_call_with(long result)
 {
-	faulty_disk_leave();
+	faulty_disk_end_call();
 	return result;
 }
 
 static int do_open(const char *path, int flags, mode_t mode)
 {
 	bool hidden = (flags & O_TMPFILE) == O_TMPFILE, changes = !hidden && (flags & (O_CREAT | O_TRUNC));
-	if (is_refused(changes ? FAULTY_DISK_OPENS : FAULTY_DISK_READS))
+	if (is_refused(changes ? FAULTY_DISK_OPEN : FAULTY_DISK_READ))
 		return -1;
 	int fd = open(path, flags, mode);
-	if (fd >= 0 && fd < FDS)
-		open_files[fd] = hidden ? NULL : faulty_disk_node_of(path, (flags & O_CREAT) != 0);
-	if (fd >= 0 && fd < FDS && open_files[fd] && (flags & O_TRUNC))
-		faulty_disk_cut(open_files[fd], 0);
-	return (int)leave_with(fd);
+	if (fd >= 0 && fd < FDS_MAX)
+		nodes_by_fd[fd] = hidden ? NULL : faulty_disk_find_node(path, (flags & O_CREAT) != 0);
+	if (fd >= 0 && fd < FDS_MAX && nodes_by_fd[fd] && (flags & O_TRUNC))
+		faulty_disk_record_truncate(nodes_by_fd[fd], 0);
+	return (int)end_call_with(fd);
 }
 
 static int do_close(int fd)
 {
-	faulty_disk_enter(FAULTY_DISK_READS); /* a failed close closes all the same */
-	if (fd >= 0 && fd < FDS)
-		open_files[fd] = NULL;
-	return (int)leave_with(close(fd));
+	faulty_disk_begin_call(FAULTY_DISK_READ); /* a failed close closes all the same */
+	if (fd >= 0 && fd < FDS_MAX)
+		nodes_by_fd[fd] = NULL;
+	return (int)end_call_with(close(fd));
 }
 
-static struct faulty_disk_node *file_of(int fd)
+static struct faulty_disk_node *fd_node(int fd)
 {
-	return fd >= 0 && fd < FDS ? open_files[fd] : NULL;
+	return fd >= 0 && fd < FDS_MAX ? nodes_by_fd[fd] : NULL;
 }
 
 static ssize_t do_read(int fd, void *bytes, size_t size)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : leave_with(read(fd, bytes, size));
+	return is_refused(FAULTY_DISK_READ) ? -1 : end_call_with(read(fd, bytes, size));
 }
 
 static ssize_t do_pread(int fd, void *bytes, size_t size, off_t at)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : leave_with(pread(fd, bytes, size, at));
+	return is_refused(FAULTY_DISK_READ) ? -1 : end_call_with(pread(fd, bytes, size, at));
 }
 
 static ssize_t do_write(int fd, const void *bytes, size_t size)
 {
-	if (is_refused(FAULTY_DISK_WRITES))
+	if (is_refused(FAULTY_DISK_WRITE))
 		return -1;
 	bool at_end = fcntl(fd, F_GETFL) & O_APPEND;
 	off_t at = lseek(fd, 0, at_end ? SEEK_END : SEEK_CUR);
 	ssize_t n = write(fd, bytes, size);
 	if (n > 0)
-		faulty_disk_wrote(file_of(fd), bytes, (size_t)n, (uint64_t)at);
-	return leave_with(n);
+		faulty_disk_record_write(fd_node(fd), bytes, (size_t)n, (uint64_t)at);
+	return end_call_with(n);
 }
 
 static ssize_t do_pwritev(int fd, const struct iovec *parts, int count, off_t at)
 {
-	if (is_refused(FAULTY_DISK_WRITES))
+	if (is_refused(FAULTY_DISK_WRITE))
 		return -1;
 	ssize_t n = pwritev(fd, parts, count, at);
-	for (size_t left = n > 0 ? (size_t)n : 0; left; parts++) {
-		size_t size = parts->iov_len < left ? parts->iov_len : left;
-		faulty_disk_wrote(file_of(fd), parts->iov_base, size, (uint64_t)at);
+	for (size_t remaining = n > 0 ? (size_t)n : 0; remaining; parts++) {
+		size_t size = parts->iov_len < remaining ? parts->iov_len : remaining;
+		faulty_disk_record_write(fd_node(fd), parts->iov_base, size, (uint64_t)at);
 		at += (off_t)size;
-		left -= size;
+		remaining -= size;
 	}
-	return leave_with(n);
+	return end_call_with(n);
 }
 
 static int do_ftruncate(int fd, off_t size)
 {
-	if (is_refused(FAULTY_DISK_REMOVES))
+	if (is_refused(FAULTY_DISK_REMOVE))
 		return -1;
 	int rc = ftruncate(fd, size);
 	if (!rc)
-		faulty_disk_cut(file_of(fd), (uint64_t)size);
-	return (int)leave_with(rc);
+		faulty_disk_record_truncate(fd_node(fd), (uint64_t)size);
+	return (int)end_call_with(rc);
 }
 
 static int do_fallocate(int fd, int mode, off_t at, off_t size)
 {
 	assert(mode == FALLOC_FL_KEEP_SIZE);
-	return is_refused(FAULTY_DISK_WRITES) ? -1 : (int)leave_with(fallocate(fd, mode, at, size));
+	return is_refused(FAULTY_DISK_WRITE) ? -1 : (int)end_call_with(fallocate(fd, mode, at, size));
 }
 
 static int do_posix_fallocate(int fd, off_t at, off_t size)
 {
-	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
-	return (int)leave_with(code ? code : posix_fallocate(fd, at, size));
+	int code = faulty_disk_begin_call(FAULTY_DISK_WRITE);
+	return (int)end_call_with(code ? code : posix_fallocate(fd, at, size));
 }
 
 static int do_fsync(int fd)
 {
-	int code = faulty_disk_enter(FAULTY_DISK_FLUSHES);
+	int code = faulty_disk_begin_call(FAULTY_DISK_FLUSH);
 	if (code)
-		faulty_disk_failed(file_of(fd));
+		faulty_disk_record_failed_flush(fd_node(fd));
 	else
-		faulty_disk_flushed(file_of(fd), false);
-	faulty_disk_leave();
+		faulty_disk_record_flush(fd_node(fd), false);
+	faulty_disk_end_call();
 	errno = code;
 	return code ? -1 : 0;
 }
 
 static int do_rename(const char *from, const char *to)
 {
-	if (is_refused(FAULTY_DISK_OPENS))
+	if (is_refused(FAULTY_DISK_OPEN))
 		return -1;
 	int rc = rename(from, to);
 	if (!rc)
-		faulty_disk_renamed(from, to);
-	return (int)leave_with(rc);
+		faulty_disk_record_rename(from, to);
+	return (int)end_call_with(rc);
 }
 
 static int do_unlink(const char *path)
 {
-	if (is_refused(FAULTY_DISK_REMOVES))
+	if (is_refused(FAULTY_DISK_REMOVE))
 		return -1;
 	int rc = unlink(path);
 	if (!rc)
-		faulty_disk_removed(path);
-	return (int)leave_with(rc);
+		faulty_disk_record_removal(path);
+	return (int)end_call_with(rc);
 }
 
 static int do_mkdir(const char *path, mode_t mode)
 {
-	if (is_refused(FAULTY_DISK_OPENS))
+	if (is_refused(FAULTY_DISK_OPEN))
 		return -1;
 	int rc = mkdir(path, mode);
 	if (!rc)
-		faulty_disk_made_folder(path);
-	return (int)leave_with(rc);
+		faulty_disk_record_new_folder(path);
+	return (int)end_call_with(rc);
 }
 
 static int do_rmdir(const char *path)
 {
-	if (is_refused(FAULTY_DISK_REMOVES))
+	if (is_refused(FAULTY_DISK_REMOVE))
 		return -1;
 	int rc = rmdir(path);
 	if (!rc)
-		faulty_disk_removed(path);
-	return (int)leave_with(rc);
+		faulty_disk_record_removal(path);
+	return (int)end_call_with(rc);
 }
 
 static int do_stat(const char *path, struct stat *st)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(lstat(path, st));
+	return is_refused(FAULTY_DISK_READ) ? -1 : (int)end_call_with(lstat(path, st));
 }
 
 static int do_fstat(int fd, struct stat *st)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(fstat(fd, st));
+	return is_refused(FAULTY_DISK_READ) ? -1 : (int)end_call_with(fstat(fd, st));
 }
 
 static int do_touch(const char *path)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(disk_system.touch(path));
+	return is_refused(FAULTY_DISK_READ) ? -1 : (int)end_call_with(disk_system.touch(path));
 }
 
-static int do_flock(int fd, int what)
+static int do_flock(int fd, int operation)
 {
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)leave_with(disk_system.flock(fd, what));
+	return is_refused(FAULTY_DISK_READ) ? -1 : (int)end_call_with(disk_system.flock(fd, operation));
 }
 
 static DIR *do_opendir(const char *path)
 {
-	if (is_refused(FAULTY_DISK_READS))
+	if (is_refused(FAULTY_DISK_READ))
 		return NULL;
 	DIR *d = opendir(path);
-	faulty_disk_leave();
+	faulty_disk_end_call();
 	return d;
 }
 
 static struct dirent *do_readdir(DIR *d)
 {
-	if (is_refused(FAULTY_DISK_READS))
+	if (is_refused(FAULTY_DISK_READ))
 		return NULL;
 	struct dirent *f = readdir(d);
-	faulty_disk_leave();
+	faulty_disk_end_call();
 	return f;
 }
 

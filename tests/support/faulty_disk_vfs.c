@@ -6,114 +6,116 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct file {
+struct vfs_file {
 	sqlite3_file base;
 	struct faulty_disk_node *node;
 	char *name;
-	bool tell_folder; /* its first flush also flushes its name, as the system's VFS does for journals */
-	sqlite3_file *real;
+	bool flushes_folder; /* its first flush also flushes its name, as the system's VFS does for journals */
+	sqlite3_file *system_file;
 };
 
 static sqlite3_vfs *system_vfs;
-static sqlite3_vfs vfs;
+static sqlite3_vfs faulty_vfs;
 
-static struct file *file_of(sqlite3_file *f)
+static struct vfs_file *to_vfs_file(sqlite3_file *f)
 {
-	return (struct file *)f;
+	return (struct vfs_file *)f;
 }
 
-static int leave_with(int rc)
+static int end_call_with(int rc)
 {
-	faulty_disk_leave();
+	faulty_disk_end_call();
 	return rc;
 }
 
 static int x_close(sqlite3_file *f)
 {
-	int rc = file_of(f)->real->pMethods->xClose(file_of(f)->real);
-	free(file_of(f)->name);
-	free(file_of(f)->real);
+	int rc = to_vfs_file(f)->system_file->pMethods->xClose(to_vfs_file(f)->system_file);
+	free(to_vfs_file(f)->name);
+	free(to_vfs_file(f)->system_file);
 	return rc;
 }
 
 static int x_read(sqlite3_file *f, void *bytes, int size, sqlite3_int64 at)
 {
-	if (faulty_disk_enter(FAULTY_DISK_READS))
-		return leave_with(SQLITE_IOERR_READ);
-	return leave_with(file_of(f)->real->pMethods->xRead(file_of(f)->real, bytes, size, at));
+	if (faulty_disk_begin_call(FAULTY_DISK_READ))
+		return end_call_with(SQLITE_IOERR_READ);
+	return end_call_with(
+		to_vfs_file(f)->system_file->pMethods->xRead(to_vfs_file(f)->system_file, bytes, size, at));
 }
 
 static int x_write(sqlite3_file *f, const void *bytes, int size, sqlite3_int64 at)
 {
-	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
+	int code = faulty_disk_begin_call(FAULTY_DISK_WRITE);
 	int rc = code == ENOSPC ? SQLITE_FULL
 		 : code		? SQLITE_IOERR_WRITE
-				: file_of(f)->real->pMethods->xWrite(file_of(f)->real, bytes, size, at);
+			: to_vfs_file(f)->system_file->pMethods->xWrite(to_vfs_file(f)->system_file, bytes, size, at);
 	if (rc == SQLITE_OK)
-		faulty_disk_wrote(file_of(f)->node, bytes, (size_t)size, (uint64_t)at);
-	return leave_with(rc);
+		faulty_disk_record_write(to_vfs_file(f)->node, bytes, (size_t)size, (uint64_t)at);
+	return end_call_with(rc);
 }
 
 static int x_truncate(sqlite3_file *f, sqlite3_int64 size)
 {
-	int rc = faulty_disk_enter(FAULTY_DISK_REMOVES) ? SQLITE_IOERR_TRUNCATE
-							: file_of(f)->real->pMethods->xTruncate(file_of(f)->real, size);
+	int rc = faulty_disk_begin_call(FAULTY_DISK_REMOVE)
+			 ? SQLITE_IOERR_TRUNCATE
+			 : to_vfs_file(f)->system_file->pMethods->xTruncate(to_vfs_file(f)->system_file, size);
 	if (rc == SQLITE_OK)
-		faulty_disk_cut(file_of(f)->node, (uint64_t)size);
-	return leave_with(rc);
+		faulty_disk_record_truncate(to_vfs_file(f)->node, (uint64_t)size);
+	return end_call_with(rc);
 }
 
 static int x_sync(sqlite3_file *f, int flags)
 {
 	(void)flags;
-	if (faulty_disk_enter(FAULTY_DISK_FLUSHES)) {
-		faulty_disk_failed(file_of(f)->node);
-		return leave_with(SQLITE_IOERR_FSYNC);
+	if (faulty_disk_begin_call(FAULTY_DISK_FLUSH)) {
+		faulty_disk_record_failed_flush(to_vfs_file(f)->node);
+		return end_call_with(SQLITE_IOERR_FSYNC);
 	}
-	faulty_disk_flushed(file_of(f)->node, true);
-	if (file_of(f)->tell_folder)
-		faulty_disk_flushed_folder_of(file_of(f)->name);
-	file_of(f)->tell_folder = false;
-	return leave_with(SQLITE_OK);
+	faulty_disk_record_flush(to_vfs_file(f)->node, true);
+	if (to_vfs_file(f)->flushes_folder)
+		faulty_disk_record_folder_flush(to_vfs_file(f)->name);
+	to_vfs_file(f)->flushes_folder = false;
+	return end_call_with(SQLITE_OK);
 }
 
 static int x_size(sqlite3_file *f, sqlite3_int64 *size)
 {
-	return file_of(f)->real->pMethods->xFileSize(file_of(f)->real, size);
+	return to_vfs_file(f)->system_file->pMethods->xFileSize(to_vfs_file(f)->system_file, size);
 }
 
 static int x_lock(sqlite3_file *f, int what)
 {
-	return file_of(f)->real->pMethods->xLock(file_of(f)->real, what);
+	return to_vfs_file(f)->system_file->pMethods->xLock(to_vfs_file(f)->system_file, what);
 }
 
 static int x_unlock(sqlite3_file *f, int what)
 {
-	return file_of(f)->real->pMethods->xUnlock(file_of(f)->real, what);
+	return to_vfs_file(f)->system_file->pMethods->xUnlock(to_vfs_file(f)->system_file, what);
 }
 
-static int x_check(sqlite3_file *f, int *is)
+static int x_check(sqlite3_file *f, int *is_reserved)
 {
-	return file_of(f)->real->pMethods->xCheckReservedLock(file_of(f)->real, is);
+	return to_vfs_file(f)->system_file->pMethods->xCheckReservedLock(to_vfs_file(f)->system_file, is_reserved);
 }
 
-static int x_control(sqlite3_file *f, int what, void *with)
+static int x_control(sqlite3_file *f, int operation, void *argument)
 {
-	return file_of(f)->real->pMethods->xFileControl(file_of(f)->real, what, with);
+	return to_vfs_file(f)->system_file->pMethods->xFileControl(to_vfs_file(f)->system_file, operation, argument);
 }
 
 static int x_sector(sqlite3_file *f)
 {
-	return file_of(f)->real->pMethods->xSectorSize(file_of(f)->real);
+	return to_vfs_file(f)->system_file->pMethods->xSectorSize(to_vfs_file(f)->system_file);
 }
 
 static int x_characteristics(sqlite3_file *f)
 {
-	return file_of(f)->real->pMethods->xDeviceCharacteristics(file_of(f)->real);
+	return to_vfs_file(f)->system_file->pMethods->xDeviceCharacteristics(to_vfs_file(f)->system_file);
 }
 
 /* Version 1: no mapping of files, no shared memory. */
-static const sqlite3_io_methods methods = {
+static const sqlite3_io_methods io_methods = {
 	.iVersion = 1,
 	.xClose = x_close,
 	.xRead = x_read,
@@ -132,45 +134,47 @@ static const sqlite3_io_methods methods = {
 static int x_open(sqlite3_vfs *v, const char *name, sqlite3_file *f, int flags, int *out_flags)
 {
 	(void)v;
-	struct file *n = file_of(f);
-	*n = (struct file){.real = NULL};
-	int code = faulty_disk_enter(flags & SQLITE_OPEN_CREATE ? FAULTY_DISK_OPENS : FAULTY_DISK_READS);
-	bool there = name && faulty_disk_node_of(name, false);
+	struct vfs_file *opened = to_vfs_file(f);
+	*opened = (struct vfs_file){.system_file = NULL};
+	int code = faulty_disk_begin_call(flags & SQLITE_OPEN_CREATE ? FAULTY_DISK_OPEN : FAULTY_DISK_READ);
+	bool existed = name && faulty_disk_find_node(name, false);
 	if (code)
-		return leave_with(SQLITE_CANTOPEN);
-	n->real = calloc(1, (size_t)system_vfs->szOsFile);
-	int rc = n->real ? system_vfs->xOpen(system_vfs, name, n->real, flags, out_flags) : SQLITE_NOMEM;
+		return end_call_with(SQLITE_CANTOPEN);
+	opened->system_file = calloc(1, (size_t)system_vfs->szOsFile);
+	int rc = opened->system_file ? system_vfs->xOpen(system_vfs, name, opened->system_file, flags, out_flags)
+				     : SQLITE_NOMEM;
 	if (rc != SQLITE_OK) {
-		free(n->real);
-		return leave_with(rc);
+		free(opened->system_file);
+		return end_call_with(rc);
 	}
-	n->base.pMethods = &methods;
-	n->node = name ? faulty_disk_node_of(name, true) : NULL;
-	n->name = strdup(name ? name : "");
-	n->tell_folder = !there && (flags & (SQLITE_OPEN_WAL | SQLITE_OPEN_MAIN_JOURNAL | SQLITE_OPEN_SUPER_JOURNAL));
-	return leave_with(SQLITE_OK);
+	opened->base.pMethods = &io_methods;
+	opened->node = name ? faulty_disk_find_node(name, true) : NULL;
+	opened->name = strdup(name ? name : "");
+	opened->flushes_folder =
+		!existed && (flags & (SQLITE_OPEN_WAL | SQLITE_OPEN_MAIN_JOURNAL | SQLITE_OPEN_SUPER_JOURNAL));
+	return end_call_with(SQLITE_OK);
 }
 
-static int x_delete(sqlite3_vfs *v, const char *name, int and_folder)
+static int x_delete(sqlite3_vfs *v, const char *name, int sync_folder)
 {
 	(void)v;
-	if (faulty_disk_enter(FAULTY_DISK_REMOVES))
-		return leave_with(SQLITE_IOERR_DELETE);
+	if (faulty_disk_begin_call(FAULTY_DISK_REMOVE))
+		return end_call_with(SQLITE_IOERR_DELETE);
 	int rc = system_vfs->xDelete(system_vfs, name, 0);
 	if (rc == SQLITE_OK)
-		faulty_disk_removed(name);
-	if (rc == SQLITE_OK && and_folder)
-		faulty_disk_flushed_folder_of(name);
-	return leave_with(rc);
+		faulty_disk_record_removal(name);
+	if (rc == SQLITE_OK && sync_folder)
+		faulty_disk_record_folder_flush(name);
+	return end_call_with(rc);
 }
 
-void faulty_disk_vfs_begin(void)
+void faulty_disk_register_vfs(void)
 {
 	system_vfs = sqlite3_vfs_find(NULL);
-	vfs = *system_vfs; /* calls that do not concern files stay the system's */
-	vfs.zName = "faulty_disk";
-	vfs.szOsFile = sizeof(struct file);
-	vfs.xOpen = x_open;
-	vfs.xDelete = x_delete;
-	sqlite3_vfs_register(&vfs, 1);
+	faulty_vfs = *system_vfs; /* calls that do not concern files stay the system's */
+	faulty_vfs.zName = "faulty_disk";
+	faulty_vfs.szOsFile = sizeof(struct vfs_file);
+	faulty_vfs.xOpen = x_open;
+	faulty_vfs.xDelete = x_delete;
+	sqlite3_vfs_register(&faulty_vfs, 1);
 }

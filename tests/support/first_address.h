@@ -5,12 +5,12 @@
 
 #include "common/net/addr.h"
 
-static inline int first_address(struct net_addr *a, const char *host_port, struct error *e)
+static inline int first_address_resolve(struct net_addr *a, const char *host_port, struct error *e)
 {
 	struct net_addrs l;
 	int rc = net_addrs_resolve(&l, host_port, e);
 	if (!rc)
-		*a = l.all[0];
+		*a = l.addrs[0];
 	return rc;
 }
 

@@ -21,7 +21,7 @@
 #include <meshoptimizer.h>
 
 /* BUFFER stands for the reference to the buffer's bytes. One entry per line, because messages state lines. */
-static const char template[] =
+static const char json_template[] =
 	"{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"extensionsUsed\": [\"KHR_lights_punctual\"],\n"
 	"\"extensions\": {\"KHR_lights_punctual\": {\"lights\": [\n"
 	"{\"type\": \"point\", \"color\": [1, 0.5, 0.25], \"intensity\": 4}]}},\n"
@@ -85,7 +85,7 @@ static const char template[] =
 	"\"buffers\": [\n"
 	"{BUFFER \"byteLength\": 601}]}\n";
 
-static void append(struct gltf_files *f, const void *bytes, size_t size)
+static void append_bytes(struct gltf_files *f, const void *bytes, size_t size)
 {
 	assert(f->buffer_size + size <= sizeof f->buffer);
 	memcpy(f->buffer + f->buffer_size, bytes, size);
@@ -93,19 +93,19 @@ static void append(struct gltf_files *f, const void *bytes, size_t size)
 }
 
 /* Little endian. */
-static void put_bits(struct gltf_files *f, uint32_t bits, int size)
+static void append_bits(struct gltf_files *f, uint32_t bits, int size)
 {
 	for (int i = 0; i < size; i++)
-		append(f, (const unsigned char[]){(unsigned char)(bits >> 8 * i)}, 1);
+		append_bytes(f, (const unsigned char[]){(unsigned char)(bits >> 8 * i)}, 1);
 }
 
-static void put_floats(struct gltf_files *f, const double *x, int count)
+static void append_floats(struct gltf_files *f, const double *x, int count)
 {
 	for (int i = 0; i < count; i++) {
 		float one = (float)x[i];
 		uint32_t bits;
 		memcpy(&bits, &one, sizeof bits);
-		put_bits(f, bits, 4);
+		append_bits(f, bits, 4);
 	}
 }
 
@@ -116,29 +116,29 @@ void gltf_files_make(struct gltf_files *f)
 	static const int strip_uv[4][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 1}},
 			 fan_uv[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
 	memset(f, 0, sizeof *f);
-	memcpy(f->json, template, sizeof template);
-	put_bits(f, 0x55, 1); /* so that nothing begins at a multiple of anything */
-	put_floats(f, solid_position[0], 3 * SOLID_VERTICES);
-	put_floats(f, solid_uv[0], 2 * SOLID_VERTICES);
+	memcpy(f->json, json_template, sizeof json_template);
+	append_bits(f, 0x55, 1); /* so that nothing begins at a multiple of anything */
+	append_floats(f, solid_position[0], 3 * SOLID_VERTICES);
+	append_floats(f, solid_uv[0], 2 * SOLID_VERTICES);
 	for (int size = 2; size > 0; size = size == 2 ? 4 : size == 4 ? 1 : 0)
 		for (int i = 0; i < 3 * SOLID_TRIANGLES; i++)
-			put_bits(f, solid_index[i / 3][i % 3], size);
+			append_bits(f, solid_index[i / 3][i % 3], size);
 	for (int i = 0; i < SOLID_VERTICES; i++) {
-		put_floats(f, solid_position[i], 3);
-		put_floats(f, solid_position[i], 3);
-		put_floats(f, solid_uv[i], 2);
+		append_floats(f, solid_position[i], 3);
+		append_floats(f, solid_position[i], 3);
+		append_floats(f, solid_uv[i], 2);
 	}
-	put_floats(f, strip[0], 12);
-	put_floats(f, fan[0], 12);
+	append_floats(f, strip[0], 12);
+	append_floats(f, fan[0], 12);
 	for (int i = 0; i < 8; i++)
-		put_bits(f, strip_uv[i / 2][i % 2] ? 65535 : 0, 2);
+		append_bits(f, strip_uv[i / 2][i % 2] ? 65535 : 0, 2);
 	for (int i = 0; i < 8; i++)
-		put_bits(f, fan_uv[i / 2][i % 2] ? 255 : 0, 1);
+		append_bits(f, fan_uv[i / 2][i % 2] ? 255 : 0, 1);
 }
 
 /* Compresses into `out` and returns the size. Two-byte indices are coded as a sequence, four-byte ones as triangles. */
-static size_t compress(unsigned char *out, size_t room, const unsigned char *from, size_t count, size_t stride,
-		       char mode)
+static size_t compress_view(unsigned char *out, size_t capacity, const unsigned char *from, size_t count, size_t stride,
+			    char mode)
 {
 	unsigned index[32] = {0};
 	float vertices[64]; /* aligned */
@@ -147,9 +147,9 @@ static size_t compress(unsigned char *out, size_t room, const unsigned char *fro
 	for (size_t i = 0; mode != 'A' && i < count; i++)
 		memcpy(&index[i], from + i * stride, stride);
 	meshopt_encodeVertexVersion(0);
-	return mode == 'A'   ? meshopt_encodeVertexBuffer(out, room, vertices, count, stride)
-	       : mode == 'T' ? meshopt_encodeIndexBuffer(out, room, index, count)
-			     : meshopt_encodeIndexSequence(out, room, index, count);
+	return mode == 'A'   ? meshopt_encodeVertexBuffer(out, capacity, vertices, count, stride)
+	       : mode == 'T' ? meshopt_encodeIndexBuffer(out, capacity, index, count)
+			     : meshopt_encodeIndexSequence(out, capacity, index, count);
 }
 
 void gltf_files_compress(struct gltf_files *f, const char *extension)
@@ -161,11 +161,12 @@ void gltf_files_compress(struct gltf_files *f, const char *extension)
 		     {169, 4, 24, "TRIANGLES"},	 {289, 32, 6, "ATTRIBUTES"}, {481, 12, 4, "ATTRIBUTES"},
 		     {529, 12, 4, "ATTRIBUTES"}, {577, 4, 4, "ATTRIBUTES"}};
 	char from[256], to[512];
-	assert(f->buffer_size == GLTF_FILES_PLAIN);
+	assert(f->buffer_size == GLTF_FILES_PLAIN_BYTES);
 	for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
 		unsigned char packed[512], *bytes = f->buffer + views[i].first;
 		unsigned length = views[i].count * views[i].stride;
-		size_t size = compress(packed, sizeof packed, bytes, views[i].count, views[i].stride, *views[i].mode);
+		size_t size =
+			compress_view(packed, sizeof packed, bytes, views[i].count, views[i].stride, *views[i].mode);
 		assert(size > 0);
 		memset(bytes, 0xff, length);
 		snprintf(from, sizeof from, "{\"buffer\": 0, \"byteOffset\": %u, \"byteLength\": %u", views[i].first,
@@ -176,12 +177,12 @@ void gltf_files_compress(struct gltf_files *f, const char *extension)
 			"\"byteOffset\": %zu, \"byteLength\": %zu, \"byteStride\": %u, \"mode\": \"%s\", \"count\": %u}}",
 			length, extension, f->buffer_size, size, views[i].stride, views[i].mode, views[i].count);
 		gltf_files_replace(f, from, to);
-		append(f, packed, size);
+		append_bytes(f, packed, size);
 	}
-	snprintf(from, sizeof from, "\"byteLength\": %d}]}", GLTF_FILES_PLAIN);
+	snprintf(from, sizeof from, "\"byteLength\": %d}]}", GLTF_FILES_PLAIN_BYTES);
 	snprintf(to, sizeof to,
 		 "\"byteLength\": %zu},\n{\"byteLength\": %d, \"extensions\": {\"%s\": {\"fallback\": true}}}]}",
-		 f->buffer_size, GLTF_FILES_PLAIN, extension);
+		 f->buffer_size, GLTF_FILES_PLAIN_BYTES, extension);
 	gltf_files_replace(f, from, to);
 	snprintf(to, sizeof to, "\"extensionsRequired\": [\"%s\"], \"extensionsUsed\"", extension);
 	gltf_files_replace(f, "\"extensionsUsed\"", to);
@@ -190,23 +191,23 @@ void gltf_files_compress(struct gltf_files *f, const char *extension)
 void gltf_files_replace(struct gltf_files *f, const char *from, const char *to)
 {
 	static char out[sizeof f->json];
-	size_t used = 0, n = strlen(from), found = 0;
+	size_t used = 0, n = strlen(from), match_count = 0;
 	for (const char *p = f->json; *p;) {
-		bool here = strncmp(p, from, n) == 0;
-		size_t size = here ? strlen(to) : 1;
+		bool is_match = strncmp(p, from, n) == 0;
+		size_t size = is_match ? strlen(to) : 1;
 		assert_true(used + size < sizeof out);
-		memcpy(out + used, here ? to : p, size);
+		memcpy(out + used, is_match ? to : p, size);
 		used += size;
-		p += here ? n : 1;
-		found += here;
+		p += is_match ? n : 1;
+		match_count += is_match;
 	}
-	if (!found)
+	if (!match_count)
 		fail_msg("there is no %s", from);
 	out[used] = 0;
 	memcpy(f->json, out, used + 1);
 }
 
-static void base64(const unsigned char *bytes, size_t n, char *out)
+static void encode_base64(const unsigned char *bytes, size_t n, char *out)
 {
 	static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 	for (size_t i = 0; i < n; i += 3) {
@@ -218,7 +219,7 @@ static void base64(const unsigned char *bytes, size_t n, char *out)
 	*out = 0;
 }
 
-static void put_word(unsigned char *to, size_t x)
+static void store_word(unsigned char *to, size_t x)
 {
 	for (int i = 0; i < 4; i++)
 		to[i] = (unsigned char)(x >> 8 * i);
@@ -233,13 +234,13 @@ static void pack_binary(struct gltf_files *f)
 	memset(p, 0, 28 + json + binary);
 	f->file_size = 28 + json + binary;
 	memcpy(p, "glTF", 4);
-	put_word(p + 4, 2);
-	put_word(p + 8, f->file_size);
-	put_word(p + 12, json);
+	store_word(p + 4, 2);
+	store_word(p + 8, f->file_size);
+	store_word(p + 12, json);
 	memcpy(p + 16, "JSON", 4);
 	memset(p + 20, ' ', json);
 	memcpy(p + 20, f->json, strlen(f->json));
-	put_word(p + 20 + json, binary);
+	store_word(p + 20 + json, binary);
 	memcpy(p + 24 + json, "BIN", 3);
 	memcpy(p + 28 + json, f->buffer, f->buffer_size);
 }
@@ -250,7 +251,7 @@ void gltf_files_pack(struct gltf_files *f, enum gltf_form form)
 	int n = snprintf(uri, sizeof uri, "%s", form == GLTF_EXTERNAL ? "\"uri\": \"the%20mesh.bin\"," : "");
 	if (form == GLTF_EMBEDDED) {
 		n = snprintf(uri, sizeof uri, "\"uri\": \"data:application/octet-stream;base64,");
-		base64(f->buffer, f->buffer_size, uri + n);
+		encode_base64(f->buffer, f->buffer_size, uri + n);
 		n = (int)strlen(uri);
 		snprintf(uri + n, sizeof uri - (size_t)n, "\",");
 	}
@@ -263,17 +264,17 @@ void gltf_files_pack(struct gltf_files *f, enum gltf_form form)
 		memcpy(f->file, f->json, f->file_size);
 	}
 	memcpy(f->json, json, sizeof json);
-	f->list[0] = (struct memory_file){form == GLTF_BINARY ? "s.glb" : "s.gltf", f->file, f->file_size};
-	f->list[1] = (struct memory_file){"the mesh.bin", f->buffer, f->buffer_size};
+	f->files[0] = (struct memory_file){form == GLTF_BINARY ? "s.glb" : "s.gltf", f->file, f->file_size};
+	f->files[1] = (struct memory_file){"the mesh.bin", f->buffer, f->buffer_size};
 }
 
-const struct memory_file *gltf_files_change(struct gltf_files *f, const char *from, const char *to)
+const struct memory_file *gltf_files_make_changed(struct gltf_files *f, const char *from, const char *to)
 {
 	gltf_files_make(f);
 	if (from)
 		gltf_files_replace(f, from, to);
 	gltf_files_pack(f, GLTF_EXTERNAL);
-	return f->list;
+	return f->files;
 }
 
 int gltf_files_read(const struct memory_file *files, bool lenient, struct scene *s, struct error *e)
@@ -282,7 +283,7 @@ int gltf_files_read(const struct memory_file *files, bool lenient, struct scene 
 	return (lenient ? scene_read_lenient : scene_read)(s, &assets, files[0].name, render_plugins(), NULL, 0, e);
 }
 
-static struct scene read_sound(const struct memory_file *files, bool lenient)
+static struct scene read_or_fail(const struct memory_file *files, bool lenient)
 {
 	struct scene s;
 	struct error e;
@@ -291,15 +292,15 @@ static struct scene read_sound(const struct memory_file *files, bool lenient)
 	return s;
 }
 
-struct scene gltf_files_scene(const char *from, const char *to, bool lenient)
+struct scene gltf_files_read_changed(const char *from, const char *to, bool lenient)
 {
 	static struct gltf_files f;
-	gltf_files_change(&f, from, to);
-	return read_sound(f.list, lenient);
+	gltf_files_make_changed(&f, from, to);
+	return read_or_fail(f.files, lenient);
 }
 
-struct scene gltf_files_packed(struct gltf_files *f, enum gltf_form form)
+struct scene gltf_files_read_packed(struct gltf_files *f, enum gltf_form form)
 {
 	gltf_files_pack(f, form);
-	return read_sound(f->list, false);
+	return read_or_fail(f->files, false);
 }

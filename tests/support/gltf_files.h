@@ -15,7 +15,7 @@ struct gltf_files {
 	char json[1 << 15];
 	unsigned char buffer[1 << 11], file[1 << 16];
 	size_t buffer_size, file_size;
-	struct memory_file list[8]; /* the scene comes first */
+	struct memory_file files[8]; /* the scene comes first */
 };
 
 /* gltf_files_make() makes the JSON and the buffer, and gltf_files_pack() turns them into files; it must be called
@@ -26,16 +26,16 @@ void gltf_files_pack(struct gltf_files *f, enum gltf_form form);
  * library's encoder. The buffer then no longer contains the uncompressed numbers. */
 void gltf_files_compress(struct gltf_files *f, const char *extension);
 /* Offset of the compressed bytes in the buffer. */
-enum { GLTF_FILES_PLAIN = 601 };
+enum { GLTF_FILES_PLAIN_BYTES = 601 };
 /* Replaces every `from` in the JSON by `to`; fails the test if there is none. */
 void gltf_files_replace(struct gltf_files *f, const char *from, const char *to);
 
 /* Returns "s.gltf" with `from` replaced (NULL: unchanged), and its buffer in a separate file. */
-const struct memory_file *gltf_files_change(struct gltf_files *f, const char *from, const char *to);
+const struct memory_file *gltf_files_make_changed(struct gltf_files *f, const char *from, const char *to);
 int gltf_files_read(const struct memory_file *files, bool lenient, struct scene *s, struct error *e);
 /* Reads the scene of a changed file; fails the test if it is refused. */
-struct scene gltf_files_scene(const char *from, const char *to, bool lenient);
+struct scene gltf_files_read_changed(const char *from, const char *to, bool lenient);
 /* Packs the files, which may have been changed, and reads the scene; fails the test if it is refused. */
-struct scene gltf_files_packed(struct gltf_files *f, enum gltf_form form);
+struct scene gltf_files_read_packed(struct gltf_files *f, enum gltf_form form);
 
 #endif

@@ -10,21 +10,21 @@
 #include <stdio.h>
 #include <string.h>
 
-void golden_fill(const struct golden *runs, size_t count, unsigned char *bytes, size_t size)
+void golden_fill(const struct golden_run *runs, size_t count, unsigned char *bytes, size_t size)
 {
 	memset(bytes, 0, size);
 	for (size_t i = 0; i < count; i++) {
 		size_t n = strlen(runs[i].hex) / 2;
-		assert_true(runs[i].at <= size && n <= size - runs[i].at);
+		assert_true(runs[i].offset <= size && n <= size - runs[i].offset);
 		for (size_t k = 0; k < n; k++) {
 			unsigned byte;
 			assert_int_equal(sscanf(runs[i].hex + 2 * k, "%2x", &byte), 1);
-			bytes[runs[i].at + k] = (unsigned char)byte;
+			bytes[runs[i].offset + k] = (unsigned char)byte;
 		}
 	}
 }
 
-void golden_compare(const char *path, const unsigned char *bytes, size_t size)
+void golden_compare_file(const char *path, const unsigned char *bytes, size_t size)
 {
 	FILE *f = fopen(path, "rb");
 	assert_non_null(f);
@@ -37,7 +37,7 @@ void golden_compare(const char *path, const unsigned char *bytes, size_t size)
 	fclose(f);
 }
 
-void golden_open(struct checked_file *f, const char *path, const unsigned char *bytes, size_t size)
+void golden_write_and_open(struct checked_file *f, const char *path, const unsigned char *bytes, size_t size)
 {
 	struct error e;
 	assert_int_equal(checked_file_create(f, path, &e), 0);

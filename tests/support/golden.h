@@ -7,17 +7,17 @@
 
 #include <stddef.h>
 
-struct golden {
-	size_t at;
+struct golden_run {
+	size_t offset;
 	const char *hex;
 };
 
 /* Fills `size` bytes with these runs, and with zeros between them. */
-void golden_fill(const struct golden *runs, size_t count, unsigned char *bytes, size_t size);
+void golden_fill(const struct golden_run *runs, size_t count, unsigned char *bytes, size_t size);
 /* Fails at the first byte of the file that differs from these bytes. */
-void golden_compare(const char *path, const unsigned char *bytes, size_t size);
+void golden_compare_file(const char *path, const unsigned char *bytes, size_t size);
 
 /* Writes a file with a valid checksum, whatever its contents, and opens it. */
-void golden_open(struct checked_file *f, const char *path, const unsigned char *bytes, size_t size);
+void golden_write_and_open(struct checked_file *f, const char *path, const unsigned char *bytes, size_t size);
 
 #endif

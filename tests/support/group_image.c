@@ -32,8 +32,8 @@ struct plan group_image_plan(enum plan_kind kind, uint32_t width, uint32_t heigh
 	return p;
 }
 
-void group_image_with_blue(const struct plan *p, group_image_value *of, group_image_value *blue, void *user,
-			   struct canvas_image *img)
+void group_image_make_with_blue(const struct plan *p, group_image_value *value, group_image_value *blue, void *user,
+				struct canvas_image *img)
 {
 	struct canvas *c;
 	assert_int_equal(canvas_new(&c, p, -30, NULL, NULL), 0);
@@ -43,10 +43,10 @@ void group_image_with_blue(const struct plan *p, group_image_value *of, group_im
 		b.tiles[0] = (struct tile){0, 0, p->width, p->height,
 					   mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
 		for (uint32_t i = 0; i < p->width * p->height; i++) {
-			double v = of(user, g, i), more = blue ? blue(user, g, i) : 0;
+			double v = value(user, g, i), blue_value = blue ? blue(user, g, i) : 0;
 			for (int k = 0; k < 3; k++)
 				b.tiles[0].xyz[i * 3 + (uint32_t)k] =
-					(float)v * white[k] + (float)more * blue_primary[k];
+					(float)v * white[k] + (float)blue_value * blue_primary[k];
 		}
 		b.counters[COUNT_SAMPLES] = p->kind == PLAN_CHAINS ? 1 : p->width * p->height;
 		b.counters[COUNT_INDEPENDENT] = 1;
@@ -61,11 +61,11 @@ void group_image_with_blue(const struct plan *p, group_image_value *of, group_im
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 	}
-	assert_int_equal(canvas_image(c, false, img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, img, NULL), 0);
 	canvas_free(c);
 }
 
-void group_image(const struct plan *p, group_image_value *of, void *user, struct canvas_image *img)
+void group_image_make(const struct plan *p, group_image_value *value, void *user, struct canvas_image *img)
 {
-	group_image_with_blue(p, of, NULL, user, img);
+	group_image_make_with_blue(p, value, NULL, user, img);
 }

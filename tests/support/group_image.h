@@ -19,9 +19,9 @@ typedef double group_image_value(void *user, uint32_t group, uint32_t pixel);
 
 /* Makes an image of one round in which pixel i of group g has the value of(user, g, i) in all channels.
  * canvas_image_fini frees it. */
-void group_image(const struct plan *p, group_image_value *of, void *user, struct canvas_image *img);
+void group_image_make(const struct plan *p, group_image_value *value, void *user, struct canvas_image *img);
 /* blue: an additional value for the blue channel, or NULL. */
-void group_image_with_blue(const struct plan *p, group_image_value *of, group_image_value *blue, void *user,
-			   struct canvas_image *img);
+void group_image_make_with_blue(const struct plan *p, group_image_value *value, group_image_value *blue, void *user,
+				struct canvas_image *img);
 
 #endif

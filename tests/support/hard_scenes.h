@@ -10,7 +10,7 @@
 
 struct hard_case {
 	const char *topic, *name;
-	struct world *(*make)(double parameter);
+	struct world *(*build)(double parameter);
 	double parameter;
 	unsigned min_edges, max_edges;
 	const char *mutation; /* the mutation to test alone */

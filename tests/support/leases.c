@@ -10,18 +10,18 @@
 
 #include <cmocka.h>
 
-struct batch lease_done(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+struct batch leases_run(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
 {
 	struct batch b;
 	struct error e = {""};
-	enum lease_end end;
+	enum lease_outcome end;
 	if (render_lease(w, p, &k, in, NULL, &end, &b, &e) || batch_check(&b, p, &e))
 		fail_msg("%s: %s", p->integrator, e.text);
 	assert_int_equal(end, LEASE_DONE);
 	return b;
 }
 
-float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth)
+float *leases_render_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth)
 {
 	struct plan p = {.kind = PLAN_SAMPLES,
 			 .integrator = "path",
@@ -38,7 +38,7 @@ float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_de
 			 .max_depth = max_depth};
 	size_t bytes = (size_t)side * side * 3 * sizeof(float);
 	accuracy_settings_print(&w->accuracy, p.accuracy);
-	struct batch b = lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 0, 0, 0}, NULL);
+	struct batch b = leases_run(w, &p, (struct lease_key){1, LEASE_RENDER, 0, 0, 0}, NULL);
 	float *image = calloc(1, bytes);
 	assert_non_null(image);
 	assert_true(b.tile_count <= 1); /* a black image has no tile */
@@ -51,9 +51,9 @@ float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_de
 	return image;
 }
 
-double lease_brightness(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth)
+double leases_mean_luminance(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth)
 {
-	float *xyz = lease_image(w, side, spp, max_depth);
+	float *xyz = leases_render_image(w, side, spp, max_depth);
 	double sum = 0, count = (double)(side * side * spp);
 	for (uint32_t i = 0; i < side * side; i++)
 		sum += (double)xyz[3 * i + 1] / count;

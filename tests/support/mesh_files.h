@@ -23,13 +23,13 @@ enum ply_kind { PLY_ASCII, PLY_LITTLE, PLY_BIG, PLY_KINDS };
 
 /* Makes a PLY file with float positions and double normals, and with colours and an element `edge` in between that
  * have no meaning. */
-void mesh_file_ply(struct mesh_file *f, enum ply_kind kind);
+void mesh_file_make_ply(struct mesh_file *f, enum ply_kind kind);
 /* Makes a file of `meshes` octahedra, the k-th scaled by k + 1. */
-void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_t flags, int meshes);
-/* mesh_stream_5() makes the contents of a mesh of version 5, mesh_file_of_stream_5() a file with it. Flags are those
- * of version 4. Both maps exist, and after the colours there are an attribute of the triangles and one that a spectral
- * variant writes. */
-void mesh_stream_5(struct mesh_file *f, uint32_t flags, int scale);
-void mesh_file_of_stream_5(struct mesh_file *f, const struct mesh_file *stream);
+void mesh_file_make_serialized(struct mesh_file *f, int version, int doubles, uint32_t flags, int meshes);
+/* mesh_file_make_stream_5() makes the contents of a mesh of version 5, mesh_file_from_stream_5() a file with it. Flags
+ * are those of version 4. Both maps exist, and after the colours there are an attribute of the triangles and one that a
+ * spectral variant writes. */
+void mesh_file_make_stream_5(struct mesh_file *f, uint32_t flags, int scale);
+void mesh_file_from_stream_5(struct mesh_file *f, const struct mesh_file *stream);
 
 #endif

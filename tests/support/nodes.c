@@ -13,13 +13,13 @@ static void *alloc_or_abort(struct arena *a, size_t count, size_t size)
 	return p;
 }
 
-static void add(struct arena *a, struct scene_node *n, const char *name, struct value v)
+static void add_property(struct arena *a, struct scene_node *n, const char *name, struct value v)
 {
-	struct property *all = alloc_or_abort(a, n->property_count + 1, sizeof *all);
+	struct property *grown = alloc_or_abort(a, n->property_count + 1, sizeof *grown);
 	if (n->property_count)
-		memcpy(all, n->properties, n->property_count * sizeof *all);
-	all[n->property_count] = (struct property){.name = arena_strdup(a, name), .line = 1, .value = v};
-	n->properties = all;
+		memcpy(grown, n->properties, n->property_count * sizeof *grown);
+	grown[n->property_count] = (struct property){.name = arena_strdup(a, name), .line = 1, .value = v};
+	n->properties = grown;
 	n->property_count++;
 }
 
@@ -51,40 +51,40 @@ struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char 
 		if (!equals)
 			abort();
 		*equals = 0;
-		add(a, n, word, parse_value(a, equals + 1));
+		add_property(a, n, word, parse_value(a, equals + 1));
 	}
 	return n;
 }
 
 void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child)
 {
-	const struct scene_node **all = alloc_or_abort(a, n->child_count + 1, sizeof *all);
+	const struct scene_node **grown = alloc_or_abort(a, n->child_count + 1, sizeof *grown);
 	for (uint32_t i = 0; i < n->child_count; i++)
-		all[i] = n->children[i];
-	all[n->child_count++] = child;
-	n->children = all;
+		grown[i] = n->children[i];
+	grown[n->child_count++] = child;
+	n->children = grown;
 }
 
 void node_add_ref(struct arena *a, struct scene_node *n, const char *name, const struct scene_node *child)
 {
-	add(a, n, name, (struct value){.type = VALUE_NODE, .as.node = child});
+	add_property(a, n, name, (struct value){.type = VALUE_NODE, .as.node = child});
 }
 
 void node_add_transform(struct arena *a, struct scene_node *n, const char *name, mat4 transform)
 {
-	add(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
+	add_property(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
 }
 
 /* Makes a BSDF and its parts, which are separated by the first of these characters; their parts are separated by the
  * next. */
-static struct scene_node *nested_node(struct arena *a, char *text, const char *separators);
+static struct scene_node *make_nested_node(struct arena *a, char *text, const char *separators);
 
 /* Parses " diffuse", " texture checkerboard", " texture scale texture checkerboard", " phase hg", or a BSDF with
  * parts. */
-static struct scene_node *node_of_part(struct arena *a, char *text, const char *separators)
+static struct scene_node *make_part_node(struct arena *a, char *text, const char *separators)
 {
 	if (*separators && strchr(text, *separators))
-		return nested_node(a, text, separators);
+		return make_nested_node(a, text, separators);
 	char *phase = strstr(text, "phase ");
 	if (phase)
 		return node_make(a, PLUGIN_PHASE, phase + strlen("phase "));
@@ -104,26 +104,26 @@ static void add_part(struct arena *a, struct scene_node *n, char *text, const ch
 {
 	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
 	if (!space || (*separators && strchr(text, *separators))) {
-		node_add_child(a, n, node_of_part(a, text, separators));
+		node_add_child(a, n, make_part_node(a, text, separators));
 		return;
 	}
 	*space = 0;
 	node_add_ref(a, n, at + 1, node_make(a, PLUGIN_TEXTURE, space + 1));
 }
 
-static struct scene_node *nested_node(struct arena *a, char *text, const char *separators)
+static struct scene_node *make_nested_node(struct arena *a, char *text, const char *separators)
 {
-	const char here[] = {*separators, 0};
+	const char separator[] = {*separators, 0};
 	char *rest = text;
-	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(text, here, &rest));
-	for (char *child; (child = strtok_r(NULL, here, &rest));)
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(text, separator, &rest));
+	for (char *child; (child = strtok_r(NULL, separator, &rest));)
 		add_part(a, n, child, separators + 1);
 	return n;
 }
 
-struct scene_node *node_bsdf(struct arena *a, const char *text)
+struct scene_node *node_make_bsdf(struct arena *a, const char *text)
 {
 	char copy[512];
 	snprintf(copy, sizeof copy, "%s", text);
-	return nested_node(a, copy, "|/;");
+	return make_nested_node(a, copy, "|/;");
 }

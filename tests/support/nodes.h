@@ -13,7 +13,7 @@ struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char 
 /* Makes a BSDF and what it holds, each after '|': "mask opacity=0.3 | plastic", a phase function after the word
  * "phase", a texture after the word "texture" or, if it has a name, after "@NAME". Contents of these follow after '/',
  * and contents of the latter after ';'. */
-struct scene_node *node_bsdf(struct arena *a, const char *text);
+struct scene_node *node_make_bsdf(struct arena *a, const char *text);
 void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child); /* without a name */
 void node_add_ref(struct arena *a, struct scene_node *n, const char *name, const struct scene_node *child);
 void node_add_transform(struct arena *a, struct scene_node *n, const char *name, mat4 transform);

@@ -6,20 +6,20 @@
 /* Cached and fresh values may differ by rounding, which narrow lobes amplify. */
 #define CHECK_TOLERANCE 1e-6
 
-static bool close_to(double a, double b)
+static bool is_close(double a, double b)
 {
 	return fabs(a - b) <= CHECK_TOLERANCE * fmax(fabs(a), fabs(b));
 }
 
-static bool same_spectrum(spectrum a, spectrum b)
+static bool is_same_spectrum(spectrum a, spectrum b)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		if (!close_to(a.v[i], b.v[i]))
+		if (!is_close(a.v[i], b.v[i]))
 			return false;
 	return true;
 }
 
-static bool same_vector(vec3 a, vec3 b)
+static bool is_same_vector(vec3 a, vec3 b)
 {
 	vec3 d = vec3_sub(a, b);
 	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
@@ -27,36 +27,37 @@ static bool same_vector(vec3 a, vec3 b)
 
 /* The checks change the path that they examine, so they work on a copy. A path is 64 kB, most of it unused: copying
  * all of it took 6 of 25 s in a test of detailed balance. */
-static struct full_path *copy_of(const struct full_path *x)
+static struct full_path *copy_path(const struct full_path *x)
 {
 	static _Thread_local struct full_path copy;
 	full_path_copy(&copy, x, 0, x->edges);
 	return &copy;
 }
 
-static bool check_media(const struct path_edge *a, const struct path_edge *b, spectrum left, spectrum fresh)
+static bool check_media(const struct path_edge *a, const struct path_edge *b, spectrum cached, spectrum fresh)
 {
-	return a->medium == b->medium && a->before == b->before && a->fits == b->fits &&
-	       same_spectrum(a->free, b->free) && same_spectrum(left, fresh);
+	return a->medium == b->medium && a->previous_medium == b->previous_medium && a->media_match == b->media_match &&
+	       is_same_spectrum(a->free_flight, b->free_flight) && is_same_spectrum(cached, fresh);
 }
 
 static bool check_edges(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
-	struct full_path *seen = copy_of(x);
+	struct full_path *copy = copy_path(x);
 	for (unsigned e = 0; e < x->edges; e++) {
 		double distance2;
 		vec3 w = path_direction(&x->v[e], &x->v[e + 1], &distance2);
-		if (!(distance2 > 0) || !same_vector(w, x->edge[e].w) || !close_to(distance2, x->edge[e].distance2) ||
-		    !same_vector(w, x->v[e].to_prev)) {
+		if (!(distance2 > 0) || !is_same_vector(w, x->edge[e].w) ||
+		    !is_close(distance2, x->edge[e].distance2) || !is_same_vector(w, x->v[e].to_prev)) {
 			snprintf(text, size, "edge %u of %u is not the one between its ends", e, x->edges);
 			return false;
 		}
-		if (!full_path_visible(c, seen, e)) {
+		if (!full_path_edge_is_visible(c, copy, e)) {
 			snprintf(text, size, "edge %u of %u is occluded", e, x->edges);
 			return false;
 		}
 		if (EFFECT_IS_ON(c->w, scattering) &&
-		    !check_media(&x->v[e].edge, &seen->v[e].edge, x->edge[e].left, seen->edge[e].left)) {
+		    !check_media(&x->v[e].edge, &copy->v[e].edge, x->edge[e].transmittance,
+				 copy->edge[e].transmittance)) {
 			snprintf(text, size, "edge %u of %u does not know its media", e, x->edges);
 			return false;
 		}
@@ -69,7 +70,7 @@ static bool check_edges(struct path_context *c, const struct full_path *x, char 
 
 static bool check_specular(const struct full_path *x, unsigned j, char *text, size_t size)
 {
-	double miss = full_path_specular_miss(x, j);
+	double miss = full_path_specular_error(x, j);
 	if (miss > SPECULAR_TOLERANCE)
 		snprintf(text, size, "vertex %u of %u misses its specular direction by %g", j, x->edges, miss);
 	return miss <= SPECULAR_TOLERANCE;
@@ -77,8 +78,8 @@ static bool check_specular(const struct full_path *x, unsigned j, char *text, si
 
 static bool check_vertices(const struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
-	struct full_path *fresh = copy_of(x);
-	fresh->known_f = fresh->known_fh = (struct vertex_set){{0}};
+	struct full_path *fresh = copy_path(x);
+	fresh->cached_f = fresh->cached_fh = (struct vertex_set){{0}};
 	for (unsigned j = 0; j < x->edges; j++) {
 		const struct path_vertex *v = &x->v[j];
 		if (j > 0 && (v->mode & (BSDF_REFLECT | BSDF_TRANSMIT)) != full_path_mode(x, j)) {
@@ -89,12 +90,13 @@ static bool check_vertices(const struct path_context *c, const struct full_path 
 			return false;
 		spectrum f = full_path_f(c, fresh, j);
 		if (spectrum_is_zero(f) || !spectrum_is_valid(f) ||
-		    (vertex_set_has(&x->known_f, j) && !same_spectrum(f, x->f[j]))) {
+		    (vertex_set_has(&x->cached_f, j) && !is_same_spectrum(f, x->f[j]))) {
 			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0],
 				 x->f[j].v[0]);
 			return false;
 		}
-		if (j > 0 && vertex_set_has(&x->known_fh, j) && !same_spectrum(full_path_fh(c, fresh, j), x->fh[j])) {
+		if (j > 0 && vertex_set_has(&x->cached_fh, j) &&
+		    !is_same_spectrum(full_path_fh(c, fresh, j), x->fh[j])) {
 			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh->fh[j].v[0],
 				 x->fh[j].v[0]);
 			return false;
@@ -109,18 +111,19 @@ static bool check_vertices(const struct path_context *c, const struct full_path 
 
 bool path_check(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
-	if (x->edges < 1 || x->edges > FULL_PATH_MAX_EDGES) {
+	if (x->edges < 1 || x->edges > FULL_PATH_EDGES_MAX) {
 		snprintf(text, size, "%u edges", x->edges);
 		return false;
 	}
-	struct full_path *film = copy_of(x);
-	double off = fmax(1e-6, FILM_TOLERANCE * c->w->camera.scale);
-	if (!full_path_project(c, film) || hypot(film->film[0] - x->film[0], film->film[1] - x->film[1]) > off) {
-		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film->film[0],
-			 film->film[1]);
+	struct full_path *projected = copy_path(x);
+	double tolerance = fmax(1e-6, FILM_TOLERANCE * c->w->camera.pixels_per_slope);
+	if (!full_path_project(c, projected) ||
+	    hypot(projected->film[0] - x->film[0], projected->film[1] - x->film[1]) > tolerance) {
+		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], projected->film[0],
+			 projected->film[1]);
 		return false;
 	}
-	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, x)) {
+	if (EFFECT_IS_ON(c->w, scattering) && !full_path_can_be_made(c, x)) {
 		snprintf(text, size, "a path of %u edges that no technique makes", x->edges);
 		return false;
 	}

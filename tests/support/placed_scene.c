@@ -3,11 +3,11 @@
 
 #include "tests/support/worlds.h"
 
-struct world *placed_scene(double s, double m, const char *ball, const char *cube)
+struct world *placed_scene_make(double s, double m, const char *ball, const char *cube)
 {
 #define P(x) (s * (x) + m)
 	/* clang-format off */
-	return world_of_text(PLACED_SIDE, PLACED_SIDE,
+	return world_from_text(PLACED_SCENE_SIDE, PLACED_SCENE_SIDE,
 		"<sensor type='perspective'>"
 			"<float name='fov' value='45'/>"
 			"<float name='near_clip' value='%.17g'/>"

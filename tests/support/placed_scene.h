@@ -5,9 +5,9 @@
 
 #include "worker/render/world/world.h"
 
-enum { PLACED_SIDE = 32 }; /* pixels of a side of its film */
+enum { PLACED_SCENE_SIDE = 32 }; /* pixels of a side of its film */
 
 /* Returns the scene, scaled by s, then moved by m along all axes. ball, cube: their <bsdf>, or "". */
-struct world *placed_scene(double s, double m, const char *ball, const char *cube);
+struct world *placed_scene_make(double s, double m, const char *ball, const char *cube);
 
 #endif

@@ -6,12 +6,12 @@
 
 #include <math.h>
 
-static double angle_of_index(double least, double most, int i, int n)
+static double angle_of_index(double min, double max, int i, int n)
 {
-	return least + (most - least) * i / (n - 1);
+	return min + (max - min) * i / (n - 1);
 }
 
-unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t *size)
+unsigned char *polarized_file_make(polarized_function *f, int phis, int thetas, size_t *size)
 {
 	struct tensor_file file = {.count = 0};
 	const int rows[2] = {1, thetas}, phi_row[2] = {1, phis}, wavelengths[1] = {POLARIZED_WAVELENGTHS},
@@ -22,10 +22,10 @@ unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t 
 		      *nm = tensor_file_add(&file, "wvls", TENSOR_SHORTS, 1, wavelengths),
 		      *m = tensor_file_add(&file, "M", TENSOR_FLOATS, 6, sides);
 	for (int i = 0; i < phis; i++)
-		tensor_file_put(&phi, angle_of_index(-M_PI, M_PI, i, phis));
+		tensor_file_put_float(&phi, angle_of_index(-M_PI, M_PI, i, phis));
 	for (int i = 0; i < thetas; i++) {
-		tensor_file_put(&theta_d, angle_of_index(0, M_PI / 2, i, thetas));
-		tensor_file_put(&theta_h, angle_of_index(0, M_PI / 2, i, thetas));
+		tensor_file_put_float(&theta_d, angle_of_index(0, M_PI / 2, i, thetas));
+		tensor_file_put_float(&theta_h, angle_of_index(0, M_PI / 2, i, thetas));
 	}
 	for (int i = 0; i < POLARIZED_WAVELENGTHS; i++)
 		put_bytes(nm + 2 * i, (uint64_t)(450 + 50 * i), 2);
@@ -37,7 +37,7 @@ unsigned char *polarized_file_make(polarized_f *f, int phis, int thetas, size_t 
 						double first = f(angle_of_index(-M_PI, M_PI, i, phis),
 								 angle_of_index(0, M_PI / 2, d, thetas),
 								 angle_of_index(0, M_PI / 2, h, thetas), 450 + 50 * w);
-						tensor_file_put(&m, k ? 7 : first);
+						tensor_file_put_float(&m, k ? 7 : first);
 					}
 	return tensor_file_end(&file, size);
 }

@@ -5,7 +5,7 @@
  */
 #include "tests/support/random_scene.h"
 
-#include "tests/support/append.h"
+#include "tests/support/append_format.h"
 #include "tests/support/dice.h"
 #include "tests/support/measured_file.h"
 #include "tests/support/memory_assets.h"
@@ -19,35 +19,35 @@
 
 #include <cmocka.h>
 
-struct maker {
+struct scene_maker {
 	struct random_scene *s;
 	struct dice d;
 	const char *const *materials;
-	uint32_t count;
-	bool relief, fog;
+	uint32_t material_count;
+	bool has_relief, has_fog;
 };
 
 /* clang-format off */
-#define PUT(m, ...) append((m)->s->body, sizeof (m)->s->body, &(m)->s->used, __VA_ARGS__)
+#define PUT(m, ...) append_format((m)->s->body, sizeof (m)->s->body, &(m)->s->used, __VA_ARGS__)
 /* clang-format on */
 
-static bool is_drawn(struct maker *m, double p)
+static bool draw_bool(struct scene_maker *m, double p)
 {
-	return dice_throw(&m->d) < p;
+	return dice_uniform(&m->d) < p;
 }
 
-static double random_between(struct maker *m, double low, double high)
+static double draw_between(struct scene_maker *m, double low, double high)
 {
 	return dice_between(&m->d, low, high);
 }
 
 /* Draws one number per call, because the order in which arguments are evaluated is the compiler's choice. */
-static void put_between(struct maker *m, const char *before, double low, double high, const char *after)
+static void put_between(struct scene_maker *m, const char *before, double low, double high, const char *after)
 {
-	PUT(m, "%s%.3f%s", before, random_between(m, low, high), after);
+	PUT(m, "%s%.3f%s", before, draw_between(m, low, high), after);
 }
 
-static void put_rgb(struct maker *m, const char *name, double low, double high)
+static void put_rgb(struct scene_maker *m, const char *name, double low, double high)
 {
 	PUT(m, "<rgb name='%s' value='", name);
 	put_between(m, "", low, high, ",");
@@ -55,9 +55,9 @@ static void put_rgb(struct maker *m, const char *name, double low, double high)
 	put_between(m, "", low, high, "'/>");
 }
 
-static void put_node(struct maker *m, const struct scene_node *n, const char *name);
+static void put_node(struct scene_maker *m, const struct scene_node *n, const char *name);
 
-static void put_property(struct maker *m, const struct property *p)
+static void put_property(struct scene_maker *m, const struct property *p)
 {
 	const struct value *v = &p->value;
 	switch (v->type) {
@@ -82,7 +82,7 @@ static void put_property(struct maker *m, const struct property *p)
 }
 
 /* name: NULL if it has none. */
-static void put_node(struct maker *m, const struct scene_node *n, const char *name)
+static void put_node(struct scene_maker *m, const struct scene_node *n, const char *name)
 {
 	const char *element = n->cls == PLUGIN_BSDF ? "bsdf" : "texture";
 	PUT(m, "<%s type='%s'", element, n->type);
@@ -97,35 +97,36 @@ static void put_node(struct maker *m, const struct scene_node *n, const char *na
 }
 
 /* Begins a normal map of tiles with two normals, up to 60 degrees from the surface's. */
-static void begin_relief(struct maker *m)
+static void begin_relief(struct scene_maker *m)
 {
 	PUT(m, "<bsdf type='normalmap'><texture type='checkerboard'>");
 	for (int i = 0; i < 2; i++) {
-		double angle = random_between(m, 0, 60 * M_PI / 180), around = random_between(m, 0, 2 * M_PI);
+		double angle = draw_between(m, 0, 60 * M_PI / 180), around = draw_between(m, 0, 2 * M_PI);
 		PUT(m, "<rgb name='color%d' value='%.3f,%.3f,%.3f'/>", i, 0.5 + 0.5 * sin(angle) * cos(around),
 		    0.5 + 0.5 * sin(angle) * sin(around), 0.5 + 0.5 * cos(angle));
 	}
 	PUT(m, "<transform name='to_uv'><scale value='%u'/></transform></texture>", 1 + dice_below(&m->d, 6));
 }
 
-static void put_material(struct maker *m)
+static void put_material(struct scene_maker *m)
 {
-	const char *chosen = m->materials[dice_below(&m->d, m->count)];
-	bool bent = m->relief && is_drawn(m, 0.6) && !strstr(chosen, "bumpmap") && !strstr(chosen, "normalmap");
-	if (bent)
+	const char *chosen = m->materials[dice_below(&m->d, m->material_count)];
+	bool has_relief =
+		m->has_relief && draw_bool(m, 0.6) && !strstr(chosen, "bumpmap") && !strstr(chosen, "normalmap");
+	if (has_relief)
 		begin_relief(m);
 	size_t used = strlen(m->s->materials);
-	append(m->s->materials, sizeof m->s->materials, &used, "%s%s", used ? "; " : "", chosen);
+	append_format(m->s->materials, sizeof m->s->materials, &used, "%s%s", used ? "; " : "", chosen);
 	struct arena a = {0};
-	put_node(m, node_bsdf(&a, chosen), NULL);
+	put_node(m, node_make_bsdf(&a, chosen), NULL);
 	arena_fini(&a);
-	if (bent)
+	if (has_relief)
 		PUT(m, "</bsdf>");
 }
 
 /* Adds a transform for shapes of about the size of the unit ball: stretched, rotated, and moved into a box around
  * (0, y, 0). */
-static void put_place(struct maker *m, double size, double y, double reach)
+static void put_transform(struct scene_maker *m, double size, double y, double reach)
 {
 	vec3 axis = dice_direction(&m->d);
 	put_between(m, "<transform name='to_world'><scale x='", 0.5 * size, 1.3 * size, "'");
@@ -143,7 +144,7 @@ static const char wedge[] =
 	"f 1/1 2/2 3/3 4/4\nf 4/1 3/2 6/3 5/4\nf 2/1 1/2 5/3 6/4\nf 1/1 4/2 5/3\nf 3/1 2/2 6/3\n";
 static const char curve[] = "-1 -0.5 0 0.2\n-0.4 0.7 0.3 0.3\n0.3 -0.6 0.2 0.2\n1 0.4 -0.4 0.3\n";
 
-static void put_phase(struct maker *m)
+static void put_phase(struct scene_maker *m)
 {
 	unsigned k = dice_below(&m->d, 3);
 	PUT(m, "<phase type='%s'>", k == 0 ? "isotropic" : k == 1 ? "rayleigh" : "hg");
@@ -153,10 +154,10 @@ static void put_phase(struct maker *m)
 }
 
 /* Adds a medium that absorbs or, in fog, may scatter. */
-static void put_medium(struct maker *m, const char *name)
+static void put_medium(struct scene_maker *m, const char *name)
 {
 	PUT(m, "<medium type='homogeneous' name='%s'>", name);
-	if (m->fog && is_drawn(m, 0.8)) {
+	if (m->has_fog && draw_bool(m, 0.8)) {
 		put_rgb(m, "albedo", 0.3, 1);
 		put_phase(m);
 	} else
@@ -184,7 +185,7 @@ static const struct {
 };
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
-static void put_shape(struct maker *m)
+static void put_shape(struct scene_maker *m)
 {
 	unsigned k = dice_below(&m->d, SHAPES + 1);
 	if (k == SHAPES) { /* the same mesh at two places */
@@ -194,32 +195,32 @@ static void put_shape(struct maker *m)
 		PUT(m, "</shape></shape>");
 		for (int i = 0; i < 2; i++) {
 			PUT(m, "<shape type='instance'><ref id='g%zu'/>", id);
-			put_place(m, random_between(m, 0.3, 0.6), -0.2, 1);
+			put_transform(m, draw_between(m, 0.3, 0.6), -0.2, 1);
 			PUT(m, "</shape>");
 		}
 		return;
 	}
 	PUT(m, "<shape type='%s'>%s", shapes[k].type, shapes[k].inner);
-	if (is_drawn(m, 0.1))
+	if (draw_bool(m, 0.1))
 		PUT(m, "<boolean name='flip_normals' value='true'/>");
-	put_place(m, random_between(m, 0.3, 0.7), -0.2, 1);
-	if (m->fog && is_drawn(m, 0.4))
+	put_transform(m, draw_between(m, 0.3, 0.7), -0.2, 1);
+	if (m->has_fog && draw_bool(m, 0.4))
 		PUT(m, "<bsdf type='null'/>");
 	else
 		put_material(m);
 	/* on either side of any shape, closed or not: most of these media contradict each other */
-	if (is_drawn(m, m->fog ? 0.7 : 0.2))
-		put_medium(m, is_drawn(m, 0.7) ? "interior" : "exterior");
+	if (draw_bool(m, m->has_fog ? 0.7 : 0.2))
+		put_medium(m, draw_bool(m, 0.7) ? "interior" : "exterior");
 	PUT(m, "</shape>");
 }
 
-static void put_wall(struct maker *m, const char *turn, const char *move)
+static void put_wall(struct scene_maker *m, const char *turn, const char *move)
 {
 	PUT(m,
 	    "<shape type='rectangle'><transform name='to_world'><scale value='2'/>%s<translate %s/></transform>"
 	    "<bsdf type='twosided'><bsdf type='diffuse'>",
 	    turn, move);
-	if (is_drawn(m, 0.3)) {
+	if (draw_bool(m, 0.3)) {
 		PUT(m, "<texture name='reflectance' type='checkerboard'>");
 		put_rgb(m, "color0", 0.05, 0.8);
 		put_rgb(m, "color1", 0.05, 0.8);
@@ -229,7 +230,7 @@ static void put_wall(struct maker *m, const char *turn, const char *move)
 	PUT(m, "</bsdf></bsdf></shape>");
 }
 
-static void put_daylight(struct maker *m, const char *type)
+static void put_daylight(struct scene_maker *m, const char *type)
 {
 	PUT(m, "<emitter type='%s'><transform name='to_world'><rotate x='1' angle='-90'/></transform>", type);
 	put_between(m, "<vector name='sun_direction' y='1' x='", -1, 1, "'");
@@ -238,7 +239,7 @@ static void put_daylight(struct maker *m, const char *type)
 	       "<float name='sun_radius_scale' value='40'/></emitter>");
 }
 
-static void put_environment(struct maker *m)
+static void put_environment(struct scene_maker *m)
 {
 	switch (dice_below(&m->d, 5)) {
 	case 0:
@@ -261,31 +262,31 @@ static void put_environment(struct maker *m)
 }
 
 /* Adds an emitter that paths can hit. */
-static void put_lamp(struct maker *m)
+static void put_lamp(struct scene_maker *m)
 {
 	unsigned k = dice_below(&m->d, SHAPES - 1); /* any shape except the displaced ball */
 	PUT(m, "<shape type='%s'>%s<emitter type='area'>", shapes[k].type, shapes[k].inner);
-	if (is_drawn(m, 0.2))
+	if (draw_bool(m, 0.2))
 		PUT(m,
 		    "<texture name='radiance' type='bitmap'><string name='filename' value='picture.ppm'/></texture>");
 	else
 		put_rgb(m, "radiance", 2, 9);
-	PUT(m, "%s</emitter>", is_drawn(m, 0.3) ? "<boolean name='two_sided' value='true'/>" : "");
-	put_place(m, random_between(m, 0.25, 0.5), 1.2, 0.5);
-	if (is_drawn(m, 0.2))
+	PUT(m, "%s</emitter>", draw_bool(m, 0.3) ? "<boolean name='two_sided' value='true'/>" : "");
+	put_transform(m, draw_between(m, 0.25, 0.5), 1.2, 0.5);
+	if (draw_bool(m, 0.2))
 		put_material(m);
 	PUT(m, "</shape>");
 }
 
 /* Adds an emitter under the ceiling, aimed at the floor. */
-static void put_aimed(struct maker *m, const char *type)
+static void begin_aimed_emitter(struct scene_maker *m, const char *type)
 {
 	PUT(m, "<emitter type='%s'><transform name='to_world'><lookat target='0,-1,0' up='0,0,1' origin='", type);
 	put_between(m, "", -1, 1, ",1.8,");
 	put_between(m, "", -1, 1, "'/></transform>");
 }
 
-static void put_beam(struct maker *m)
+static void put_beam(struct scene_maker *m)
 {
 	m->s->needs_light_paths = true;
 	switch (dice_below(&m->d, 5)) {
@@ -303,12 +304,12 @@ static void put_beam(struct maker *m)
 		PUT(m, "</emitter>");
 		break;
 	case 2:
-		put_aimed(m, "spot");
+		begin_aimed_emitter(m, "spot");
 		put_rgb(m, "intensity", 4, 19);
 		put_between(m, "<float name='cutoff_angle' value='", 20, 60, "'/></emitter>");
 		break;
 	case 3:
-		put_aimed(m, "projector");
+		begin_aimed_emitter(m, "projector");
 		PUT(m,
 		    "<texture name='irradiance' type='bitmap'><string name='filename' value='picture.ppm'/></texture>"
 		    "<float name='scale' value='20'/>");
@@ -322,16 +323,16 @@ static void put_beam(struct maker *m)
 	}
 }
 
-static void put_camera(struct maker *m)
+static void put_camera(struct scene_maker *m)
 {
 	static const char *const types[] = {"perspective", "perspective", "thinlens", "orthographic"};
 	unsigned k = dice_below(&m->d, 4);
 	PUT(m, "<sensor type='%s'>", types[k]);
-	if (is_drawn(m, 0.3))
+	if (draw_bool(m, 0.3))
 		put_between(m, "<float name='near_clip' value='", 0.1, 2, "'/>");
 	if (k < 3)
 		put_between(m, "<float name='fov' value='", 35, 60, "'/>");
-	if (k < 3 && is_drawn(m, 0.2))
+	if (k < 3 && draw_bool(m, 0.2))
 		put_between(m, "<float name='principal_point_offset_x' value='", -0.3, 0.3, "'/>");
 	if (k == 2) {
 		put_between(m, "<float name='aperture_radius' value='", 0.02, 0.2, "'/>");
@@ -341,9 +342,9 @@ static void put_camera(struct maker *m)
 	put_between(m, "", -1, 1, ",");
 	put_between(m, "", -0.5, 1, ",3.8' target='");
 	put_between(m, "", -0.4, 0.4, ",0,0'/></transform>");
-	if (m->fog && is_drawn(m, 0.3))
+	if (m->has_fog && draw_bool(m, 0.3))
 		put_medium(m, "medium");
-	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", is_drawn(m, 0.5) ? "box" : "gaussian");
+	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", draw_bool(m, 0.5) ? "box" : "gaussian");
 }
 
 void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count)
@@ -356,49 +357,50 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 	char name[64];
 	snprintf(name, sizeof name, "random scene %llu", (unsigned long long)number);
 	*s = (struct random_scene){.used = 0};
-	struct maker m = {.s = s,
-			  .d = dice_of(name),
-			  .materials = materials,
-			  .count = count,
-			  .relief = number >= RANDOM_SCENES_WITH_RELIEF && number < RANDOM_SCENES_WITH_FOG,
-			  .fog = number >= RANDOM_SCENES_WITH_FOG};
+	struct scene_maker m = {.s = s,
+				.d = dice_for_test(name),
+				.materials = materials,
+				.material_count = count,
+				.has_relief = number >= RANDOM_SCENES_WITH_RELIEF && number < RANDOM_SCENES_WITH_FOG,
+				.has_fog = number >= RANDOM_SCENES_WITH_FOG};
 	PUT(&m, "<integrator type='volpath'><integer name='max_depth' value='%u'/></integrator>",
 	    3 + dice_below(&m.d, 5));
 	put_camera(&m);
-	bool room = is_drawn(&m, 0.6);
+	bool room = draw_bool(&m, 0.6);
 	put_wall(&m, "<rotate x='1' angle='-90'/>", "y='-1.6'");
 	for (unsigned i = 0; room && i < sizeof walls / sizeof *walls; i++)
-		if (is_drawn(&m, 0.85))
+		if (draw_bool(&m, 0.85))
 			put_wall(&m, walls[i][0], walls[i][1]);
 	for (unsigned i = 0, n = 2 + dice_below(&m.d, 3); i < n; i++)
 		put_shape(&m);
-	if (!room || is_drawn(&m, 0.2))
+	if (!room || draw_bool(&m, 0.2))
 		put_environment(&m);
-	if (room || is_drawn(&m, 0.5))
+	if (room || draw_bool(&m, 0.5))
 		put_lamp(&m);
-	if (is_drawn(&m, 0.25))
+	if (draw_bool(&m, 0.25))
 		put_beam(&m);
 }
 
 struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height)
 {
-	enum { SIDE = 8, OWN = 4, MEASURED = 4 };
+	enum { SIDE = 8, OWN_FILES = 4, MEASURED_FILES = 4 };
 	static char xml[sizeof s->body + 64];
 	static unsigned char picture[16 + 3 * SIDE * SIDE];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->body);
 	int head = sprintf((char *)picture, "P6 %d %d 255\n", SIDE, SIDE);
 	for (int i = 0; i < 3 * SIDE * SIDE; i++)
 		picture[head + i] = (unsigned char)(40 + (i * 37 + i / SIDE * 91) % 200);
-	struct memory_file files[OWN + MEASURED + 1] = {{"test.xml", xml, (size_t)n},
-							{"picture.ppm", picture, (size_t)head + 3 * SIDE * SIDE},
-							{"wedge.obj", wedge, sizeof wedge - 1},
-							{"curve.txt", curve, sizeof curve - 1}};
-	assert_null(measured_files()[MEASURED].name);
-	memcpy(files + OWN, measured_files(), MEASURED * sizeof *files);
-	return world_of_files(width, height, files);
+	struct memory_file files[OWN_FILES + MEASURED_FILES + 1] = {
+		{"test.xml", xml, (size_t)n},
+		{"picture.ppm", picture, (size_t)head + 3 * SIDE * SIDE},
+		{"wedge.obj", wedge, sizeof wedge - 1},
+		{"curve.txt", curve, sizeof curve - 1}};
+	assert_null(measured_file_all()[MEASURED_FILES].name);
+	memcpy(files + OWN_FILES, measured_file_all(), MEASURED_FILES * sizeof *files);
+	return world_from_files(width, height, files);
 }
 
-void random_scene_range(const char *text, uint64_t *first, uint64_t *last)
+void random_scene_parse_range(const char *text, uint64_t *first, uint64_t *last)
 {
 	unsigned long long a = 0, b = 0;
 	int n = sscanf(text, "%llu-%llu", &a, &b);

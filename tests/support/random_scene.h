@@ -22,10 +22,10 @@ struct random_scene {
  * are scattering media. */
 enum { RANDOM_SCENES_WITH_RELIEF = 1000, RANDOM_SCENES_WITH_FOG = 2000 };
 
-/* materials: texts for node_bsdf (tests/support/nodes.h). */
+/* materials: texts for node_make_bsdf (tests/support/nodes.h). */
 void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count);
 /* Parses "3" or "0-9". */
-void random_scene_range(const char *text, uint64_t *first, uint64_t *last);
+void random_scene_parse_range(const char *text, uint64_t *first, uint64_t *last);
 /* Builds the scene; the caller frees the world. */
 struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height);
 

@@ -26,7 +26,7 @@ static void *run_part(void *arg)
 {
 	struct part_run *r = arg;
 	struct lease_key k = {1, LEASE_RENDER, 0, r->part, 0};
-	enum lease_end end;
+	enum lease_outcome end;
 	r->rc = render_lease(r->w, r->p, &k, NULL, NULL, &end, &r->batch, &r->e);
 	return NULL;
 }
@@ -49,7 +49,7 @@ static void add_part(struct part_run *r, struct picture *out)
 	batch_fini(&r->batch);
 }
 
-static struct plan make_plan(const struct world *w, const struct render_picture_how *how)
+static struct plan make_plan(const struct world *w, const struct render_picture_options *options)
 {
 	struct render_summary s;
 	world_summary(w, &s);
@@ -59,15 +59,15 @@ static struct plan make_plan(const struct world *w, const struct render_picture_
 			 .crop_width = s.settings.width,
 			 .crop_height = s.settings.height,
 			 .border = s.settings.border,
-			 .seed = stats_seed(how->test),
+			 .seed = stats_seed(options->test),
 			 .groups = 1,
 			 .parts = 16,
 			 .rounds = 1,
 			 .bootstrap = 16,
-			 .epoch = how->spp,
+			 .epoch = options->spp,
 			 .min_depth = 1,
-			 .max_depth = how->max_depth ? how->max_depth : s.settings.max_depth};
-	snprintf(p.integrator, sizeof p.integrator, "%s", how->integrator);
+			 .max_depth = options->max_depth ? options->max_depth : s.settings.max_depth};
+	snprintf(p.integrator, sizeof p.integrator, "%s", options->integrator);
 	accuracy_settings_print(&w->accuracy, p.accuracy);
 	struct error e = {""};
 	if (plan_check(&p, &e))
@@ -75,7 +75,7 @@ static struct plan make_plan(const struct world *w, const struct render_picture_
 	return p;
 }
 
-static void make_black(struct picture *out, uint32_t width, uint32_t height)
+static void make_black_picture(struct picture *out, uint32_t width, uint32_t height)
 {
 	*out = (struct picture){.image = {.width = width,
 					  .height = height,
@@ -83,24 +83,24 @@ static void make_black(struct picture *out, uint32_t width, uint32_t height)
 					  .full_width = width,
 					  .full_height = height}};
 	for (int k = 0; k < 3; k++) {
-		snprintf(out->image.names[k], sizeof out->image.names[k], "%c", "RGB"[k]);
+		snprintf(out->image.channel_names[k], sizeof out->image.channel_names[k], "%c", "RGB"[k]);
 		out->rgb[k] = out->image.planes[k] = mem_alloc((size_t)width * height, sizeof(float));
 		assert_non_null(out->rgb[k]);
 	}
 }
 
-void render_picture_xyz(const struct world *w, const struct render_picture_how *how, struct picture *out)
+void render_picture_xyz(const struct world *w, const struct render_picture_options *options, struct picture *out)
 {
-	struct plan p = make_plan(w, how);
-	make_black(out, p.width, p.height);
+	struct plan p = make_plan(w, options);
+	make_black_picture(out, p.width, p.height);
 	/* Two parts at a time, added in order: where their strips overlap because of the filter, sums do not depend on
 	 * which part ends first. */
 	for (uint32_t part = 0; part < p.parts; part += 2) {
 		struct part_run run[2] = {{.w = w, .p = &p, .part = part}, {.w = w, .p = &p, .part = part + 1}};
 		pthread_t other;
-		bool two = pthread_create(&other, NULL, run_part, &run[1]) == 0;
+		bool has_second_thread = pthread_create(&other, NULL, run_part, &run[1]) == 0;
 		run_part(&run[0]);
-		if (two)
+		if (has_second_thread)
 			pthread_join(other, NULL);
 		else
 			run_part(&run[1]);

@@ -11,7 +11,7 @@
 
 #include <stdint.h>
 
-struct render_picture_how {
+struct render_picture_options {
 	const char *integrator; /* must be one that samples pixels */
 	const char *test;	/* its name gives the seed */
 	uint64_t spp;
@@ -19,6 +19,6 @@ struct render_picture_how {
 };
 
 /* Renders at the world's film size. R, G, B of the picture are CIE X, Y, Z. picture_fini frees it. */
-void render_picture_xyz(const struct world *w, const struct render_picture_how *how, struct picture *out);
+void render_picture_xyz(const struct world *w, const struct render_picture_options *options, struct picture *out);
 
 #endif

@@ -9,7 +9,7 @@
 #include "common/estimate/canvas_image.h"
 #include "worker/render/world/world.h"
 
-struct repeats_how {
+struct repeats_options {
 	const char *integrator, *test;
 	uint32_t count;
 	uint64_t spp, bootstrap, epoch; /* 0: by the plan's rule; for spp, until the target is met */
@@ -18,17 +18,17 @@ struct repeats_how {
 };
 
 /* Examines a render after each complete round. Called from two threads, but for each render from only one of them. */
-typedef void repeats_look(void *user, uint32_t render, uint64_t rounds, const struct canvas *c);
+typedef void repeats_observer(void *user, uint32_t render, uint64_t rounds, const struct canvas *c);
 
 struct repeats {
-	uint32_t count, values; /* values: width x height x 3 */
-	struct plan plan;	/* of the first render */
+	uint32_t count, value_count; /* value_count: width x height x 3 */
+	struct plan plan;	     /* of the first render */
 	struct canvas_image *images;
 	double cpu_seconds; /* of all leases together */
 };
 
-void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user,
+void repeats_run(const struct world *w, const struct repeats_options *options, repeats_observer *observer, void *user,
 		 struct repeats *out);
-void repeats_free(struct repeats *r);
+void repeats_fini(struct repeats *r);
 
 #endif

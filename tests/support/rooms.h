@@ -13,8 +13,8 @@ struct room {
 	struct world *(*build)(void);
 };
 
-enum { ROOMS_MOST = 24 };		 /* limit for the list, which a test or two run through completely */
-extern const struct room rooms[];	 /* ends with a NULL name */
-struct world *room_of(const char *name); /* fails the test if there is none */
+enum { ROOMS_MAX = 24 };			  /* limit for the list, which a test or two run through completely */
+extern const struct room rooms[];		  /* ends with a NULL name */
+struct world *room_build_named(const char *name); /* fails the test if there is none */
 
 #endif

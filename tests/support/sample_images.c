@@ -18,7 +18,7 @@ struct buffer {
 	size_t size;
 };
 
-static void append(png_structp png, png_bytep bytes, size_t n)
+static void append_png_bytes(png_structp png, png_bytep bytes, size_t n)
 {
 	struct buffer *b = png_get_io_ptr(png);
 	b->bytes = realloc(b->bytes, b->size + n);
@@ -26,7 +26,7 @@ static void append(png_structp png, png_bytep bytes, size_t n)
 	b->size += n;
 }
 
-static void flush(png_structp png)
+static void flush_png(png_structp png)
 {
 	(void)png;
 }
@@ -39,7 +39,7 @@ unsigned char *sample_png(size_t width, size_t height, enum sample_pixels kind, 
 	struct buffer b = {0};
 	png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
 	png_infop info = png_create_info_struct(png);
-	png_set_write_fn(png, &b, append, flush);
+	png_set_write_fn(png, &b, append_png_bytes, flush_png);
 	png_set_IHDR(png, info, (png_uint_32)width, (png_uint_32)height, bits, types[kind],
 		     interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, 0, 0);
 	png_color palette[256];

@@ -72,7 +72,7 @@ static const char *const extremes[] = {
 enum { EXTREMES = sizeof extremes / sizeof *extremes };
 
 /* Returns the end of the number at p; NULL if none begins there. */
-static const char *number_at(const char *p)
+static const char *number_end(const char *p)
 {
 	const char *digits = p + (*p == '-' || *p == '+');
 	digits += *digits == '.';
@@ -83,10 +83,10 @@ static const char *number_at(const char *p)
 	return end;
 }
 
-static size_t numbers_between(const char *p, const char *end, struct span *out, size_t count)
+static size_t append_numbers(const char *p, const char *end, struct span *out, size_t count)
 {
-	for (char before = ' '; p < end && count < NUMBERS_MAX; before = *p++) {
-		const char *last = isalnum((unsigned char)before) || strchr("_$#", before) ? NULL : number_at(p);
+	for (char previous = ' '; p < end && count < NUMBERS_MAX; previous = *p++) {
+		const char *last = isalnum((unsigned char)previous) || strchr("_$#", previous) ? NULL : number_end(p);
 		if (!last || last > end)
 			continue;
 		out[count++] = (struct span){p, last};
@@ -95,7 +95,7 @@ static size_t numbers_between(const char *p, const char *end, struct span *out, 
 	return count;
 }
 
-static bool holds_numbers(const char *name, size_t length)
+static bool has_numbers(const char *name, size_t length)
 {
 	static const char *const names[] = {"value", "x", "y", "z", "angle", "origin", "target", "up"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
@@ -116,8 +116,8 @@ static size_t find_in_xml(const char *text, struct span *out)
 			name--;
 		if (!end)
 			break;
-		if (holds_numbers(name, (size_t)(p - 1 - name)))
-			count = numbers_between(p + 1, end, out, count);
+		if (has_numbers(name, (size_t)(p - 1 - name)))
+			count = append_numbers(p + 1, end, out, count);
 		p = end + 1;
 	}
 	return count;
@@ -130,13 +130,13 @@ static size_t find_in_obj(const char *text, struct span *out)
 		const char *end = strchr(line, '\n');
 		end = end ? end : line + strlen(line);
 		if (*line == 'v' || *line == 'f')
-			count = numbers_between(line + 1 + (line[1] == 't' || line[1] == 'n'), end, out, count);
+			count = append_numbers(line + 1 + (line[1] == 't' || line[1] == 'n'), end, out, count);
 		line = end + (*end == '\n');
 	}
 	return count;
 }
 
-static size_t find(const char *text, struct span *out)
+static size_t find_numbers(const char *text, struct span *out)
 {
 	return strchr(text, '<') ? find_in_xml(text, out) : find_in_obj(text, out);
 }
@@ -144,11 +144,11 @@ static size_t find(const char *text, struct span *out)
 size_t scene_numbers_count(const char *text)
 {
 	static struct span spans[NUMBERS_MAX];
-	return find(text, spans);
+	return find_numbers(text, spans);
 }
 
 /* Replaces half of the numbers by values from the list, with any sign, and multiplies the others by a power of ten. */
-static void replace(struct span s, struct dice *d, char out[NUMBER_BYTES])
+static void replace_number(struct span s, struct dice *d, char out[NUMBER_BYTES])
 {
 	if (dice_below(d, 2) == 0) {
 		const char *x = extremes[dice_below(d, EXTREMES)];
@@ -163,7 +163,7 @@ static void replace(struct span s, struct dice *d, char out[NUMBER_BYTES])
 char *scene_numbers_mutate(const char *text, struct dice *d, char *what, size_t what_size)
 {
 	static struct span spans[NUMBERS_MAX];
-	size_t count = find(text, spans), n = 1 + dice_below(d, CHANGES_MAX), used = 0, said = 0;
+	size_t count = find_numbers(text, spans), n = 1 + dice_below(d, CHANGES_MAX), used = 0, described = 0;
 	if (count == 0)
 		return NULL;
 	size_t chosen[CHANGES_MAX];
@@ -173,13 +173,13 @@ char *scene_numbers_mutate(const char *text, struct dice *d, char *what, size_t 
 	const char *p = text;
 	what[0] = 0;
 	for (size_t k = 0; k < count; k++) {
-		bool wanted = false;
+		bool is_chosen = false;
 		for (size_t i = 0; i < n; i++)
-			wanted |= chosen[i] == k;
-		if (!wanted)
+			is_chosen |= chosen[i] == k;
+		if (!is_chosen)
 			continue;
 		char number[NUMBER_BYTES];
-		replace(spans[k], d, number);
+		replace_number(spans[k], d, number);
 		memcpy(out + used, p, (size_t)(spans[k].begin - p));
 		used += (size_t)(spans[k].begin - p);
 		used += (size_t)sprintf(out + used, "%s", number);
@@ -187,9 +187,11 @@ char *scene_numbers_mutate(const char *text, struct dice *d, char *what, size_t 
 		size_t line = 1;
 		for (const char *c = text; c < p; c++)
 			line += *c == '\n';
-		int length = snprintf(what + said, what_size - said, "%sline %zu: %.*s -> %s", said ? "; " : "", line,
-				      (int)(spans[k].end - spans[k].begin), spans[k].begin, number);
-		said = length > 0 && said + (size_t)length < what_size ? said + (size_t)length : said;
+		int length = snprintf(what + described, what_size - described, "%sline %zu: %.*s -> %s",
+				      described ? "; " : "", line, (int)(spans[k].end - spans[k].begin), spans[k].begin,
+				      number);
+		described =
+			length > 0 && described + (size_t)length < what_size ? described + (size_t)length : described;
 	}
 	strcpy(out + used, p);
 	return out;

@@ -17,7 +17,7 @@ bool scene_has_note(const struct scene *s, const char *text)
 	return false;
 }
 
-const struct scene_node *scene_named(const struct scene *s, const char *id)
+const struct scene_node *scene_find_object(const struct scene *s, const char *id)
 {
 	for (uint32_t i = 0; i < s->object_count; i++)
 		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)

@@ -10,6 +10,6 @@
 /* Returns whether there is a note that contains the text. */
 bool scene_has_note(const struct scene *s, const char *text);
 /* Returns the object with that id; fails the test if there is none. */
-const struct scene_node *scene_named(const struct scene *s, const char *id);
+const struct scene_node *scene_find_object(const struct scene *s, const char *id);
 
 #endif

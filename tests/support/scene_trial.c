@@ -17,21 +17,21 @@
 enum { CPU_SECONDS = 20 };
 
 /* "glass.xml:12: " */
-static bool has_place(const char *text)
+static bool has_file_and_line(const char *text)
 {
 	const char *p = strstr(text, ".xml:");
 	p = p ? p : strstr(text, ".obj:");
 	return p && p[5] >= '1' && p[5] <= '9';
 }
 
-static int end_with(enum trial_end end, const char *text)
+static int report_end(enum trial_end end, const char *text)
 {
 	printf("%s", text);
 	fflush(stdout);
 	return (int)end;
 }
 
-static struct plan plan_of(const struct render_summary *s, const struct render_integrator *i)
+static struct plan make_plan(const struct render_summary *s, const struct integrator_properties *i)
 {
 	struct plan p = {.kind = i->kind,
 			 .width = s->settings.width,
@@ -56,16 +56,16 @@ static int run_lease(const struct world *w, const struct plan *p, enum lease_kin
 		     struct batch *b, struct error *e)
 {
 	struct lease_key k = {1, kind, 0, 0, 0};
-	enum lease_end end;
+	enum lease_outcome end;
 	int rc = render_lease(w, p, &k, in, NULL, &end, b, e);
 	return rc ? rc : batch_check(b, p, e);
 }
 
-static int render(const struct world *w, const struct render_summary *s, const struct render_integrator *i,
-		  struct error *e)
+static int render_with_integrator(const struct world *w, const struct render_summary *s,
+				  const struct integrator_properties *i, struct error *e)
 {
-	struct plan p = plan_of(s, i);
-	if (i->has_mutations && render_mutations(NULL, s, p.mutations, e))
+	struct plan p = make_plan(s, i);
+	if (i->has_mutations && render_canonical_mutations(NULL, s, p.mutations, e))
 		return -1;
 	if (plan_check(&p, e))
 		return -1;
@@ -96,22 +96,22 @@ static int try_in_child(const struct memory_file *files)
 	if (!rc)
 		rc = render_check(&s, &assets, &o, &summary, &e);
 	if (rc)
-		return end_with(has_place(e.text) ? TRIAL_REFUSED : TRIAL_NO_PLACE, e.text);
+		return report_end(has_file_and_line(e.text) ? TRIAL_REFUSED : TRIAL_REFUSED_WITHOUT_PLACE, e.text);
 	o.width = o.height = 24; /* a larger film costs only memory, and its numbers have been checked already */
 	if (world_new(&w, &s, &assets, &o, &e))
-		return end_with(TRIAL_FAILED, e.text);
+		return report_end(TRIAL_FAILED, e.text);
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++) {
-		const struct render_integrator *integrator = render_integrator_at(i);
-		bool refuses = (integrator->from_camera ? summary.beams : summary.rolls) ||
-			       (integrator->to_emitters && render_effect_on(&summary, "medium-light"));
-		if (!refuses && render(w, &summary, integrator, &e))
-			return end_with(TRIAL_FAILED, e.text);
+		const struct integrator_properties *integrator = render_integrator_at(i);
+		bool is_unsupported = (integrator->only_from_camera ? summary.has_beam : summary.has_rolling_shutter) ||
+				      (integrator->ends_on_emitters && render_effect_is_on(&summary, "medium-light"));
+		if (!is_unsupported && render_with_integrator(w, &summary, integrator, &e))
+			return report_end(TRIAL_FAILED, e.text);
 	}
 	return TRIAL_RENDERED;
 }
 
-int scene_trial(const struct memory_file *files, char *text, size_t size)
+int scene_trial_run(const struct memory_file *files, char *text, size_t size)
 {
 	int pipes[2];
 	assert_int_equal(pipe(pipes), 0);

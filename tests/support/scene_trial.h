@@ -11,12 +11,12 @@
 enum trial_end {
 	TRIAL_REFUSED = 10, /* refused by an error with file and line */
 	TRIAL_RENDERED,
-	TRIAL_NO_PLACE, /* refused by an error without file and line */
-	TRIAL_FAILED,	/* it passed the check but did not render */
+	TRIAL_REFUSED_WITHOUT_PLACE, /* refused by an error without file and line */
+	TRIAL_FAILED,		     /* it passed the check but did not render */
 };
 
 /* files: the scene first. Returns one of trial_end, or another exit code, or the negative number of the signal that
  * ended the process. */
-int scene_trial(const struct memory_file *files, char *text, size_t size);
+int scene_trial_run(const struct memory_file *files, char *text, size_t size);
 
 #endif

@@ -7,10 +7,10 @@
 #ifndef TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
 #define TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
 
-#include "tests/support/scripted.h"
+#include "tests/support/scripted_peer.h"
 #include "worker/daemon/agent_state.h"
 
-enum { PIECE = 1000, MESH = 3500, PIECES = 4 };
+enum { COORD_PIECE_BYTES = 1000, COORD_MESH_BYTES = 3500, COORD_MESH_PIECES = 4 };
 
 struct coord_file {
 	const unsigned char *bytes;
@@ -18,40 +18,42 @@ struct coord_file {
 	struct blob_hash hash;
 };
 
-struct coord_test {
+struct coord_state {
 	struct agent *agent;
 	int listener;
 	char address[32];
-	struct scripted *at; /* the connection, from the coordinator's side */
+	struct scripted_peer *connection; /* the connection, from the coordinator's side */
 	struct coord_file mesh, scenes[4];
-	unsigned char mesh_bytes[MESH];
-	bool own; /* of the last LeaseFailed */
+	unsigned char mesh_bytes[COORD_MESH_BYTES];
+	bool failed_own; /* of the last LeaseFailed */
 };
-extern struct coord_test coord;
+extern struct coord_state coord;
 
 void coord_make_file(struct coord_file *f, const void *bytes, size_t size);
 
 /* Starts both; the worker's cache is in `folder` (folder.h). */
 void coord_start(uint64_t cache_bytes);
-void coord_finish(void);
-void coord_welcome(void); /* accepts a connection of the worker */
-void coord_hang_up(void);
+void coord_stop(void);
+void coord_accept_worker(void); /* accepts a connection of the worker */
+void coord_disconnect(void);
 
-const Farm__Envelope *coord_hear(void); /* NULL: the worker hung up */
-void coord_hear_job_get(uint64_t job);
-void coord_hear_blob_get(const struct coord_file *f, uint64_t offset);
-uint64_t coord_hear_failed(const char *why); /* with `why` in its text; returns the job */
-void coord_hear_built(int count); /* `count` jobs had all files: their leases fail, as their scenes cannot be read */
-void coord_hear_silence(void);	  /* checks that no message is on its way: the answer to another message comes first */
+const Farm__Envelope *coord_receive(void); /* NULL: the worker hung up */
+void coord_expect_job_get(uint64_t job);
+void coord_expect_blob_get(const struct coord_file *f, uint64_t offset);
+uint64_t coord_expect_lease_failed(const char *why); /* with `why` in its text; returns the job */
+void coord_expect_built_jobs(
+	int count);		 /* `count` jobs had all files: their leases fail, as their scenes cannot be read */
+void coord_expect_silence(void); /* checks that no message is on its way: the answer to another message comes first */
 
-void coord_say_grant(uint64_t job);
-void coord_grant(uint64_t job); /* a lease of a job that the worker does not know, so that it asks for the job */
-void coord_say_revoke(uint64_t job);
-void coord_describe(uint64_t job);
-void coord_end_job(uint64_t job);
+void coord_send_grant(uint64_t job);
+void coord_grant_new_job(
+	uint64_t job); /* a lease of a job that the worker does not know, so that it asks for the job */
+void coord_send_revoke(uint64_t job);
+void coord_send_job_info(uint64_t job);
+void coord_send_job_end(uint64_t job);
 void coord_send_piece(struct coord_file *f, uint64_t offset);
 /* Sends pieces from .. to - 1 of the mesh, each after the worker has asked for it. */
-void coord_serve_mesh(int from, int to);
+void coord_serve_mesh(int first, int end);
 /* Grants one lease each of jobs 1 to count, and sends their scene files. The worker then asks for the mesh once. */
 void coord_begin_jobs(uint64_t count);
 

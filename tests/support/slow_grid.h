@@ -9,10 +9,10 @@
 #include "worker/render/volume/grid.h"
 
 /* Computes the position, in cells, of the ray's point at t. */
-void slow_grid_cells(const struct grid *g, const struct grid_ray *r, double t, double x[3]);
+void slow_grid_position(const struct grid *g, const struct grid_ray *r, double t, double x[3]);
 /* Returns the value at a position in cells. */
 double slow_grid_value(const struct grid *g, const double x[3], int channel);
-bool slow_grid_has(const struct grid *g, vec3 p); /* whether the grid's box contains p, a point in the world */
+bool slow_grid_contains(const struct grid *g, vec3 p); /* whether the grid's box contains p, a point in the world */
 /* Returns the integral along the ray, up to t = 1000 at most. */
 double slow_grid_integral(const struct grid *g, const struct grid_ray *r, int channel);
 

@@ -9,37 +9,37 @@
 
 #include "worker/render/path/full_path.h"
 
-enum { STARTS_MAX_EDGES = 8 };
+enum { STARTS_EDGES_MAX = 8 };
 
 struct start { /* technique s of pair `index` of sub-paths */
 	uint64_t index;
-	unsigned s, passed;
-	double sum; /* sum of the contributions up to this one */
+	unsigned technique, passed_count;
+	double cumulative; /* sum of the contributions up to this one */
 };
 
 struct starts {
 	struct path_context *c;
 	uint64_t seed;
 	struct {
-		struct start *at;
-		size_t count, room;
-	} of[STARTS_MAX_EDGES + 1]; /* by number of edges */
+		struct start *items;
+		size_t count, capacity;
+	} by_edges[STARTS_EDGES_MAX + 1]; /* by number of edges */
 	uint64_t pairs;
 };
 
 /* Makes a context for films of 32 x 32 and paths of min_depth..max_depth edges; the caller owns the counters. */
-void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth,
-		    uint64_t *counters);
+void starts_init_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth,
+			 uint64_t *counters);
 
 /* Samples the group's own pairs. starts_fini frees them. */
 void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64_t group, uint64_t pairs);
 void starts_fini(struct starts *s);
 
 /* Returns the contribution of all paths with that number of edges, per pair: its expectation is the integral of f. */
-double starts_weight(const struct starts *s, unsigned edges);
+double starts_contribution(const struct starts *s, unsigned edges);
 
 /* Makes the path at the fraction u in [0,1) of the sum. Returns false if there is none (or if it lies just outside
  * the film's border). */
-bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x);
+bool starts_make_path(struct starts *s, unsigned edges, double u, struct full_path *x);
 
 #endif

@@ -29,9 +29,9 @@ enum {
 };
 
 /* Faults planted in the acceptance probability, to see that they are found. */
-enum stationary_fault { STATIONARY_SOUND, STATIONARY_NO_TRANSFER, STATIONARY_NO_DENSITY, STATIONARY_NO_GEOMETRY };
+enum stationary_fault { STATIONARY_NO_FAULT, STATIONARY_NO_TRANSFER, STATIONARY_NO_DENSITY, STATIONARY_NO_GEOMETRY };
 
-struct stationary_how {
+struct stationary_options {
 	const char *mutation; /* "hslt@b2c0" */
 	unsigned min_edges, max_edges;
 	uint32_t starts, bootstrap; /* per group; divided by HSLT_TEST_SCALE */
@@ -42,35 +42,36 @@ struct stationary_result {
 	uint64_t starts, proposals, accepted;
 	uint64_t counters[BATCH_COUNTERS];
 	uint64_t strategy[STRATEGY_COUNTERS];
-	uint64_t checked;  /* number of final states examined by path_check */
-	char failure[256]; /* message of path_check or the bootstrap; "": none */
+	uint64_t checked_states; /* number of final states examined by path_check */
+	char failure[256];	 /* message of path_check or the bootstrap; "": none */
 	double bias[STATIONARY_FUNCTIONS], error[STATIONARY_FUNCTIONS]; /* of the mean; relative; 0: never changes */
-	double least_block, least_colour,
-		least_other; /* smallest bias found with 95 % probability: the largest for each kind of function */
-	int worst;	     /* the function that differs most */
-	double p;	     /* p of that function, times the number of functions */
-	double share;	     /* accepted mutations as a fraction of accepted mutations and starts */
-	double seconds;	     /* CPU */
+	double detectable_block_bias, detectable_colour_bias,
+		detectable_other_bias; /* smallest bias found with 95 % probability: the largest for each kind of
+					  function */
+	int worst_function;	       /* the function that differs most */
+	double p;		       /* p of that function, times the number of functions */
+	double accepted_share;	       /* accepted mutations as a fraction of accepted mutations and starts */
+	double cpu_seconds;	       /* CPU */
 };
 
 /* Call before runs on paths of given lengths: otherwise the bootstrap's roulette would leave few long paths. */
-void stationary_keep_long_starts(struct world *w);
+void stationary_disable_roulette(struct world *w);
 
 /* Common starts of several mutations on paths of the same world and the same lengths: finding starts takes a third
  * of the time of a mutation. Initialize with zeros; the first run finds the starts, with its own seed. */
 struct stationary_starts {
-	uint64_t seed, *index; /* indices in the bootstrap, for all groups in turn */
+	uint64_t seed, *indices; /* indices in the bootstrap, for all groups in turn */
 	double weight[STATIONARY_GROUPS];
 };
-void stationary_forget(struct stationary_starts *s);
+void stationary_starts_fini(struct stationary_starts *s);
 
-/* Needs as many starts and as long a bootstrap as the run that found `from`. */
-void stationary_run_from(const struct world *w, const char *test, const struct stationary_how *how,
-			 struct stationary_starts *from, struct stationary_result *out);
-void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
+/* Needs as many starts and as long a bootstrap as the run that found `starts_cache`. */
+void stationary_run_with_starts(const struct world *w, const char *test, const struct stationary_options *options,
+				struct stationary_starts *starts_cache, struct stationary_result *out);
+void stationary_run(const struct world *w, const char *test, const struct stationary_options *options,
 		    struct stationary_result *out);
-const char *stationary_function(int i);
+const char *stationary_function_name(int i);
 /* Returns whether p is above the level, no path failed its check, and nothing was invalid. */
-bool stationary_holds(const struct stationary_result *r);
+bool stationary_passes(const struct stationary_result *r);
 
 #endif

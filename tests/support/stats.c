@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 /* Upper regularised incomplete gamma function: series below a + 1, Lentz's continued fraction above. */
-static double gamma_q(double a, double x)
+static double regularised_gamma_q(double a, double x)
 {
 	if (x <= 0)
 		return 1;
@@ -35,14 +35,14 @@ static double gamma_q(double a, double x)
 }
 
 /* Regularised incomplete beta function by its continued fraction (x below the mean; else the mirror image). */
-static double beta_i(double a, double b, double x)
+static double regularised_beta(double a, double b, double x)
 {
 	if (x <= 0)
 		return 0;
 	if (x >= 1)
 		return 1;
 	if (x > (a + 1) / (a + b + 2))
-		return 1 - beta_i(b, a, 1 - x);
+		return 1 - regularised_beta(b, a, 1 - x);
 	double front = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log1p(-x)) / a;
 	double c = 1, d = 1 / (1 - (a + b) * x / (a + 1)), h = d;
 	for (int m = 1; m < 100000; m++) {
@@ -62,12 +62,12 @@ static double beta_i(double a, double b, double x)
 
 double stats_chi2_p(double x, double degrees)
 {
-	return gamma_q(degrees / 2, x / 2);
+	return regularised_gamma_q(degrees / 2, x / 2);
 }
 
 double stats_student_t_p(double t, double degrees)
 {
-	return isinf(t) ? 0 : beta_i(degrees / 2, 0.5, degrees / (degrees + t * t));
+	return isinf(t) ? 0 : regularised_beta(degrees / 2, 0.5, degrees / (degrees + t * t));
 }
 
 struct cell {
@@ -117,13 +117,13 @@ uint64_t stats_seed(const char *name)
 
 struct stats_mean stats_mean_test(const double *x, size_t n, double expected)
 {
-	double sum = 0, square = 0;
+	double sum = 0, square_sum = 0;
 	for (size_t i = 0; i < n; i++)
 		sum += x[i];
 	double mean = sum / (double)n;
 	for (size_t i = 0; i < n; i++)
-		square += (x[i] - mean) * (x[i] - mean);
-	double error = sqrt(square / ((double)n * (double)(n - 1)));
+		square_sum += (x[i] - mean) * (x[i] - mean);
+	double error = sqrt(square_sum / ((double)n * (double)(n - 1)));
 	double p = error > 0 ? stats_student_t_p((mean - expected) / error, (double)n - 1) : mean == expected;
 	return (struct stats_mean){mean, error, p};
 }

@@ -26,7 +26,7 @@ unsigned char *tensor_file_add(struct tensor_file *f, const char *name, unsigned
 	return a->bytes;
 }
 
-void tensor_file_put(unsigned char **at, double x)
+void tensor_file_put_float(unsigned char **at, double x)
 {
 	put_float(*at, (float)x);
 	*at += 4;

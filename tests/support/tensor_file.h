@@ -21,7 +21,7 @@ struct tensor_file {
 /* Returns the bytes of a new array, which are zeros. */
 unsigned char *tensor_file_add(struct tensor_file *f, const char *name, unsigned type, unsigned dimensions,
 			       const int *shape);
-void tensor_file_put(unsigned char **at, double x); /* stores a float and advances *at */
+void tensor_file_put_float(unsigned char **at, double x); /* stores a float and advances *at */
 
 /* Returns the file, of *size bytes; the caller frees it. */
 unsigned char *tensor_file_end(struct tensor_file *f, size_t *size);

@@ -17,12 +17,12 @@
 
 #include <cmocka.h>
 
-struct said {
+struct answer_text {
 	char text[4096];
 	size_t used;
 };
 
-__attribute__((format(printf, 2, 3))) static void say(struct said *s, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void append_words(struct answer_text *s, const char *format, ...)
 {
 	va_list ap;
 	va_start(ap, format);
@@ -32,151 +32,151 @@ __attribute__((format(printf, 2, 3))) static void say(struct said *s, const char
 	s->used += (size_t)n;
 }
 
-static void say_key(struct said *s, const struct lease_key *k)
+static void append_key(struct answer_text *s, const struct lease_key *k)
 {
-	say(s, "j%" PRIu64 " g%u p%u ", k->job, k->group, k->part);
+	append_words(s, "j%" PRIu64 " g%u p%u ", k->job, k->group, k->part);
 	if (k->kind == LEASE_BOOTSTRAP)
-		say(s, "boot");
+		append_words(s, "boot");
 	else
-		say(s, "e%" PRIu64, k->epoch);
+		append_words(s, "e%" PRIu64, k->epoch);
 }
 
-static void say_ack(struct said *s, const struct action *a)
+static void append_ack(struct answer_text *s, const struct action *a)
 {
 	static const char *const names[] = {"merged", "repeat", "refused", "noted"};
-	say(s, "%s%s%s", names[a->ack], *a->text ? ": " : "", a->text);
+	append_words(s, "%s%s%s", names[a->ack], *a->text ? ": " : "", a->text);
 }
 
-static void say_changed(struct said *s, const struct action *a)
+static void append_job_state(struct answer_text *s, const struct action *a)
 {
-	say(s, "j%" PRIu64 " is %s", a->job, job_state_name(a->state));
+	append_words(s, "j%" PRIu64 " is %s", a->job, job_state_name(a->state));
 	if (a->end != END_NONE)
-		say(s, " (%s%s%s)", job_end_name(a->end), *a->text ? ": " : "", a->text);
+		append_words(s, " (%s%s%s)", job_end_name(a->end), *a->text ? ": " : "", a->text);
 }
 
-static void say_action(struct said *s, const struct action *a)
+static void append_action(struct answer_text *s, const struct action *a)
 {
 	switch (a->kind) {
 	case ACTION_SUBMITTED:
-		say(s, "j%" PRIu64 " submitted", a->job);
+		append_words(s, "j%" PRIu64 " submitted", a->job);
 		break;
 	case ACTION_CANCELLED:
-		say(s, "j%" PRIu64 " cancelled", a->job);
+		append_words(s, "j%" PRIu64 " cancelled", a->job);
 		break;
 	case ACTION_REJECTED:
-		say(s, "rejected: %s", a->text);
+		append_words(s, "rejected: %s", a->text);
 		break;
 	case ACTION_SEND_LEASE:
 	case ACTION_REVOKE:
-		say(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
-		say_key(s, &a->key);
-		if (a->anew)
-			say(s, " anew");
+		append_words(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
+		append_key(s, &a->key);
+		if (a->from_seeds)
+			append_words(s, " anew");
 		break;
 	case ACTION_MERGE:
-		say(s, "merge");
+		append_words(s, "merge");
 		break;
 	case ACTION_ACK:
-		say_ack(s, a);
+		append_ack(s, a);
 		break;
 	case ACTION_BOOTSTRAP_DONE:
-		say(s, "j%" PRIu64 " prepare", a->job);
+		append_words(s, "j%" PRIu64 " prepare", a->job);
 		break;
 	case ACTION_ROUND_DONE:
-		say(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds);
+		append_words(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds);
 		break;
 	case ACTION_EVALUATE_ERROR:
-		say(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds);
+		append_words(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds);
 		break;
 	case ACTION_PUBLISH:
-		say(s, "j%" PRIu64 " publish %" PRIu64, a->job, a->rounds);
+		append_words(s, "j%" PRIu64 " publish %" PRIu64, a->job, a->rounds);
 		break;
 	case ACTION_JOB_CHANGED:
-		say_changed(s, a);
+		append_job_state(s, a);
 		break;
 	case ACTION_JOB_FORGOTTEN:
-		say(s, "j%" PRIu64 " forgotten", a->job);
+		append_words(s, "j%" PRIu64 " forgotten", a->job);
 		break;
-	case ACTION_CHAINS_ANEW:
-		say(s, "anew");
+	case ACTION_RESTART_CHAINS:
+		append_words(s, "anew");
 		break;
-	case ACTION_TAKE_BACK:
-		say(s, "back ");
-		say_key(s, &a->key);
+	case ACTION_ROLL_BACK:
+		append_words(s, "back ");
+		append_key(s, &a->key);
 		break;
-	case ACTION_WRONG:
-		say(s, "#%" PRIu64 " %s", a->who, a->text);
+	case ACTION_WRONG_RESULT:
+		append_words(s, "#%" PRIu64 " %s", a->worker_id, a->text);
 		break;
 	case ACTION_QUARANTINE:
-		say(s, "#%" PRIu64 " quarantined", a->who);
+		append_words(s, "#%" PRIu64 " quarantined", a->worker_id);
 		break;
 	case ACTION_CLOSE_PEER:
-		say(s, "close w%" PRIu64, a->peer);
+		append_words(s, "close w%" PRIu64, a->peer);
 		break;
 	}
 }
 
 /* ---- reading */
 
-static bool skip_word(const char **at, const char *word)
+static bool skip_word(const char **cursor, const char *word)
 {
 	size_t n = strlen(word);
-	if (strncmp(*at, word, n) != 0)
+	if (strncmp(*cursor, word, n) != 0)
 		return false;
-	*at += n;
-	while (**at == ' ')
-		++*at;
+	*cursor += n;
+	while (**cursor == ' ')
+		++*cursor;
 	return true;
 }
 
-static double take_number(const char **at)
+static double parse_number(const char **cursor)
 {
 	char *end;
-	double x = strtod(*at, &end);
-	if (end == *at)
-		fail_msg("a number is missing: %s", *at);
-	*at = end;
-	while (**at == ' ')
-		++*at;
+	double x = strtod(*cursor, &end);
+	if (end == *cursor)
+		fail_msg("a number is missing: %s", *cursor);
+	*cursor = end;
+	while (**cursor == ' ')
+		++*cursor;
 	return x;
 }
 
-static uint64_t take_count(const char **at)
+static uint64_t parse_count(const char **cursor)
 {
-	return (uint64_t)take_number(at);
+	return (uint64_t)parse_number(cursor);
 }
 
-static uint64_t take_id(const char **at, const char *letter)
+static uint64_t parse_id(const char **cursor, const char *letter)
 {
-	if (!skip_word(at, letter))
-		fail_msg("'%s' is missing: %s", letter, *at);
-	return take_count(at);
+	if (!skip_word(cursor, letter))
+		fail_msg("'%s' is missing: %s", letter, *cursor);
+	return parse_count(cursor);
 }
 
-static struct lease_key take_key(const char **at)
+static struct lease_key parse_key(const char **cursor)
 {
-	struct lease_key k = {.job = take_id(at, "j"), .kind = LEASE_RENDER};
-	k.group = (uint32_t)take_id(at, "g");
-	k.part = (uint32_t)take_id(at, "p");
-	if (skip_word(at, "boot"))
+	struct lease_key k = {.job = parse_id(cursor, "j"), .kind = LEASE_RENDER};
+	k.group = (uint32_t)parse_id(cursor, "g");
+	k.part = (uint32_t)parse_id(cursor, "p");
+	if (skip_word(cursor, "boot"))
 		k.kind = LEASE_BOOTSTRAP;
 	else
-		k.epoch = take_id(at, "e");
+		k.epoch = parse_id(cursor, "e");
 	return k;
 }
 
-enum { WORD = 32 };
+enum { WORD_BYTES = 32 };
 
-static const char *take_word(const char **at, char word[WORD])
+static const char *parse_word(const char **cursor, char word[WORD_BYTES])
 {
-	size_t n = strcspn(*at, " ");
-	snprintf(word, WORD, "%.*s", (int)n, *at);
-	*at += n;
-	skip_word(at, " ");
+	size_t n = strcspn(*cursor, " ");
+	snprintf(word, WORD_BYTES, "%.*s", (int)n, *cursor);
+	*cursor += n;
+	skip_word(cursor, " ");
 	return word;
 }
 
-static void take_submit(const char **at, struct event *ev, struct plan *p, char owner[WORD])
+static void parse_submit(const char **cursor, struct event *ev, struct plan *p, char owner[WORD_BYTES])
 {
 	*p = (struct plan){.kind = PLAN_CHAINS,
 			   .width = 8,
@@ -191,199 +191,201 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 	ev->kind = EVENT_SUBMIT;
 	ev->tag = 7;
 	ev->submit = (struct event_submit){.plan = p, .name = "job", .owner = ""};
-	while (**at && **at != '-') {
-		if (skip_word(at, "priority="))
-			ev->submit.priority = (int)take_number(at);
-		else if (skip_word(at, "mixed"))
+	while (**cursor && **cursor != '-') {
+		if (skip_word(cursor, "priority="))
+			ev->submit.priority = (int)parse_number(cursor);
+		else if (skip_word(cursor, "mixed"))
 			ev->submit.mixed = true;
-		else if (skip_word(at, "samples"))
+		else if (skip_word(cursor, "samples"))
 			p->kind = PLAN_SAMPLES;
-		else if (skip_word(at, "owner="))
-			ev->submit.owner = take_word(at, owner);
-		else if (skip_word(at, "verify="))
-			ev->submit.verify = take_number(at);
-		else if (skip_word(at, "groups="))
-			p->groups = (uint32_t)take_count(at);
-		else if (skip_word(at, "parts="))
-			p->parts = (uint32_t)take_count(at);
-		else if (skip_word(at, "rounds=inf"))
+		else if (skip_word(cursor, "owner="))
+			ev->submit.owner = parse_word(cursor, owner);
+		else if (skip_word(cursor, "verify="))
+			ev->submit.verify_fraction = parse_number(cursor);
+		else if (skip_word(cursor, "groups="))
+			p->groups = (uint32_t)parse_count(cursor);
+		else if (skip_word(cursor, "parts="))
+			p->parts = (uint32_t)parse_count(cursor);
+		else if (skip_word(cursor, "rounds=inf"))
 			p->rounds = UINT64_MAX;
-		else if (skip_word(at, "rounds="))
-			p->rounds = take_count(at);
-		else if (skip_word(at, "seconds="))
-			p->seconds = take_number(at);
-		else if (skip_word(at, "target="))
-			p->target_error = take_number(at);
-		else if (skip_word(at, "epoch="))
-			p->epoch = take_count(at);
-		else if (skip_word(at, "boot="))
-			p->bootstrap = take_count(at);
+		else if (skip_word(cursor, "rounds="))
+			p->rounds = parse_count(cursor);
+		else if (skip_word(cursor, "seconds="))
+			p->seconds = parse_number(cursor);
+		else if (skip_word(cursor, "target="))
+			p->target_error = parse_number(cursor);
+		else if (skip_word(cursor, "epoch="))
+			p->epoch = parse_count(cursor);
+		else if (skip_word(cursor, "boot="))
+			p->bootstrap = parse_count(cursor);
 		else
-			fail_msg("not an option of submit: %s", *at);
+			fail_msg("not an option of submit: %s", *cursor);
 	}
 	p->chains = p->kind == PLAN_CHAINS ? p->groups * p->parts * 4 : 0;
 }
 
 /* Parses [certificate=C] [name=N] [home=H] [start=K], each one letter. */
-static void take_identity(const char **at, struct event_join *j)
+static void parse_identity(const char **cursor, struct event_join *j)
 {
 	static const char *const letters[] = {"a", "b", "c", "d"};
-	const char **where[] = {&j->certificate, &j->name, &j->home};
+	const char **targets[] = {&j->certificate, &j->name, &j->home};
 	static const char *const words[] = {"certificate=", "name=", "home="};
 	for (int i = 0; i < 3; i++)
-		for (int k = 0; skip_word(at, words[i]); k = 0) {
-			while (k < 3 && **at != *letters[k])
+		for (int k = 0; skip_word(cursor, words[i]); k = 0) {
+			while (k < 3 && **cursor != *letters[k])
 				k++;
-			*where[i] = letters[k];
-			skip_word(at, letters[k]);
+			*targets[i] = letters[k];
+			skip_word(cursor, letters[k]);
 		}
-	if (skip_word(at, "start="))
-		j->restarts = take_count(at);
+	if (skip_word(cursor, "start="))
+		j->restarts = parse_count(cursor);
 }
 
-static void take_worker(const char **at, struct event *ev, char *name, char *fingerprint)
+static void parse_worker(const char **cursor, struct event *ev, char *name, char *fingerprint)
 {
-	ev->peer = take_id(at, "w");
-	if (skip_word(at, "joins")) {
+	ev->peer = parse_id(cursor, "w");
+	if (skip_word(cursor, "joins")) {
 		ev->kind = EVENT_JOINED;
 		int n = 0;
-		if (sscanf(*at, "%31s threads=%u%n", fingerprint, &ev->join.threads, &n) != 2)
-			fail_msg("F threads=T is missing: %s", *at);
-		*at += n;
-		skip_word(at, " ");
+		if (sscanf(*cursor, "%31s threads=%u%n", fingerprint, &ev->join.threads, &n) != 2)
+			fail_msg("F threads=T is missing: %s", *cursor);
+		*cursor += n;
+		skip_word(cursor, " ");
 		snprintf(name, 32, "w%" PRIu64, ev->peer);
 		ev->join.peer = ev->peer;
 		ev->join.name = name;
 		ev->join.fingerprint = fingerprint;
-		take_identity(at, &ev->join);
+		parse_identity(cursor, &ev->join);
 		ev->peer = 0;
-	} else if (skip_word(at, "leaves")) {
+	} else if (skip_word(cursor, "leaves")) {
 		ev->kind = EVENT_LEFT;
-	} else if (skip_word(at, "heartbeat")) {
+	} else if (skip_word(cursor, "heartbeat")) {
 		ev->kind = EVENT_HEARTBEAT;
-	} else if (skip_word(at, "wants")) {
+	} else if (skip_word(cursor, "wants")) {
 		ev->kind = EVENT_REQUEST;
-		ev->want = (uint32_t)take_count(at);
+		ev->wanted_leases = (uint32_t)parse_count(cursor);
 	} else {
-		bool lacks = skip_word(at, "lacks"), lost = !lacks && skip_word(at, "denies"),
-		     late = !lacks && !lost && skip_word(at, "recalls"),
-		     later = !lacks && !lost && !late && skip_word(at, "postpones");
-		bool refuses = lost || late || (!lacks && !later && skip_word(at, "refuses"));
-		ev->kind = lacks || refuses || later   ? EVENT_LEASE_FAILED
-			   : skip_word(at, "batch")    ? EVENT_BATCH
-			   : skip_word(at, "stored")   ? EVENT_STORED
-			   : skip_word(at, "delivers") ? EVENT_DELIVERED
-			   : skip_word(at, "fails")    ? EVENT_LEASE_FAILED
-						       : EVENT_LEASE_RETURNED;
-		if (ev->kind == EVENT_LEASE_RETURNED && !skip_word(at, "returns"))
-			fail_msg("no such event: %s", *at);
-		ev->lease.key = take_key(at);
-		ev->lease.own = lacks || later;
-		ev->lease.later = later;
+		bool lacks = skip_word(cursor, "lacks"), lost = !lacks && skip_word(cursor, "denies"),
+		     late = !lacks && !lost && skip_word(cursor, "recalls"),
+		     later = !lacks && !lost && !late && skip_word(cursor, "postpones");
+		bool refuses = lost || late || (!lacks && !later && skip_word(cursor, "refuses"));
+		ev->kind = lacks || refuses || later	   ? EVENT_LEASE_FAILED
+			   : skip_word(cursor, "batch")	   ? EVENT_BATCH
+			   : skip_word(cursor, "stored")   ? EVENT_STORED_BATCH
+			   : skip_word(cursor, "delivers") ? EVENT_BATCH_DELIVERED
+			   : skip_word(cursor, "fails")	   ? EVENT_LEASE_FAILED
+							   : EVENT_LEASE_RETURNED;
+		if (ev->kind == EVENT_LEASE_RETURNED && !skip_word(cursor, "returns"))
+			fail_msg("no such event: %s", *cursor);
+		ev->lease.key = parse_key(cursor);
+		ev->lease.worker_at_fault = lacks || later;
+		ev->lease.memory_full = later;
 		ev->lease.bad_states = refuses;
-		ev->lease.can_take_back = refuses && !lost;
-		ev->lease.other_states = late;
-		ev->lease.valid = !skip_word(at, "bad");
-		if (skip_word(at, "says "))
-			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);
-		skip_word(at, " ");
+		ev->lease.can_roll_back = refuses && !lost;
+		ev->lease.states_outdated = late;
+		ev->lease.valid = !skip_word(cursor, "bad");
+		if (skip_word(cursor, "says "))
+			memset(&ev->lease.digest, *(*cursor)++, sizeof ev->lease.digest);
+		skip_word(cursor, " ");
 	}
 }
 
-/* Parses restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of
+/* Parses restore [is_requested] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of
  * submit]. */
-static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
-			 const struct forecast_history *looks, char owner[WORD])
+static void parse_restore(const char **cursor, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
+			  const struct forecast_history *history, char owner[WORD_BYTES])
 {
-	bool asked = skip_word(at, "asked");
-	struct event_restore r = {.job = take_id(at, "j"),
-				  .next = next,
+	bool is_requested = skip_word(cursor, "asked");
+	struct event_restore r = {.job = parse_id(cursor, "j"),
+				  .next_epochs = next,
 				  .fingerprint = fingerprint,
 				  .elapsed = NAN,
 				  .opened = NAN,
 				  .completed = NAN,
-				  .looks = looks};
-	r.kind = skip_word(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
-	if (r.kind == LEASE_RENDER && !skip_word(at, "render"))
-		fail_msg("boot or render is missing: %s", *at);
+				  .looks = history};
+	r.kind = skip_word(cursor, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
+	if (r.kind == LEASE_RENDER && !skip_word(cursor, "render"))
+		fail_msg("boot or render is missing: %s", *cursor);
 	fingerprint[0] = 0;
 	do
-		*next++ = take_count(at);
-	while (skip_word(at, ","));
-	if (skip_word(at, "fingerprint=")) {
+		*next++ = parse_count(cursor);
+	while (skip_word(cursor, ","));
+	if (skip_word(cursor, "fingerprint=")) {
 		int n = 0;
-		sscanf(*at, "%31s%n", fingerprint, &n);
-		*at += n;
-		skip_word(at, " ");
+		sscanf(*cursor, "%31s%n", fingerprint, &n);
+		*cursor += n;
+		skip_word(cursor, " ");
 	}
-	if (skip_word(at, "elapsed="))
-		r.elapsed = r.opened = take_number(at);
-	if (skip_word(at, "completed="))
-		r.completed = take_number(at);
-	r.black = skip_word(at, "black");
-	take_submit(at, ev, p, owner);
+	if (skip_word(cursor, "elapsed="))
+		r.elapsed = r.opened = parse_number(cursor);
+	if (skip_word(cursor, "completed="))
+		r.completed = parse_number(cursor);
+	r.black = skip_word(cursor, "black");
+	parse_submit(cursor, ev, p, owner);
 	r.submit = ev->submit;
 	ev->kind = EVENT_RESTORE;
-	if (!asked)
+	if (!is_requested)
 		ev->tag = 0;
 	ev->restore = r;
 }
 
-static void take_extend(const char **at, struct event *ev, struct plan *p, char owner[WORD])
+static void parse_extend(const char **cursor, struct event *ev, struct plan *p, char owner[WORD_BYTES])
 {
-	ev->job = take_id(at, "j");
-	take_submit(at, ev, p, owner);
+	ev->job = parse_id(cursor, "j");
+	parse_submit(cursor, ev, p, owner);
 	ev->kind = EVENT_EXTEND;
 	ev->plan = p;
 }
 
-static void take_job(const char **at, struct event *ev)
+static void parse_job(const char **cursor, struct event *ev)
 {
-	if (skip_word(at, "cancel")) {
+	if (skip_word(cursor, "cancel")) {
 		ev->kind = EVENT_CANCEL;
-		ev->job = take_id(at, "j");
-	} else if (skip_word(at, "prepared")) {
+		ev->job = parse_id(cursor, "j");
+	} else if (skip_word(cursor, "prepared")) {
 		ev->kind = EVENT_PREPARED;
-		ev->prepared.job = take_id(at, "j");
-		ev->prepared.black = skip_word(at, "black");
-		ev->prepared.ok = !skip_word(at, "bad");
-	} else if (skip_word(at, "error")) {
-		ev->kind = EVENT_ERROR_KNOWN;
-		ev->error_known.job = take_id(at, "j");
-		ev->error_known.rounds = take_count(at);
-		ev->error_known.black = skip_word(at, "black");
-		ev->error_known.rel_error = ev->error_known.black ? NAN : take_number(at);
-	} else if (skip_word(at, "image")) {
-		ev->kind = EVENT_IMAGE_KNOWN;
-		ev->image_known.job = take_id(at, "j");
-		ev->image_known.disagrees = skip_word(at, "disagrees");
-	} else if (skip_word(at, "hold") || skip_word(at, "release")) {
+		ev->prepared.job = parse_id(cursor, "j");
+		ev->prepared.black = skip_word(cursor, "black");
+		ev->prepared.ok = !skip_word(cursor, "bad");
+	} else if (skip_word(cursor, "error")) {
+		ev->kind = EVENT_ERROR_ESTIMATED;
+		ev->error_estimated.job = parse_id(cursor, "j");
+		ev->error_estimated.rounds = parse_count(cursor);
+		ev->error_estimated.black = skip_word(cursor, "black");
+		ev->error_estimated.rel_error = ev->error_estimated.black ? NAN : parse_number(cursor);
+	} else if (skip_word(cursor, "image")) {
+		ev->kind = EVENT_IMAGE_PUBLISHED;
+		ev->image_published.job = parse_id(cursor, "j");
+		ev->image_published.chains_disagree = skip_word(cursor, "disagrees");
+	} else if (skip_word(cursor, "hold") || skip_word(cursor, "release")) {
 		ev->kind = EVENT_HOLD;
 		ev->tag = 7;
-		ev->hold = skip_word(at, "order") ? HOLD_ORDERED : skip_word(at, "files") ? HOLD_FILES : HOLD_STORAGE;
-		ev->job = take_id(at, "j");
-	} else if (skip_word(at, "priority")) {
+		ev->hold = skip_word(cursor, "order")	? HOLD_BY_USER
+			   : skip_word(cursor, "files") ? HOLD_FILES
+							: HOLD_STORAGE;
+		ev->job = parse_id(cursor, "j");
+	} else if (skip_word(cursor, "priority")) {
 		ev->kind = EVENT_PRIORITY;
 		ev->tag = 7;
-		ev->job = take_id(at, "j");
-		ev->priority = (int)take_number(at);
-	} else if (skip_word(at, "quarantined")) { /* the letter of NAME, as for `joins` */
+		ev->job = parse_id(cursor, "j");
+		ev->priority = (int)parse_number(cursor);
+	} else if (skip_word(cursor, "quarantined")) { /* the letter of NAME, as for `joins` */
 		ev->kind = EVENT_QUARANTINED;
-		take_identity(at, &ev->join);
-	} else if (skip_word(at, "broken")) {
+		parse_identity(cursor, &ev->join);
+	} else if (skip_word(cursor, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
-		ev->job = take_id(at, "j");
-	} else if (!skip_word(at, "tick")) {
-		fail_msg("no such event: %s", *at);
+		ev->job = parse_id(cursor, "j");
+	} else if (!skip_word(cursor, "tick")) {
+		fail_msg("no such event: %s", *cursor);
 	}
 }
 
-static double last_wake;
+static double last_wake_time;
 
 static bool play_wake(const char *line, const char *expected)
 {
 	char text[32];
-	snprintf(text, sizeof text, "%g", last_wake);
+	snprintf(text, sizeof text, "%g", last_wake_time);
 	if (strcmp(text, expected) == 0)
 		return true;
 	print_error("%s\n        but it is %s\n", line, text);
@@ -392,43 +394,43 @@ static bool play_wake(const char *line, const char *expected)
 
 static bool play_line(struct farm *f, const char *line)
 {
-	const char *at = line, *arrow = strstr(line, "-> ");
-	char name[32], fingerprint[32], owner[WORD], text[256];
+	const char *cursor = line, *arrow = strstr(line, "-> ");
+	char name[32], fingerprint[32], owner[WORD_BYTES], text[256];
 	struct plan plan;
 	uint64_t next[64];
-	struct forecast_history looks = {.count = 0};
+	struct forecast_history history = {.count = 0};
 	struct event ev = {.kind = EVENT_TICK};
-	if (!arrow || !skip_word(&at, "["))
+	if (!arrow || !skip_word(&cursor, "["))
 		fail_msg("not a line of a transcript: %s", line);
-	ev.time = take_number(&at);
-	skip_word(&at, "]");
-	if (skip_word(&at, "unread="))
-		ev.unread = take_number(&at);
-	if (skip_word(&at, "wake"))
+	ev.time = parse_number(&cursor);
+	skip_word(&cursor, "]");
+	if (skip_word(&cursor, "unread="))
+		ev.unread_seconds = parse_number(&cursor);
+	if (skip_word(&cursor, "wake"))
 		return play_wake(line, arrow + 3);
-	if (*at == 'w')
-		take_worker(&at, &ev, name, fingerprint);
-	else if (skip_word(&at, "submit"))
-		take_submit(&at, &ev, &plan, owner);
-	else if (skip_word(&at, "extend"))
-		take_extend(&at, &ev, &plan, owner);
-	else if (skip_word(&at, "restore"))
-		take_restore(&at, &ev, &plan, fingerprint, next, &looks, owner);
+	if (*cursor == 'w')
+		parse_worker(&cursor, &ev, name, fingerprint);
+	else if (skip_word(&cursor, "submit"))
+		parse_submit(&cursor, &ev, &plan, owner);
+	else if (skip_word(&cursor, "extend"))
+		parse_extend(&cursor, &ev, &plan, owner);
+	else if (skip_word(&cursor, "restore"))
+		parse_restore(&cursor, &ev, &plan, fingerprint, next, &history, owner);
 	else
-		take_job(&at, &ev);
-	snprintf(text, sizeof text, "%.*s", at < arrow ? (int)(arrow - at) - 1 : 0, at);
+		parse_job(&cursor, &ev);
+	snprintf(text, sizeof text, "%.*s", cursor < arrow ? (int)(arrow - cursor) - 1 : 0, cursor);
 	ev.text = text;
 
 	struct update u;
 	farm_step(f, &ev, &u);
-	last_wake = u.wake;
-	struct said s = {.used = 0};
+	last_wake_time = u.wake_time;
+	struct answer_text s = {.used = 0};
 	for (size_t i = 0; i < u.count; i++) {
-		say(&s, "%s", i ? ", " : "");
-		say_action(&s, &u.actions[i]);
+		append_words(&s, "%s", i ? ", " : "");
+		append_action(&s, &u.actions[i]);
 	}
 	if (u.count == 0)
-		say(&s, "-");
+		append_words(&s, "-");
 	if (strcmp(s.text, arrow + 3) == 0)
 		return true;
 	print_error("\"%.*s%s\",\n", (int)(arrow + 3 - line), line, s.text);
@@ -436,7 +438,7 @@ static bool play_line(struct farm *f, const char *line)
 	return false;
 }
 
-struct farm *transcript_farm(void)
+struct farm *transcript_farm_new(void)
 {
 	struct farm_config c;
 	struct farm *f = NULL;
@@ -448,32 +450,32 @@ struct farm *transcript_farm(void)
 
 /* Returns whether a job that is active but has no leases, or is held, states what it waits for, to its owner as
  * well. */
-static bool says_why(const struct farm *f, const char *line)
+static bool is_waiting_explained(const struct farm *f, const char *line)
 {
 	enum { JOBS = 64 };
-	bool all = true;
+	bool is_explained = true;
 	for (uint64_t id = 1; id <= JOBS; id++) {
 		struct job_status s;
-		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases && s.state != JOB_HELD) ||
+		if (!farm_job_status(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases && s.state != JOB_HELD) ||
 		    (*s.waiting && *s.owners_waiting))
 			continue;
 		print_error("\"%s\": j%llu waits and does not say for what\n", line, (unsigned long long)id);
-		all = false;
+		is_explained = false;
 	}
-	return all;
+	return is_explained;
 }
 
 void transcript_play(struct farm *f, const char *const *lines)
 {
-	int wrong = 0;
+	int failures = 0;
 	for (; *lines; lines++)
-		wrong += !play_line(f, *lines) + !says_why(f, *lines);
-	assert_int_equal(wrong, 0);
+		failures += !play_line(f, *lines) + !is_waiting_explained(f, *lines);
+	assert_int_equal(failures, 0);
 }
 
-void transcript(const char *const *lines)
+void transcript_check(const char *const *lines)
 {
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, lines);
 	farm_free(f);
 }

@@ -45,14 +45,14 @@
 
 #include "coordinator/core/farm.h"
 
-struct farm *transcript_farm(void);				/* default configuration */
+struct farm *transcript_farm_new(void);				/* default configuration */
 void transcript_play(struct farm *f, const char *const *lines); /* lines ends with NULL */
 /* Plays the lines on a new farm, which is freed at the end. */
-void transcript(const char *const *lines);
+void transcript_check(const char *const *lines);
 
 /* clang-format off */
 /* Two workers, and a job whose bootstrap is done: each worker has a lease of its first round. */
-#define START_TWO                                                                      \
+#define TRANSCRIPT_START_TWO                                                                      \
 	"[0] submit -> j1 submitted, j1 is queued",                                    \
 	"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -",              \
 	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                    \

@@ -4,24 +4,24 @@
 #include <assert.h>
 #include <string.h>
 
-void vol_put32(struct vol *v, size_t at, uint32_t word)
+void vol_put32(struct vol *v, size_t offset, uint32_t word)
 {
 	for (int i = 0; i < 4; i++)
-		v->bytes[at + (size_t)i] = (unsigned char)(word >> 8 * i);
+		v->bytes[offset + (size_t)i] = (unsigned char)(word >> 8 * i);
 }
 
-static void put_float(struct vol *v, size_t at, float x)
+static void store_float(struct vol *v, size_t offset, float x)
 {
 	uint32_t bits;
 	memcpy(&bits, &x, sizeof bits);
-	vol_put32(v, at, bits);
+	vol_put32(v, offset, bits);
 }
 
 void vol_set_box(struct vol *v, const float low[3], const float high[3])
 {
 	for (size_t i = 0; i < 3; i++) {
-		put_float(v, 24 + 4 * i, low[i]);
-		put_float(v, 36 + 4 * i, high[i]);
+		store_float(v, 24 + 4 * i, low[i]);
+		store_float(v, 36 + 4 * i, high[i]);
 	}
 }
 
@@ -36,11 +36,11 @@ void vol_write(struct vol *v)
 	vol_put32(v, 20, v->channels);
 	vol_set_box(v, zero, one);
 	for (size_t i = 0; i < count; i++)
-		put_float(v, VOL_HEAD + 4 * i, v->value[i]);
-	v->size = VOL_HEAD + 4 * count;
+		store_float(v, VOL_HEADER_BYTES + 4 * i, v->value[i]);
+	v->size = VOL_HEADER_BYTES + 4 * count;
 }
 
-static double share_of_side(uint32_t i, uint32_t side)
+static double grid_coordinate(uint32_t i, uint32_t side)
 {
 	return side > 1 ? i / (side - 1.0) : 0;
 }
@@ -55,7 +55,8 @@ void vol_make(struct vol *v, const uint32_t side[3], uint32_t channels, vol_fiel
 		for (uint32_t j = 0; j < side[1]; j++)
 			for (uint32_t i = 0; i < side[0]; i++)
 				for (uint32_t c = 0; c < channels; c++)
-					v->value[at++] = (float)f(share_of_side(i, side[0]), share_of_side(j, side[1]),
-								  share_of_side(k, side[2]), c);
+					v->value[at++] =
+						(float)f(grid_coordinate(i, side[0]), grid_coordinate(j, side[1]),
+							 grid_coordinate(k, side[2]), c);
 	vol_write(v);
 }

@@ -6,10 +6,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { VOL_HEAD = 48, VOL_VALUES_MAX = 24 * 24 * 24 };
+enum { VOL_HEADER_BYTES = 48, VOL_VALUES_MAX = 24 * 24 * 24 };
 
 struct vol {
-	unsigned char bytes[VOL_HEAD + 4 * VOL_VALUES_MAX];
+	unsigned char bytes[VOL_HEADER_BYTES + 4 * VOL_VALUES_MAX];
 	size_t size;
 	uint32_t side[3], channels;
 	float value[VOL_VALUES_MAX];
@@ -23,6 +23,6 @@ void vol_make(struct vol *v, const uint32_t side[3], uint32_t channels, vol_fiel
 /* Writes the current values into the bytes. */
 void vol_write(struct vol *v);
 void vol_set_box(struct vol *v, const float low[3], const float high[3]);
-void vol_put32(struct vol *v, size_t at, uint32_t word);
+void vol_put32(struct vol *v, size_t offset, uint32_t word);
 
 #endif

@@ -14,7 +14,7 @@
 
 const char *worlds_accuracy, *worlds_effects;
 
-static struct render_options options(uint32_t width, uint32_t height)
+static struct render_options make_options(uint32_t width, uint32_t height)
 {
 	struct render_options o = {.width = width, .height = height};
 	snprintf(o.accuracy, sizeof o.accuracy, "%s", worlds_accuracy ? worlds_accuracy : "");
@@ -22,16 +22,16 @@ static struct render_options options(uint32_t width, uint32_t height)
 	return o;
 }
 
-static struct world *build(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
+static struct world *build_world(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
 {
 	struct error e = {""};
 	struct scene s;
 	struct world *w = NULL;
-	struct render_options o = options(width, height);
+	struct render_options o = make_options(width, height);
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
 		/* Scenes of tests need not care which way their surfaces face, unless they set `backs`. */
-		s.black_backs &= strstr(o.accuracy, "backs=") != NULL;
+		s.has_black_backs &= strstr(o.accuracy, "backs=") != NULL;
 		rc = world_new(&w, &s, assets, &o, &e);
 		scene_fini(&s);
 	}
@@ -40,7 +40,7 @@ static struct world *build(const struct asset_source *assets, const char *name, 
 	return w;
 }
 
-struct world *world_of_text(uint32_t width, uint32_t height, const char *format, ...)
+struct world *world_from_text(uint32_t width, uint32_t height, const char *format, ...)
 {
 	static char body[1 << 16], text[sizeof body + 64];
 	va_list ap;
@@ -51,10 +51,10 @@ struct world *world_of_text(uint32_t width, uint32_t height, const char *format,
 	int m = snprintf(text, sizeof text, "<scene version='3.0.0'>%s</scene>", body);
 	const struct memory_file files[] = {{"test.xml", text, (size_t)m}, {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
-	return build(&assets, "test.xml", width, height);
+	return build_world(&assets, "test.xml", width, height);
 }
 
-void world_of_files_refused(const struct memory_file *files, const char *sentence)
+void world_check_files_refused(const struct memory_file *files, const char *sentence)
 {
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -62,7 +62,7 @@ void world_of_files_refused(const struct memory_file *files, const char *sentenc
 	struct error e = {""};
 	int rc = scene_read(&s, &assets, files[0].name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
-		struct render_options o = options(0, 0);
+		struct render_options o = make_options(0, 0);
 		rc = world_new(&w, &s, &assets, &o, &e);
 		scene_fini(&s);
 	}
@@ -71,37 +71,38 @@ void world_of_files_refused(const struct memory_file *files, const char *sentenc
 			 sentence);
 }
 
-void world_refused(const char *body, const char *sentence)
+void world_check_refused(const char *body, const char *sentence)
 {
 	static char xml[2048];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", body);
 	assert_true(n > 0 && (size_t)n < sizeof xml);
-	world_of_files_refused((const struct memory_file[]){{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}}, sentence);
+	world_check_files_refused((const struct memory_file[]){{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}}, sentence);
 }
 
-struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files)
+struct world *world_from_files(uint32_t width, uint32_t height, const struct memory_file *files)
 {
 	struct asset_source assets = memory_assets(files);
-	return build(&assets, files[0].name, width, height);
+	return build_world(&assets, files[0].name, width, height);
 }
 
-static struct world *build_in(const char *base, const char *folder, const char *file, uint32_t width, uint32_t height)
+static struct world *build_from_folder(const char *base, const char *folder, const char *file, uint32_t width,
+				       uint32_t height)
 {
 	char path[4096];
 	snprintf(path, sizeof path, "%s/%s", base, folder);
-	struct asset_source assets = asset_folder(path);
-	return build(&assets, file, width, height);
+	struct asset_source assets = asset_source_for_folder(path);
+	return build_world(&assets, file, width, height);
 }
 
-struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
+struct world *world_from_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
 {
 	const char *scenes = getenv("HSLT_SCENES");
 	if (!scenes)
 		return NULL;
-	return build_in(scenes, folder, file, width, height);
+	return build_from_folder(scenes, folder, file, width, height);
 }
 
-struct world *world_of_own_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
+struct world *world_from_own_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
 {
-	return build_in("tests/scenes", folder, file, width, height);
+	return build_from_folder("tests/scenes", folder, file, width, height);
 }

@@ -7,9 +7,9 @@
  *
  * A lease that makes no progress is returned as failed; if building a scene makes no progress, all leases that wait for
  * that scene are. A thread cannot be killed, so the worker then leaves as on SIGTERM, and the program exits with
- * AGENT_HUNG. A leaving worker does not wait for scenes being built. The worker runs in a process that a signal may end
- * at any time (supervise.h); the leases of the previous process are returned as failed as soon as the next one is
- * connected (work.h).
+ * AGENT_EXIT_HUNG. A leaving worker does not wait for scenes being built. The worker runs in a process that a signal
+ * may end at any time (supervise.h); the leases of the previous process are returned as failed as soon as the next one
+ * is connected (work.h).
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H
@@ -17,8 +17,8 @@
 #include "common/base/error.h"
 #include "worker/daemon/config.h"
 
-enum { AGENT_HUNG = 75 };   /* exit code after a thread hung: the worker should be restarted */
-enum { AGENT_REFUSED = 6 }; /* exit code after -EACCES */
+enum { AGENT_EXIT_HUNG = 75 };	 /* exit code after a thread hung: the worker should be restarted */
+enum { AGENT_EXIT_REFUSED = 6 }; /* exit code after -EACCES */
 
 /* Runs a worker until it has left; if a thread is still working then, exits the program instead of returning. Returns
  * 0; -EINVAL, -EPERM or -EHOSTUNREACH at once for an unusable address; -EACCES if the coordinator refuses the worker
@@ -30,6 +30,6 @@ struct agent;
 int agent_open(struct agent **a, const struct agent_config *c, struct error *e);
 void agent_close(struct agent *a); /* leaves at once, if it has not left; waits for the threads */
 /* Leaves, if the worker is leaving and nothing is left to do. */
-void agent_settle(struct agent *a);
+void agent_leave_if_idle(struct agent *a);
 
 #endif

@@ -10,14 +10,14 @@
 #include "worker/daemon/lease_task.h"
 #include "worker/render/fingerprint.h"
 
-enum { WORLDS_KEPT = 2 /* number of scenes kept in memory for jobs without leases here */ };
+enum { IDLE_WORLDS_MAX = 2 /* number of scenes kept in memory for jobs without leases here */ };
 
 /* The job whose scene may be in memory while only one scene may (scenes_kept_admit). Times are of clock_seconds. */
 struct scene_turn {
 	uint64_t job;
-	bool waits;   /* another job waits for its turn */
-	double since; /* since when another job has waited */
-	double asked; /* when a lease of another job was last refused */
+	bool has_waiter;	/* another job waits for its turn */
+	double waiting_since;	/* since when another job has waited */
+	double last_refused_at; /* when a lease of another job was last refused */
 };
 
 struct fetch;
@@ -25,32 +25,32 @@ struct fetch;
 struct agent {
 	struct agent_config config;
 	uv_loop_t loop;
-	uv_timer_t retry, heartbeat, grace, pulse, watch;
-	uv_signal_t on_term, on_int;
-	uv_getaddrinfo_t resolving;
-	bool resolves;	   /* the coordinator's name is being looked up */
-	unsigned attempt;  /* number of connection attempts; selects one of the name's addresses in turn */
-	struct tls *tls;   /* NULL: plaintext */
-	struct conn *conn; /* NULL: not connected */
-	bool welcome;	   /* the coordinator has accepted Hello */
-	double back_off;   /* pause before the next attempt, s */
+	uv_timer_t retry_timer, heartbeat_timer, grace_timer, pulse_timer, hang_timer;
+	uv_signal_t sigterm_handle, sigint_handle;
+	uv_getaddrinfo_t resolve_request;
+	bool is_resolving;	/* the coordinator's name is being looked up */
+	unsigned attempt_count; /* number of connection attempts; selects one of the name's addresses in turn */
+	struct tls *tls;	/* NULL: plaintext */
+	struct conn *conn;	/* NULL: not connected */
+	bool is_accepted;	/* the coordinator has accepted Hello */
+	double backoff_seconds; /* pause before the next attempt, s */
 	char fingerprint[FINGERPRINT_MAX];
 	struct cache cache;
 	struct thread_pool *thread_pool;
 	struct job_cache *job_caches;
 	struct fetch *fetches;
 	struct lease_task *leases;
-	struct scene_turn turn;
-	uint64_t clock;			/* counter of uses of job_caches */
-	bool backlog;			/* too many results wait to be acknowledged: no leases are requested */
-	uint64_t busy_at;		/* ms of the loop's clock: when the worker last had a lease */
-	bool watched;			/* the service manager expects notifications */
-	bool leaving;			/* no more leases are accepted */
-	bool gone;			/* Bye has been sent, and the handles are being closed */
-	bool refused;			/* the coordinator refuses this worker permanently */
-	char why[256];			/* the coordinator's reason */
-	bool hung;			/* a thread of the pool hangs */
-	void (*settle)(struct agent *); /* agent_settle; called after each change of the leases */
+	struct scene_turn scene_turn;
+	uint64_t use_counter;		       /* counter of uses of job_caches */
+	bool has_backlog;		       /* too many results wait to be acknowledged: no leases are requested */
+	uint64_t last_busy_ms;		       /* ms of the loop's clock: when the worker last had a lease */
+	bool has_watchdog;		       /* the service manager expects notifications */
+	bool is_leaving;		       /* no more leases are accepted */
+	bool has_left;			       /* Bye has been sent, and the handles are being closed */
+	bool is_refused;		       /* the coordinator refuses this worker permanently */
+	char refusal[256];		       /* the coordinator's reason */
+	bool has_hung_thread;		       /* a thread of the pool hangs */
+	void (*leave_if_idle)(struct agent *); /* agent_leave_if_idle; called after each change of the leases */
 };
 
 #endif

@@ -18,28 +18,28 @@ static int make_folders(char *path, struct error *e)
 	for (char *p = path + 1;; p++) {
 		if (*p && *p != '/')
 			continue;
-		char keep = *p;
+		char saved = *p;
 		*p = 0;
 		if (mkdir(path, 0700) && errno != EEXIST)
 			return error_set(e, errno, "%s: %s", path, strerror(errno));
-		*p = keep;
-		if (!keep)
+		*p = saved;
+		if (!saved)
 			return 0;
 	}
 }
 
 /* Refuses a folder of another user, or one that others can write to: they could choose what this worker renders. The
- * parent folder (or_root) may be root's. */
-static int check_owner(const char *path, bool or_root, struct error *e)
+ * parent folder (allow_root) may be root's. */
+static int check_owner(const char *path, bool allow_root, struct error *e)
 {
 	struct stat st;
 	if (stat(path, &st))
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	bool ours = st.st_uid == geteuid();
-	if (!ours && !(or_root && st.st_uid == 0))
+	bool is_ours = st.st_uid == geteuid();
+	if (!is_ours && !(allow_root && st.st_uid == 0))
 		return error_set(e, EPERM,
 				 "%s belongs to another user: its contents cannot be trusted (use --cache DIR)", path);
-	if (ours && (st.st_mode & S_IWOTH) && !(or_root && (st.st_mode & S_ISVTX)))
+	if (is_ours && (st.st_mode & S_IWOTH) && !(allow_root && (st.st_mode & S_ISVTX)))
 		return error_set(e, EPERM,
 				 "%s is writable for everybody: its contents cannot be trusted (use --cache DIR)",
 				 path);
@@ -53,7 +53,7 @@ static int make_slot(const char *path, struct error *e)
 	return check_owner(path, false, e);
 }
 
-static int base_folder(const char *folder, char path[PATH_BYTES], struct error *e)
+static int make_base_folder(const char *folder, char path[PATH_BYTES], struct error *e)
 {
 	const char *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
 	int n;
@@ -72,12 +72,12 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 }
 
 /* Counts this start of the slot. A failure is only logged, since the worker can work without a counted identity. */
-static void begin_life(struct cache *c, const char *base, int slot)
+static void count_start(struct cache *c, const char *base, int slot)
 {
 	char name[32];
 	struct error e;
 	snprintf(name, sizeof name, "slot-%d.life", slot);
-	if (worker_identity_begin(&c->identity, base, name, &e))
+	if (worker_identity_count_start(&c->identity, base, name, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
@@ -105,19 +105,19 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 {
 	char base[PATH_BYTES], path[PATH_BYTES + 32];
 	c->blobs = NULL;
-	c->lock = -1;
+	c->lock_fd = -1;
 	c->folder = folder;
-	int rc = base_folder(folder, base, e);
+	int rc = make_base_folder(folder, base, e);
 	if (rc)
 		return rc;
 	for (c->slot = 0; c->slot < SLOTS; c->slot++) {
-		rc = lock_slot(base, c->slot, &c->lock, e);
+		rc = lock_slot(base, c->slot, &c->lock_fd, e);
 		if (rc == -EWOULDBLOCK)
 			continue;
 		if (rc)
 			return rc;
 		slot_path(base, c->slot, path);
-		begin_life(c, base, c->slot);
+		count_start(c, base, c->slot);
 		rc = make_slot(path, e);
 		if (!rc)
 			rc = blob_store_open(&c->blobs, path, limit, e);
@@ -133,23 +133,23 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 	return error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);
 }
 
-int cache_mend(struct cache *c, struct error *e)
+int cache_restore_folder(struct cache *c, struct error *e)
 {
 	char base[PATH_BYTES], path[PATH_BYTES + 32];
 	struct stat st;
 	int lock;
-	int rc = base_folder(c->folder, base, e);
+	int rc = make_base_folder(c->folder, base, e);
 	if (rc)
 		return rc;
 	slot_path(base, c->slot, path);
 	if (stat(path, &st) == 0 || errno != ENOENT)
 		return 0;
-	if (fstat(c->lock, &st) == 0 && st.st_nlink == 0) { /* the lock's file has been removed, too */
+	if (fstat(c->lock_fd, &st) == 0 && st.st_nlink == 0) { /* the lock's file has been removed, too */
 		rc = lock_slot(base, c->slot, &lock, e);
 		if (rc)
 			return rc;
-		close(c->lock);
-		c->lock = lock;
+		close(c->lock_fd);
+		c->lock_fd = lock;
 	}
 	log_event(LOG_SPOOL_FAULT, "path=%s text=\"the cache was removed: it is made anew\"", log_quote(path).text);
 	return make_slot(path, e);
@@ -158,8 +158,8 @@ int cache_mend(struct cache *c, struct error *e)
 void cache_close(struct cache *c)
 {
 	blob_store_close(c->blobs);
-	if (c->lock >= 0)
-		close(c->lock);
+	if (c->lock_fd >= 0)
+		close(c->lock_fd);
 	c->blobs = NULL;
-	c->lock = -1;
+	c->lock_fd = -1;
 }

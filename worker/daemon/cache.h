@@ -12,7 +12,7 @@
 struct cache {
 	struct blob_store *blobs;
 	const char *folder;		 /* as given to cache_open; not copied */
-	int slot, lock;			 /* number of the slot; descriptor of its locked file */
+	int slot, lock_fd;		 /* number of the slot; descriptor of its locked file */
 	struct worker_identity identity; /* of the slot */
 };
 
@@ -22,7 +22,7 @@ struct cache {
 int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e);
 /* Makes the slot's folder again if it has been removed, which users may do with ~/.cache at any time. Call before a
  * file is stored. */
-int cache_mend(struct cache *c, struct error *e);
+int cache_restore_folder(struct cache *c, struct error *e);
 void cache_close(struct cache *c);
 
 #endif

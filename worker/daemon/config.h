@@ -7,10 +7,10 @@
 #include <stdint.h>
 
 struct agent_config {
-	const char *coordinator, *name;
-	const char *tls;   /* a folder (common/net/tls.h); NULL or "": plaintext */
-	const char *cache; /* NULL: the user's cache folder */
-	uint64_t cache_bytes;
+	const char *coordinator_address, *name;
+	const char *tls_folder;	  /* a folder (common/net/tls.h); NULL or "": plaintext */
+	const char *cache_folder; /* NULL: the user's cache folder */
+	uint64_t max_cache_bytes;
 	unsigned threads;
 	double grace_seconds;
 	double idle_seconds;  /* the worker exits after this time without a lease; 0: never */

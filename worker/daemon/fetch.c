@@ -8,24 +8,24 @@
 
 static uint64_t fetch_offset(const struct fetch *f)
 {
-	return f->writer ? blob_write_at(f->writer) : 0;
+	return f->writer ? blob_write_offset(f->writer) : 0;
 }
 
-static void request_piece(struct agent *a, struct fetch *f)
+static void request_chunk(struct agent *a, struct fetch *f)
 {
-	f->asked = true;
+	f->is_requested = true;
 	send_message(a,
 		     ENVELOPE(BLOB_GET, blob_get, .hash = {BLOB_HASH_SIZE, f->hash.bytes}, .offset = fetch_offset(f)));
 }
 
-int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)
+int fetch_request(struct agent *a, const struct blob_hash *h, struct error *e)
 {
 	struct fetch *f = a->fetches;
 	unsigned count = 0;
 	for (; f && !blob_hash_equal(&f->hash, h); f = f->next)
 		count++;
 	if (!f) {
-		if (count == FETCHES_MOST)
+		if (count == CONCURRENT_FETCHES_MAX)
 			return error_set(e, ENOBUFS, "%u chunks of files were requested, and none was received", count);
 		f = mem_alloc(1, sizeof *f);
 		if (!f)
@@ -34,34 +34,34 @@ int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)
 		f->next = a->fetches;
 		a->fetches = f;
 	}
-	if (!f->asked)
-		request_piece(a, f);
+	if (!f->is_requested)
+		request_chunk(a, f);
 	return 0;
 }
 
-struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
+struct fetch *fetch_match_chunk(struct agent *a, const Farm__BlobChunk *c)
 {
 	if (c->hash.len != BLOB_HASH_SIZE)
 		return NULL;
 	for (struct fetch *f = a->fetches; f; f = f->next) {
 		if (memcmp(c->hash.data, f->hash.bytes, BLOB_HASH_SIZE) != 0)
 			continue;
-		if (!f->asked || c->offset != fetch_offset(f))
+		if (!f->is_requested || c->offset != fetch_offset(f))
 			return NULL;
-		f->asked = false;
+		f->is_requested = false;
 		return f;
 	}
 	return NULL;
 }
 
 /* Files beyond the limit and wrong bytes are failures of the fetch; any other error is one of this machine's disk. */
-static enum fetch_end failed(int rc)
+static enum fetch_outcome failure_outcome(int rc)
 {
-	return rc == -EFBIG || rc == -EMSGSIZE || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;
+	return rc == -EFBIG || rc == -EMSGSIZE || rc == -EBADMSG ? FETCH_FAILED : FETCH_NOT_STORED;
 }
 
-enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload,
-			 size_t size, struct error *e)
+enum fetch_outcome fetch_store_chunk(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c,
+				     const unsigned char *payload, size_t size, struct error *e)
 {
 	int rc = 0;
 	if (*c->error || (size == 0 && c->offset < c->size)) {
@@ -72,14 +72,14 @@ enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__Blob
 	if (!f->writer)
 		rc = blob_write_begin(&f->writer, s, &f->hash, c->size, e);
 	if (!rc)
-		rc = blob_write_add(f->writer, payload, size, e);
+		rc = blob_write_append(f->writer, payload, size, e);
 	if (rc)
-		return failed(rc);
+		return failure_outcome(rc);
 	if (fetch_offset(f) < c->size)
 		return FETCH_MORE;
 	rc = blob_write_commit(f->writer, e);
 	f->writer = NULL;
-	return rc ? failed(rc) : FETCH_WHOLE;
+	return rc ? failure_outcome(rc) : FETCH_COMPLETE;
 }
 
 void fetch_drop(struct agent *a, struct fetch *f)
@@ -93,8 +93,8 @@ void fetch_drop(struct agent *a, struct fetch *f)
 	mem_free(f);
 }
 
-void fetch_reconnected(struct agent *a)
+void fetch_reset_requests(struct agent *a)
 {
 	for (struct fetch *f = a->fetches; f; f = f->next)
-		f->asked = false;
+		f->is_requested = false;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Threads count ticks while they work (task.ticks). Each look compares the ticks of every lease and scene in work with
- * those of the last look; after STALL_LOOKS looks without a difference the thread counts as hung, and its lease fails,
+ * those of the last look; after STALL_CHECKS looks without a difference the thread counts as hung, and its lease fails,
  * or all leases that wait for its scene do. The thread itself cannot be ended: agent.c lets the other threads finish,
  * and the worker exits.
  */
@@ -13,47 +13,47 @@
 #include <stdio.h>
 
 /* Looks are counted, not seconds, so that a worker that was stopped as a whole (SIGSTOP) does not count as hung. */
-static bool has_hung(struct task *t)
+static bool detect_hang(struct task *t)
 {
 	unsigned long long now = atomic_load(&t->ticks);
-	t->still = now && now == t->seen ? t->still + 1 : 0;
-	t->seen = now;
-	return t->still >= STALL_LOOKS;
+	t->stalled_checks = now && now == t->last_ticks ? t->stalled_checks + 1 : 0;
+	t->last_ticks = now;
+	return t->stalled_checks >= STALL_CHECKS;
 }
 
-static bool watch_leases(struct agent *a)
+static bool fail_hung_leases(struct agent *a)
 {
 	char text[128];
 	bool found = false;
 	snprintf(text, sizeof text, "no progress for %g s: its thread hangs", a->config.stall_seconds);
 	for (struct lease_task *l = a->leases; l; l = l->next) {
-		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
+		if (l->state != LEASE_QUEUED || l->task.is_hung || !detect_hang(&l->task))
 			continue;
-		if (!l->unwanted)
-			send_failed(a, &l->grant.key, text, false);
-		l->unwanted = l->task.hung = found = true;
-		atomic_store(&l->stop, true);
+		if (!l->is_unwanted)
+			send_lease_failed(a, &l->grant.key, text, false);
+		l->is_unwanted = l->task.is_hung = found = true;
+		atomic_store(&l->stop_requested, true);
 	}
 	return found;
 }
 
-static bool watch_builds(struct agent *a)
+static bool fail_hung_builds(struct agent *a)
 {
 	bool found = false;
 	for (struct job_cache *b = a->job_caches; b; b = b->next) {
 		struct error e;
-		if (b->state != JOB_CACHE_BUILDING || b->task.hung || !has_hung(&b->task))
+		if (b->state != JOB_CACHE_BUILDING || b->task.is_hung || !detect_hang(&b->task))
 			continue;
 		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs",
 			  a->config.stall_seconds);
 		lease_list_fail(a, b, &e);
-		b->task.hung = found = true;
+		b->task.is_hung = found = true;
 	}
 	return found;
 }
 
-bool hang_watch_look(struct agent *a)
+bool hang_watch_check(struct agent *a)
 {
-	bool lease = watch_leases(a);
-	return watch_builds(a) || lease;
+	bool lease = fail_hung_leases(a);
+	return fail_hung_builds(a) || lease;
 }

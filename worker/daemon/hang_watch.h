@@ -5,8 +5,8 @@
 
 #include "worker/daemon/agent_state.h"
 
-enum { STALL_LOOKS = 8 }; /* looks without progress until a thread counts as hung */
+enum { STALL_CHECKS = 8 }; /* looks without progress until a thread counts as hung */
 /* Looks at all threads; to be called at regular intervals. Returns true if another thread hangs. */
-bool hang_watch_look(struct agent *a);
+bool hang_watch_check(struct agent *a);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job arrives as JobInfo (job_cache_set_info). job_cache_look checks which of its files are in the cache and
+ * A job arrives as JobInfo (job_cache_set_info). job_cache_check_files checks which of its files are in the cache and
  * undamaged; the caller fetches the others. Once all are there, a thread of the pool reads the scene from the cached
  * files and builds the world (job_cache_build). Film, integrator, settings and mixture as this worker reads them are
  * compared with the plan before any lease runs.
@@ -30,7 +30,7 @@ enum {
 	CHECKED_SECONDS = 60 /* a file that was verified within this time is not read again */
 };
 
-static const Farm__JobInfo *info_of(const struct job_cache *b)
+static const Farm__JobInfo *get_info(const struct job_cache *b)
 {
 	return b->info.message->job_info;
 }
@@ -57,16 +57,16 @@ int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs
 void job_cache_free(struct job_cache *b)
 {
 	assert(b->state != JOB_CACHE_BUILDING && !b->reading.check);
-	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
-		struct blob_hash h = file_hash_from_wire(info_of(b)->files[i]);
-		if (b->held[i])
+	for (size_t i = 0; b->info.message && b->is_held && i < get_info(b)->n_files; i++) {
+		struct blob_hash h = file_hash_from_wire(get_info(b)->files[i]);
+		if (b->is_held[i])
 			blob_release(b->blobs, &h);
 		if (b->paths)
 			mem_free(b->paths[i]);
 	}
-	mem_free(b->held);
+	mem_free(b->is_held);
 	mem_free(b->paths);
-	render_map_free(b->map);
+	render_brightness_map_free(b->brightness_map);
 	if (b->world)
 		world_free(b->world);
 	envelope_fini(&b->info);
@@ -75,9 +75,10 @@ void job_cache_free(struct job_cache *b)
 
 static int check_info(const Farm__JobInfo *m, struct error *e)
 {
-	bool ok = envelope_text_ok(m->name, 1024) && envelope_text_ok(m->scene, 1024) && m->n_defines <= DEFINES_MAX;
+	bool ok = envelope_text_is_valid(m->name, 1024) && envelope_text_is_valid(m->scene, 1024) &&
+		  m->n_defines <= DEFINES_MAX;
 	for (size_t i = 0; ok && i < m->n_files; i++)
-		ok = envelope_text_ok(m->files[i]->name, 1024) && m->files[i]->hash.len == BLOB_HASH_SIZE;
+		ok = envelope_text_is_valid(m->files[i]->name, 1024) && m->files[i]->hash.len == BLOB_HASH_SIZE;
 	return ok ? 0 : error_set(e, EBADMSG, "the coordinator's description of the job is invalid");
 }
 
@@ -97,7 +98,7 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
 	b->plan.rounds = UINT64_MAX; /* the bound may be changed while the job runs, and no lease depends on it */
-	b->held = held;
+	b->is_held = held;
 	b->paths = paths;
 	b->info = *info;
 	memset(info, 0, sizeof *info);
@@ -120,82 +121,83 @@ static unsigned char *pack_unbounded(const Farm__JobInfo *m, size_t *size)
 	return bytes;
 }
 
-bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info)
+bool job_cache_matches(const struct job_cache *b, const Farm__JobInfo *info)
 {
-	size_t known_size, size;
+	size_t expected_size, size;
 	if (!b->info.message)
 		return true;
 	if (!info->plan)
 		return false;
-	unsigned char *known = pack_unbounded(info_of(b), &known_size), *received = pack_unbounded(info, &size);
-	bool same = known && received && size == known_size && memcmp(known, received, size) == 0;
-	mem_free(known);
+	unsigned char *expected = pack_unbounded(get_info(b), &expected_size), *received = pack_unbounded(info, &size);
+	bool same = expected && received && size == expected_size && memcmp(expected, received, size) == 0;
+	mem_free(expected);
 	mem_free(received);
 	return same;
 }
 
-static void read_some(uv_work_t *work)
+static void read_part(uv_work_t *work)
 {
 	struct job_cache *b = work->data;
-	b->reading.more = blob_check_read(b->reading.check);
+	b->reading.has_more = blob_check_read(b->reading.check);
 }
 
-static void on_read(uv_work_t *work, int status)
+static void on_part_read(uv_work_t *work, int status)
 {
 	struct job_cache *b = work->data;
-	if (status == 0 && b->reading.more && !*b->reading.stop &&
-	    uv_queue_work(work->loop, work, read_some, on_read) == 0)
+	if (status == 0 && b->reading.has_more && !*b->reading.stop_requested &&
+	    uv_queue_work(work->loop, work, read_part, on_part_read) == 0)
 		return;
 	int rc = blob_check_end(b->reading.check, NULL);
 	b->reading.check = NULL;
-	b->held[b->reading.file] = rc == 0 && blob_hold(b->blobs, &b->wanted);
-	b->reading.failed = rc != 0;
-	b->reading.done(b);
+	b->is_held[b->reading.file_index] = rc == 0 && blob_hold(b->blobs, &b->wanted_file);
+	b->reading.has_failed = rc != 0;
+	b->reading.on_done(b);
 }
 
 /* Looks for one file in the cache. It may have been damaged since it arrived, so it is read again, by libuv's pool,
  * unless that was done recently; a damaged file counts as missing. */
-static enum job_cache_files look_for(struct job_cache *b, size_t i, uv_loop_t *loop)
+static enum job_cache_files check_file(struct job_cache *b, size_t i, uv_loop_t *loop)
 {
-	b->wanted = file_hash_from_wire(info_of(b)->files[i]);
-	bool failed = b->reading.failed && b->reading.file == i;
-	b->reading.failed = false;
-	int rc = failed ? -EBADMSG : blob_check_begin(&b->reading.check, b->blobs, &b->wanted, CHECKED_SECONDS, NULL);
+	b->wanted_file = file_hash_from_wire(get_info(b)->files[i]);
+	bool failed = b->reading.has_failed && b->reading.file_index == i;
+	b->reading.has_failed = false;
+	int rc = failed ? -EBADMSG
+			: blob_check_begin(&b->reading.check, b->blobs, &b->wanted_file, CHECKED_SECONDS, NULL);
 	if (rc > 0) {
-		b->reading.file = i;
+		b->reading.file_index = i;
 		b->reading.work.data = b;
-		if (uv_queue_work(loop, &b->reading.work, read_some, on_read) == 0)
-			return JOB_CACHE_READS;
+		if (uv_queue_work(loop, &b->reading.work, read_part, on_part_read) == 0)
+			return JOB_CACHE_FILE_BEING_READ;
 		rc = blob_check_end(b->reading.check, NULL);
 		b->reading.check = NULL;
 	}
-	b->held[i] = rc == 0 && blob_hold(b->blobs, &b->wanted);
-	return b->held[i] ? JOB_CACHE_HAS : JOB_CACHE_LACKS;
+	b->is_held[i] = rc == 0 && blob_hold(b->blobs, &b->wanted_file);
+	return b->is_held[i] ? JOB_CACHE_FILES_COMPLETE : JOB_CACHE_FILE_MISSING;
 }
 
-enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop)
+enum job_cache_files job_cache_check_files(struct job_cache *b, uv_loop_t *loop)
 {
 	if (b->reading.check)
-		return JOB_CACHE_READS;
-	for (size_t i = 0; i < info_of(b)->n_files; i++) {
-		enum job_cache_files found = b->held[i] ? JOB_CACHE_HAS : look_for(b, i, loop);
-		if (found != JOB_CACHE_HAS)
+		return JOB_CACHE_FILE_BEING_READ;
+	for (size_t i = 0; i < get_info(b)->n_files; i++) {
+		enum job_cache_files found = b->is_held[i] ? JOB_CACHE_FILES_COMPLETE : check_file(b, i, loop);
+		if (found != JOB_CACHE_FILES_COMPLETE)
 			return found;
 	}
-	return JOB_CACHE_HAS;
+	return JOB_CACHE_FILES_COMPLETE;
 }
 
 /* ---- assets: the builder's thread ---- */
 
 struct mapping {
-	void *at;
+	void *address;
 	size_t size;
 };
 
 static int open_asset(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct job_cache *b = user;
-	const Farm__JobInfo *m = info_of(b);
+	const Farm__JobInfo *m = get_info(b);
 	size_t i = 0;
 	liveness_tick();
 	while (i < m->n_files && strcmp(m->files[i]->name, name) != 0)
@@ -206,24 +208,25 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	struct stat st;
 	if (fd < 0 || fstat(fd, &st)) {
 		int rc = error_set(e, errno, "%s: %s", name, strerror(errno));
-		b->own = true;
+		b->worker_at_fault = true;
 		if (fd >= 0)
 			close(fd);
 		return rc;
 	}
 	struct mapping *map = mem_alloc(1, sizeof *map);
-	void *at = MAP_FAILED;
+	void *address = MAP_FAILED;
 	if (map && st.st_size > 0)
-		at = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
+		address = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
 	close(fd);
-	if (!map || (st.st_size > 0 && at == MAP_FAILED)) {
+	if (!map || (st.st_size > 0 && address == MAP_FAILED)) {
 		mem_free(map);
-		b->own = true;
+		b->worker_at_fault = true;
 		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
 	}
-	*map = (struct mapping){st.st_size > 0 ? at : NULL, (size_t)st.st_size};
-	*out = (struct asset){
-		.bytes = st.st_size > 0 ? at : (const unsigned char *)"", .size = (size_t)st.st_size, .handle = map};
+	*map = (struct mapping){st.st_size > 0 ? address : NULL, (size_t)st.st_size};
+	*out = (struct asset){.bytes = st.st_size > 0 ? address : (const unsigned char *)"",
+			      .size = (size_t)st.st_size,
+			      .handle = map};
 	return 0;
 }
 
@@ -231,8 +234,8 @@ static void close_asset(void *user, struct asset *a)
 {
 	(void)user;
 	struct mapping *map = a->handle;
-	if (map && map->at)
-		munmap(map->at, map->size);
+	if (map && map->address)
+		munmap(map->address, map->size);
 	mem_free(map);
 	memset(a, 0, sizeof *a);
 }
@@ -257,35 +260,36 @@ static int check_plan(const struct job_cache *b, const struct scene *s, const st
 			"this worker reads a film of %ux%u with a border of %u from the scene, the plan has %ux%u and "
 			"%u: different versions?",
 			set.width, set.height, set.border, p->width, p->height, p->border);
-	const struct render_integrator *i = render_integrator_find(p->integrator);
+	const struct integrator_properties *i = render_integrator_find(p->integrator);
 	if (!i || i->kind != p->kind)
 		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
-	char own[PLAN_ACCURACY_MAX];
-	rc = render_settings_canonical(p->accuracy, own, e);
-	if (!rc && strcmp(own, p->accuracy) != 0)
-		rc = error_set(e, EINVAL, "this worker has the settings '%s', the plan '%s': different versions?", own,
-			       p->accuracy);
+	char canonical[PLAN_ACCURACY_MAX];
+	rc = accuracy_settings_canonicalize(p->accuracy, canonical, e);
+	if (!rc && strcmp(canonical, p->accuracy) != 0)
+		rc = error_set(e, EINVAL, "this worker has the settings '%s', the plan '%s': different versions?",
+			       canonical, p->accuracy);
 	return rc;
 }
 
 static int check_mutations(const struct job_cache *b, struct error *e)
 {
 	const struct plan *p = &b->plan;
-	char own[PLAN_MUTATIONS_MAX] = "";
+	char canonical[PLAN_MUTATIONS_MAX] = "";
 	struct render_summary summary;
 	world_summary(b->world, &summary);
-	int rc = render_integrator_find(p->integrator)->has_mutations ? render_mutations(p->mutations, &summary, own, e)
-								      : 0;
-	if (!rc && strcmp(own, p->mutations) != 0)
+	int rc = render_integrator_find(p->integrator)->has_mutations
+			 ? render_canonical_mutations(p->mutations, &summary, canonical, e)
+			 : 0;
+	if (!rc && strcmp(canonical, p->mutations) != 0)
 		rc = error_set(e, EINVAL,
-			       "this worker has the mixture of mutations '%s', the plan '%s': different versions?", own,
-			       p->mutations);
+			       "this worker has the mixture of mutations '%s', the plan '%s': different versions?",
+			       canonical, p->mutations);
 	return rc;
 }
 
-static int build(struct job_cache *b, struct error *e)
+static int build_world(struct job_cache *b, struct error *e)
 {
-	const Farm__JobInfo *m = info_of(b);
+	const Farm__JobInfo *m = get_info(b);
 	struct scene_define defines[DEFINES_MAX];
 	struct asset_source assets = {.user = b, .open = open_asset, .close = close_asset};
 	struct render_options options = {
@@ -306,7 +310,7 @@ static int build(struct job_cache *b, struct error *e)
 		return rc;
 	rc = check_mutations(b, e);
 	if (!rc)
-		rc = render_map_new(b->world, &b->plan, &b->map, e);
+		rc = render_brightness_map_new(b->world, &b->plan, &b->brightness_map, e);
 	if (rc) {
 		world_free(b->world);
 		b->world = NULL;
@@ -318,12 +322,12 @@ static void run_build(struct task *t)
 {
 	struct job_cache *b = (struct job_cache *)t; /* its first member */
 	uint64_t begun = uv_hrtime();
-	if (b->waits.job)
-		work_begin(&b->waits, info_of(b)->scene);
-	int rc = build(b, &b->error);
+	if (b->waiting_lease.job)
+		work_begin(&b->waiting_lease, get_info(b)->scene);
+	int rc = build_world(b, &b->error);
 	if (rc)
 		b->world = NULL;
-	b->no_memory = rc == -ENOMEM;
+	b->out_of_memory = rc == -ENOMEM;
 	work_end();
 	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
 }
@@ -332,12 +336,12 @@ static void on_world_built(struct task *t)
 {
 	struct job_cache *b = (struct job_cache *)t;
 	b->state = b->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
-	b->built(b);
+	b->on_built(b);
 }
 
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 {
-	const Farm__JobInfo *m = info_of(b);
+	const Farm__JobInfo *m = get_info(b);
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (!b->paths[i])
@@ -348,29 +352,29 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 	}
 	b->state = JOB_CACHE_BUILDING;
 	b->task.run = run_build;
-	b->task.done = on_world_built;
+	b->task.on_done = on_world_built;
 	thread_pool_add(c, &b->task);
 	return 0;
 }
 
-static bool takes_memory(const struct job_cache *b)
+static bool has_world_in_memory(const struct job_cache *b)
 {
 	/* The world is not read while BUILDING, since the thread writes it. */
 	return b->state == JOB_CACHE_BUILDING || b->world;
 }
 
-void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building)
+void job_cache_note_other_worlds(struct job_cache *b, struct job_cache *all, bool building)
 {
-	b->beside = false;
+	b->had_other_worlds = false;
 	for (struct job_cache *o = all; o; o = o->next)
-		if (o != b && takes_memory(o)) {
-			b->beside = true;
-			o->beside |= building;
+		if (o != b && has_world_in_memory(o)) {
+			b->had_other_worlds = true;
+			o->had_other_worlds |= building;
 		}
 }
 
-void job_cache_lacked_memory(const struct job_cache *b)
+void job_cache_note_memory_failure(const struct job_cache *b)
 {
-	if (b->beside)
-		work_memory_short(clock_seconds());
+	if (b->had_other_worlds)
+		work_note_memory_short(clock_seconds());
 }

@@ -14,17 +14,18 @@
 #include "worker/render/render.h"
 
 enum job_cache_state {
-	JOB_CACHE_ASKED,    /* JobGet has been sent */
-	JOB_CACHE_FETCHING, /* files are missing or being checked */
-	JOB_CACHE_BUILDING, /* the world is being built */
-	JOB_CACHE_READY,    /* leases can be rendered */
-	JOB_CACHE_FAILED,   /* `error` is the reason */
+	JOB_CACHE_REQUESTED, /* JobGet has been sent */
+	JOB_CACHE_FETCHING,  /* files are missing or being checked */
+	JOB_CACHE_BUILDING,  /* the world is being built */
+	JOB_CACHE_READY,     /* leases can be rendered */
+	JOB_CACHE_FAILED,    /* `error` is the reason */
 };
 
 enum job_cache_files {
-	JOB_CACHE_HAS,	 /* all files are in the cache */
-	JOB_CACHE_LACKS, /* the file `wanted` must be fetched */
-	JOB_CACHE_READS, /* `wanted` is being read by libuv's pool: look again once reading.done has been called */
+	JOB_CACHE_FILES_COMPLETE,  /* all files are in the cache */
+	JOB_CACHE_FILE_MISSING,	   /* the file `wanted_file` must be fetched */
+	JOB_CACHE_FILE_BEING_READ, /* `wanted_file` is being read by libuv's pool: look again once reading.done has been
+				      called */
 };
 
 struct job_cache {
@@ -35,32 +36,32 @@ struct job_cache {
 	struct envelope info; /* JobInfo, owned */
 	struct plan plan;
 	struct blob_store *blobs;
-	bool *held;		 /* by file: it is in the cache, and held for this job */
-	char **paths;		 /* by file, for the thread that builds the world */
-	struct blob_hash wanted; /* while FETCHING: the file being waited for */
+	bool *is_held;		      /* by file: it is in the cache, and held for this job */
+	char **paths;		      /* by file, for the thread that builds the world */
+	struct blob_hash wanted_file; /* while FETCHING: the file being waited for */
 	struct {
 		uv_work_t work;
-		struct blob_check *check;	  /* NULL: nothing is being read */
-		size_t file;			  /* index of the file */
-		bool more;			  /* its end has not been reached */
-		bool failed;			  /* the file cannot be used and must be fetched */
-		const bool *stop;		  /* set when the worker stops: ends the reading */
-		void (*done)(struct job_cache *); /* called on the loop's thread when a file has been read */
+		struct blob_check *check;	     /* NULL: nothing is being read */
+		size_t file_index;		     /* index of the file */
+		bool has_more;			     /* its end has not been reached */
+		bool has_failed;		     /* the file cannot be used and must be fetched */
+		const bool *stop_requested;	     /* set when the worker stops: ends the reading */
+		void (*on_done)(struct job_cache *); /* called on the loop's thread when a file has been read */
 	} reading;
 	struct world *world;
-	struct brightness *map; /* see render_map_new */
-	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
-	unsigned users;		/* number of leases that need the world */
-	uint64_t last_used;	/* value of the counter of uses */
-	bool ended;		/* the job has ended at the coordinator */
-	bool confirmed;		/* on this connection, the coordinator has said that this number is still this job's */
+	struct brightness *brightness_map; /* see render_brightness_map_new */
+	struct lease_key waiting_lease;	   /* one of the leases that wait for the world; job 0: none */
+	unsigned lease_count;		   /* number of leases that need the world */
+	uint64_t last_used;		   /* value of the counter of uses */
+	bool ended;			   /* the job has ended at the coordinator */
+	bool confirmed; /* on this connection, the coordinator has said that this number is still this job's */
 	double build_seconds;
 	void *owner;
-	void (*built)(struct job_cache *); /* called on the loop's thread when the state is READY or FAILED */
+	void (*on_built)(struct job_cache *); /* called on the loop's thread when the state is READY or FAILED */
 	struct error error;
-	bool own;	/* FAILED because of this machine, not the job */
-	bool no_memory; /* FAILED because there was not enough memory for the world */
-	bool beside;	/* other worlds have been in memory since the build, or since the last lease, began */
+	bool worker_at_fault;  /* FAILED because of this machine, not the job */
+	bool out_of_memory;    /* FAILED because there was not enough memory for the world */
+	bool had_other_worlds; /* other worlds have been in memory since the build, or since the last lease, began */
 };
 
 struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL if none has this number */
@@ -68,20 +69,21 @@ int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, 
 /* Must not be called while BUILDING, nor while a file is being read. */
 void job_cache_free(struct job_cache *b);
 
-/* Takes the answer to JobGet, which it then owns; call job_cache_look next. Returns 0, -EBADMSG or -ENOMEM. */
+/* Takes the answer to JobGet, which it then owns; call job_cache_check_files next. Returns 0, -EBADMSG or -ENOMEM. */
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
 /* Returns whether a description is that of this job: all but the bounds, which may have been changed, must be equal.
  * False also if memory is out. */
-bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
+bool job_cache_matches(const struct job_cache *b, const Farm__JobInfo *info);
 /* Holds the job's files that are in the cache, up to the first that is missing or must be read first. reading.stop and
  * reading.done must be set. */
-enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop);
-/* Builds the world in the thread pool, after job_cache_look has returned JOB_CACHE_HAS. Returns 0 or -ENOMEM. */
+enum job_cache_files job_cache_check_files(struct job_cache *b, uv_loop_t *loop);
+/* Builds the world in the thread pool, after job_cache_check_files has returned JOB_CACHE_FILES_COMPLETE. Returns 0 or
+ * -ENOMEM. */
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
 
 /* Call when a lease of b begins, or the building of its world does: notes whether other worlds are in memory. */
-void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building);
-/* Call when an allocation has failed for b. If other worlds were in memory, tells work_memory_short. */
-void job_cache_lacked_memory(const struct job_cache *b);
+void job_cache_note_other_worlds(struct job_cache *b, struct job_cache *all, bool building);
+/* Call when an allocation has failed for b. If other worlds were in memory, tells work_note_memory_short. */
+void job_cache_note_memory_failure(const struct job_cache *b);
 
 #endif

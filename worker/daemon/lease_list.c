@@ -15,7 +15,7 @@ void lease_list_drop(struct agent *a, struct lease_task *l)
 	while (*at != l)
 		at = &(*at)->next;
 	*at = l->next;
-	a->busy_at = uv_now(&a->loop);
+	a->last_busy_ms = uv_now(&a->loop);
 	lease_task_free(l);
 }
 
@@ -26,43 +26,44 @@ void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e
 		next = l->next;
 		if (l->job_cache != b || l->state != LEASE_WAITING)
 			continue;
-		send_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
+		send_lease_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built",
+				  b->worker_at_fault);
 		lease_list_drop(a, l);
 	}
 }
 
-void lease_list_limit_backlog(struct agent *a)
+void lease_list_update_backlog(struct agent *a)
 {
-	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
+	enum { BACKLOG_MAX = 256, BACKLOG_RESUME = 128 };
 	unsigned results = 0;
 	for (const struct lease_task *l = a->leases; l; l = l->next)
 		results += l->state == LEASE_RENDERED;
-	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
-	if (backlog == a->backlog)
+	bool backlog = a->has_backlog ? results > BACKLOG_RESUME : results >= BACKLOG_MAX;
+	if (backlog == a->has_backlog)
 		return;
-	a->backlog = backlog;
-	send_request(a);
+	a->has_backlog = backlog;
+	send_lease_request(a);
 }
 
 struct lease_task *lease_list_find(const struct agent *a, const struct lease_key *k)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
-		if (!l->unwanted && lease_key_equal(&l->grant.key, k))
+		if (!l->is_unwanted && lease_key_equal(&l->grant.key, k))
 			return l;
 	return NULL;
 }
 
 void lease_list_forget(struct agent *a, struct lease_task *l)
 {
-	if (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)) {
-		l->unwanted = true;
-		atomic_store(&l->stop, true);
+	if (l->state == LEASE_QUEUED && !thread_pool_remove(a->thread_pool, &l->task)) {
+		l->is_unwanted = true;
+		atomic_store(&l->stop_requested, true);
 		return;
 	}
 	lease_list_drop(a, l);
 }
 
-bool lease_list_is_flood(const struct agent *a)
+bool lease_list_is_flooded(const struct agent *a)
 {
 	unsigned open = 0;
 	for (const struct lease_task *l = a->leases; l; l = l->next)
@@ -70,11 +71,11 @@ bool lease_list_is_flood(const struct agent *a)
 	return open >= 4 * (a->config.threads + 1) + 16;
 }
 
-bool lease_list_is_stuffed(const struct agent *a)
+bool lease_list_is_full(const struct agent *a)
 {
-	enum { ANSWERS_MOST = 1024 };
-	unsigned answered = 0;
+	enum { RESULTS_MAX = 1024 };
+	unsigned results = 0;
 	for (const struct lease_task *l = a->leases; l; l = l->next)
-		answered += l->state == LEASE_RENDERED;
-	return answered >= ANSWERS_MOST;
+		results += l->state == LEASE_RENDERED;
+	return results >= RESULTS_MAX;
 }

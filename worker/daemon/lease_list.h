@@ -18,11 +18,11 @@ void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e
 
 /* Call when the number of results has changed. If leases are short and the coordinator's disk is slow, results pile up:
  * then no more leases are requested until enough results have been acknowledged. */
-void lease_list_limit_backlog(struct agent *a);
+void lease_list_update_backlog(struct agent *a);
 /* Returns whether far more leases have been granted than were requested, which no correct coordinator does. */
-bool lease_list_is_flood(const struct agent *a);
+bool lease_list_is_flooded(const struct agent *a);
 /* Returns whether so many results wait to be acknowledged that further grants must be returned. The connection stays:
  * nobody is at fault, and on a new connection all results would be sent again. */
-bool lease_list_is_stuffed(const struct agent *a);
+bool lease_list_is_full(const struct agent *a);
 
 #endif

@@ -3,10 +3,10 @@
  * Jobs and leases of the worker daemon. Everything here runs on the event loop's thread; leases are rendered and scenes
  * built in the thread pool, which calls back on the loop's thread.
  *
- * Happy path: take_grant queues a lease and finds or creates the cache of its job. The cache asks for the job's
- * description (take_job_info), fetches missing files (take_blob) and builds the scene (on_built); then its leases
- * start. A rendered lease is sent (on_rendered) and kept until the coordinator acknowledges it (take_ack), also across
- * connections.
+ * Happy path: handle_grant queues a lease and finds or creates the cache of its job. The cache asks for the job's
+ * description (handle_job_info), fetches missing files (handle_blob_chunk) and builds the scene (on_built); then its
+ * leases start. A rendered lease is sent (on_rendered) and kept until the coordinator acknowledges it (handle_ack),
+ * also across connections.
  *
  * Failures: if files of a job cannot be fetched or its scene cannot be built, all its waiting leases fail with a
  * sentence. A lease that is revoked, or whose job has ended, is dropped; if a thread works on it, it is dropped when
@@ -28,7 +28,7 @@
 
 /* ---- scenes ---- */
 
-/* Fails a job's waiting leases. The next scenes_kept_tidy drops the job. */
+/* Fails a job's waiting leases. The next scenes_kept_drop_unused drops the job. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
@@ -39,17 +39,17 @@ static void on_rendered(struct lease_task *l);
 static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
-	l->finished = on_rendered;
-	job_cache_note_company(l->job_cache, a->job_caches, false);
+	l->on_finished = on_rendered;
+	job_cache_note_other_worlds(l->job_cache, a->job_caches, false);
 	lease_task_start(l, a->thread_pool);
 }
 
-/* Returns no_memory, which means that this machine is at fault, not the job: the client that submitted the scene had
- * enough memory, and other workers may have. */
-static bool lacked_memory(const struct job_cache *b, bool no_memory)
+/* Returns out_of_memory, which means that this machine is at fault, not the job: the client that submitted the scene
+ * had enough memory, and other workers may have. */
+static bool note_memory_failure(const struct job_cache *b, bool no_memory)
 {
 	if (no_memory)
-		job_cache_lacked_memory(b);
+		job_cache_note_memory_failure(b);
 	return no_memory;
 }
 
@@ -57,7 +57,7 @@ static void on_built(struct job_cache *b)
 {
 	struct agent *a = b->owner;
 	if (b->state == JOB_CACHE_FAILED) {
-		b->own |= lacked_memory(b, b->no_memory);
+		b->worker_at_fault |= note_memory_failure(b, b->out_of_memory);
 		fail_job_cache(a, b, &b->error);
 	} else {
 		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
@@ -66,8 +66,8 @@ static void on_built(struct job_cache *b)
 			if (l->job_cache == b && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
-	scenes_kept_tidy(a);
-	a->settle(a);
+	scenes_kept_drop_unused(a);
+	a->leave_if_idle(a);
 }
 
 static void on_file_read(struct job_cache *b);
@@ -78,24 +78,24 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 {
 	struct error e;
 	int rc = 0;
-	if (b->state != JOB_CACHE_FETCHING || a->leaving)
+	if (b->state != JOB_CACHE_FETCHING || a->is_leaving)
 		return;
 	b->owner = a;
-	b->reading.stop = &a->gone;
-	b->reading.done = on_file_read;
-	enum job_cache_files files = job_cache_look(b, &a->loop);
-	if (files == JOB_CACHE_LACKS) {
-		rc = fetch_want(a, &b->wanted, &e);
-	} else if (files == JOB_CACHE_HAS && !scenes_kept_must_wait(a, b)) {
-		b->built = on_built;
+	b->reading.stop_requested = &a->has_left;
+	b->reading.on_done = on_file_read;
+	enum job_cache_files files = job_cache_check_files(b, &a->loop);
+	if (files == JOB_CACHE_FILE_MISSING) {
+		rc = fetch_request(a, &b->wanted_file, &e);
+	} else if (files == JOB_CACHE_FILES_COMPLETE && !scenes_kept_must_wait(a, b)) {
+		b->on_built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
 			if (l->job_cache == b)
-				b->waits = l->grant.key;
-		job_cache_note_company(b, a->job_caches, true);
+				b->waiting_lease = l->grant.key;
+		job_cache_note_other_worlds(b, a->job_caches, true);
 		rc = job_cache_build(b, a->thread_pool, &e);
 	}
 	if (rc) {
-		b->own = rc == -ENOMEM;
+		b->worker_at_fault = rc == -ENOMEM;
 		fail_job_cache(a, b, &e);
 	}
 }
@@ -109,12 +109,12 @@ static void fetch_or_build_all(struct agent *a)
 static void on_file_read(struct job_cache *b)
 {
 	struct agent *a = b->owner;
-	if (a->gone)
+	if (a->has_left)
 		return;
 	if (!b->ended)
 		fetch_or_build(a, b);
-	scenes_kept_tidy(a);
-	a->settle(a);
+	scenes_kept_drop_unused(a);
+	a->leave_if_idle(a);
 }
 
 /* ---- leases ---- */
@@ -123,23 +123,23 @@ static void on_rendered(struct lease_task *l)
 {
 	struct agent *a = l->owner;
 	l->state = LEASE_RENDERED;
-	if (l->unwanted) {
+	if (l->is_unwanted) {
 		lease_list_drop(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
 		if (l->rc == -EILSEQ)
 			send_bad_states(a, &l->grant, l->error.text);
 		else
-			send_failed(a, &l->grant.key, l->rc ? l->error.text : "",
-				    lacked_memory(l->job_cache, l->rc == -ENOMEM));
+			send_lease_failed(a, &l->grant.key, l->rc ? l->error.text : "",
+					  note_memory_failure(l->job_cache, l->rc == -ENOMEM));
 		lease_list_drop(a, l);
 	} else {
 		send_result(a, l);
 	}
-	lease_list_limit_backlog(a);
-	scenes_kept_tidy(a);
+	lease_list_update_backlog(a);
+	scenes_kept_drop_unused(a);
 	fetch_or_build_all(a); /* a scene may have waited for this thread to stop */
-	scenes_kept_tidy(a);
-	a->settle(a);
+	scenes_kept_drop_unused(a);
+	a->leave_if_idle(a);
 }
 
 static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
@@ -157,7 +157,7 @@ static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job
 	return 0;
 }
 
-static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
+static void handle_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
 {
 	struct grant g;
 	struct error e;
@@ -178,13 +178,13 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		grant_fini(&g);
 		return;
 	}
-	if (lease_list_is_flood(a)) {
+	if (lease_list_is_flooded(a)) {
 		grant_fini(&g);
 		conn_close(a->conn, "the coordinator grants more leases than were requested");
 		return;
 	}
-	if (a->leaving || lease_list_is_stuffed(a)) {
-		send_failed(a, &g.key, "", false);
+	if (a->is_leaving || lease_list_is_full(a)) {
+		send_lease_failed(a, &g.key, "", false);
 		grant_fini(&g);
 		return;
 	}
@@ -193,23 +193,23 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
 		if (rc == -EAGAIN)
-			send_later(a, &g.key, e.text);
+			send_lease_deferred(a, &g.key, e.text);
 		else
-			send_failed(a, &g.key, e.text, true);
+			send_lease_failed(a, &g.key, e.text, true);
 		grant_fini(&g);
 		return;
 	}
-	b->last_used = ++a->clock;
+	b->last_used = ++a->use_counter;
 	struct lease_task **end = &a->leases; /* appended, so that rounds complete in order */
 	while (*end)
 		end = &(*end)->next;
 	*end = l;
 	if (b->state == JOB_CACHE_READY)
 		start_lease(a, l);
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
-static void take_ack(struct agent *a, const Farm__LeaseAck *m)
+static void handle_ack(struct agent *a, const Farm__LeaseAck *m)
 {
 	struct lease_key k;
 	struct error e;
@@ -226,34 +226,34 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 			  LEASE_VALUES(&k), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		lease_list_drop(a, l);
-		lease_list_limit_backlog(a);
-		scenes_kept_tidy(a);
+		lease_list_update_backlog(a);
+		scenes_kept_drop_unused(a);
 	}
 }
 
-static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
+static void handle_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 {
 	struct lease_key k;
 	struct error e;
 	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : lease_list_find(a, &k);
 	if (l && l->state != LEASE_RENDERED) /* a result is kept: the coordinator will acknowledge it */
 		lease_list_forget(a, l);
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
-static void take_job_end(struct agent *a, uint64_t job)
+static void handle_job_end(struct agent *a, uint64_t job)
 {
 	struct job_cache *b = job_cache_find(a->job_caches, job);
 	if (!b)
 		return;
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->job_cache == b && !l->unwanted)
+		if (l->job_cache == b && !l->is_unwanted)
 			lease_list_forget(a, l);
 	}
 	b->ended = true;
-	lease_list_limit_backlog(a);
-	scenes_kept_tidy(a);
+	lease_list_update_backlog(a);
+	scenes_kept_drop_unused(a);
 }
 
 /* The coordinator has started with an empty spool and given the number to another job: results of the old job are
@@ -264,106 +264,106 @@ static void drop_old_job(struct agent *a, struct job_cache *b)
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->job_cache != b || l->unwanted)
+		if (l->job_cache != b || l->is_unwanted)
 			continue;
-		send_failed(a, &l->grant.key, "", false);
+		send_lease_failed(a, &l->grant.key, "", false);
 		lease_list_forget(a, l);
 	}
-	lease_list_limit_backlog(a);
+	lease_list_update_backlog(a);
 	b->ended = true;
 	b->job = 0;
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
-static void take_job_info(struct agent *a, struct envelope *env)
+static void handle_job_info(struct agent *a, struct envelope *env)
 {
 	struct job_cache *b = job_cache_find(a->job_caches, env->message->job_info->job);
 	struct error e;
 	if (!b)
 		return;
-	if (!job_cache_is_of(b, env->message->job_info)) {
+	if (!job_cache_matches(b, env->message->job_info)) {
 		drop_old_job(a, b);
 		return;
 	}
 	b->confirmed = true;
-	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
+	if (b->state == JOB_CACHE_REQUESTED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job still runs: send results of it */
 		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
 /* Stores a chunk for the first job that wants the file. If the file cannot be stored, that job fails, which releases
  * the files that it held, and the other jobs that want the file request it again. */
-static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+static void handle_blob_chunk(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
-	struct fetch *f = fetch_answered(a, c);
+	struct fetch *f = fetch_match_chunk(a, c);
 	if (!f) {
 		conn_close(a->conn, "the coordinator sends a chunk of a file that was not requested");
 		return;
 	}
 	const struct blob_hash hash = f->hash;
-	struct job_cache *first = scenes_kept_who_wants(a, &hash);
-	enum fetch_end end = FETCH_MORE;
-	if (first && !f->writer && cache_mend(&a->cache, &e))
-		end = FETCH_UNSTORED;
+	struct job_cache *first = scenes_kept_find_waiting(a, &hash);
+	enum fetch_outcome end = FETCH_MORE;
+	if (first && !f->writer && cache_restore_folder(&a->cache, &e))
+		end = FETCH_NOT_STORED;
 	else if (first)
-		end = fetch_add(f, a->cache.blobs, c, payload, size, &e);
+		end = fetch_store_chunk(f, a->cache.blobs, c, payload, size, &e);
 	if (end != FETCH_MORE)
 		fetch_drop(a, f);
-	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
-		first->own = end == FETCH_UNSTORED;
+	if (end == FETCH_FAILED || end == FETCH_NOT_STORED) {
+		first->worker_at_fault = end == FETCH_NOT_STORED;
 		fail_job_cache(a, first, &e);
-		scenes_kept_tidy(a);
+		scenes_kept_drop_unused(a);
 	}
 	fetch_or_build_all(a);
-	if (end == FETCH_WHOLE)
+	if (end == FETCH_COMPLETE)
 		blob_release(a->cache.blobs, &hash);
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
-void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
+void lease_queue_handle_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
 	case FARM__ENVELOPE__BODY_HEARTBEAT:
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_GRANT:
-		take_grant(a, m->lease_grant, payload, size);
+		handle_grant(a, m->lease_grant, payload, size);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_ACK:
-		take_ack(a, m->lease_ack);
+		handle_ack(a, m->lease_ack);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_REVOKE:
-		take_revoke(a, m->lease_revoke);
+		handle_revoke(a, m->lease_revoke);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_INFO:
-		take_job_info(a, env);
+		handle_job_info(a, env);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:
-		take_job_end(a, m->job_end->job);
+		handle_job_end(a, m->job_end->job);
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
-		take_blob(a, m->blob_chunk, payload, size);
+		handle_blob_chunk(a, m->blob_chunk, payload, size);
 		break;
 	default:
 		conn_close(a->conn, "not a message from a coordinator to a worker");
 	}
-	a->settle(a);
+	a->leave_if_idle(a);
 }
 
 /* ---- connection and leaving ---- */
 
 /* Reports the leases of earlier processes that a signal has ended; called before any lease is requested. */
-static void tell_lost(struct agent *a)
+static void report_lost_leases(struct agent *a)
 {
 	struct lost_lease *l;
-	for (unsigned i = 0; (l = work_lost(i)); i++)
+	for (unsigned i = 0; (l = work_lost_lease(i)); i++)
 		if (!l->reported) {
-			send_failed(a, &l->key, l->text, l->own);
+			send_lease_failed(a, &l->key, l->text, l->worker_at_fault);
 			l->reported = true;
 		}
 }
@@ -376,37 +376,37 @@ static void drop_old_leases(struct agent *a)
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->state != LEASE_RENDERED && ++open > a->config.threads + 1 &&
-		    (l->state == LEASE_WAITING || thread_pool_take_back(a->thread_pool, &l->task)))
+		    (l->state == LEASE_WAITING || thread_pool_remove(a->thread_pool, &l->task)))
 			lease_list_drop(a, l);
 	}
-	scenes_kept_tidy(a);
+	scenes_kept_drop_unused(a);
 }
 
-void lease_queue_welcome(struct agent *a)
+void lease_queue_on_connect(struct agent *a)
 {
 	drop_old_leases(a);
 	for (struct lease_task *l = a->leases; l; l = l->next)
-		l->sent = false;
-	tell_lost(a);
-	fetch_reconnected(a);
+		l->is_sent = false;
+	report_lost_leases(a);
+	fetch_reset_requests(a);
 	/* Ask whether the jobs still exist. The answers resume unfinished fetches and send unsent results. */
 	for (struct job_cache *b = a->job_caches; b; b = b->next) {
 		b->confirmed = false;
 		if (!b->ended)
 			send_job_get(a, b->job);
 	}
-	send_request(a);
+	send_lease_request(a);
 }
 
-void lease_queue_leave(struct agent *a)
+void lease_queue_return_unstarted(struct agent *a)
 {
-	send_request(a);
+	send_lease_request(a);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->state == LEASE_RENDERED ||
-		    (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
+		    (l->state == LEASE_QUEUED && !thread_pool_remove(a->thread_pool, &l->task)))
 			continue;
-		send_failed(a, &l->grant.key, "", false);
+		send_lease_failed(a, &l->grant.key, "", false);
 		lease_list_drop(a, l);
 	}
 }
@@ -414,19 +414,19 @@ void lease_queue_leave(struct agent *a)
 void lease_queue_stop_all(struct agent *a)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
-		atomic_store(&l->stop, true);
+		atomic_store(&l->stop_requested, true);
 }
 
 /* Hanging threads and scenes being built do not count. */
 bool lease_queue_is_idle(const struct agent *a)
 {
-	unsigned left = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next, left++)
-		if (!l->task.hung)
+	unsigned excluded = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next, excluded++)
+		if (!l->task.is_hung)
 			return false;
 	for (const struct job_cache *b = a->job_caches; b; b = b->next)
-		left += b->state == JOB_CACHE_BUILDING;
-	return thread_pool_pending(a->thread_pool) == left;
+		excluded += b->state == JOB_CACHE_BUILDING;
+	return thread_pool_pending(a->thread_pool) == excluded;
 }
 
 void lease_queue_close(struct agent *a)

@@ -14,34 +14,35 @@ int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b
 	l->grant = *g;
 	memset(g, 0, sizeof *g);
 	l->job_cache = b;
-	b->users++;
-	atomic_init(&l->stop, false);
+	b->lease_count++;
+	atomic_init(&l->stop_requested, false);
 	*out = l;
 	return 0;
 }
 
 void lease_task_free(struct lease_task *l)
 {
-	l->job_cache->users--;
+	l->job_cache->lease_count--;
 	grant_fini(&l->grant);
 	mem_free(l->frame);
 	mem_free(l);
 }
 
 /* Renders a lease on a render thread and packs the result there, so that the loop's thread never encodes films. */
-static void render(struct task *t)
+static void render_task(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */
 	struct batch batch = {0};
 	struct lease_input in = {.chain_count = l->grant.chain_count,
 				 .seeds = l->grant.seeds,
 				 .states = l->grant.states,
-				 .map = l->job_cache->map};
+				 .map = l->job_cache->brightness_map};
 	const struct plan *p = &l->job_cache->plan;
 	l->end = LEASE_STOPPED;
 	work_begin(&l->grant.key, l->job_cache->info.message->job_info->scene);
-	if (!atomic_load(&l->stop))
-		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
+	if (!atomic_load(&l->stop_requested))
+		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop_requested, &l->end, &batch,
+				     &l->error);
 	if (!l->rc && l->end == LEASE_DONE) /* the coordinator would refuse such a result: report a failure instead */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
@@ -55,13 +56,13 @@ static void render(struct task *t)
 static void on_task_done(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t;
-	l->finished(l);
+	l->on_finished(l);
 }
 
 void lease_task_start(struct lease_task *l, struct thread_pool *c)
 {
 	l->state = LEASE_QUEUED;
-	l->task.run = render;
-	l->task.done = on_task_done;
+	l->task.run = render_task;
+	l->task.on_done = on_task_done;
 	thread_pool_add(c, &l->task);
 }

@@ -23,17 +23,17 @@ struct lease_task {
 	struct grant grant;
 	struct job_cache *job_cache;
 	enum lease_task_state state;
-	atomic_bool stop; /* tells the thread to stop */
-	bool unwanted;	  /* the result is not wanted any more: dropped when the thread returns it */
-	bool sent;	  /* the result has been sent on this connection */
+	atomic_bool stop_requested; /* tells the thread to stop */
+	bool is_unwanted;	    /* the result is not wanted any more: dropped when the thread returns it */
+	bool is_sent;		    /* the result has been sent on this connection */
 	unsigned char *frame;
 	size_t frame_size;
 	/* These three are set by the thread. */
-	enum lease_end end;
+	enum lease_outcome end;
 	int rc;
 	struct error error;
 	void *owner;
-	void (*finished)(
+	void (*on_finished)(
 		struct lease_task *); /* called on the loop's thread when the render thread returns the lease */
 };
 

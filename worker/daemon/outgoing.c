@@ -9,14 +9,14 @@
 
 void send_message(struct agent *a, const Farm__Envelope *m)
 {
-	if (a->conn && a->welcome)
+	if (a->conn && a->is_accepted)
 		conn_send(a->conn, m, NULL, 0);
 }
 
-void send_request(struct agent *a)
+void send_lease_request(struct agent *a)
 {
-	uint32_t want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
-	send_message(a, ENVELOPE(LEASE_REQUEST, lease_request, .want = want));
+	uint32_t wanted_leases = a->is_leaving || a->has_backlog ? 0 : a->config.threads + 1;
+	send_message(a, ENVELOPE(LEASE_REQUEST, lease_request, .want = wanted_leases));
 }
 
 void send_job_get(struct agent *a, uint64_t job)
@@ -25,7 +25,7 @@ void send_job_get(struct agent *a, uint64_t job)
 }
 
 /* Who is at fault for a failed lease: the job, this machine, or nobody (another scene is in memory). */
-enum fault { FAULT_JOB, FAULT_OWN, FAULT_LATER };
+enum fault { FAULT_JOB, FAULT_WORKER, FAULT_NOBODY };
 
 /* states: digest of the chain states that could not be used; NULL: they are not at fault. */
 static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault fault,
@@ -38,25 +38,25 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	text_copy(copy, sizeof copy, text);
 	text_clean(copy);
 	Farm__LeaseFailed failed = MESSAGE(lease_failed, .key = &key, .text = copy, .own = fault != FAULT_JOB,
-					   .later = fault == FAULT_LATER, .bad_states = states != NULL);
+					   .later = fault == FAULT_NOBODY, .bad_states = states != NULL);
 	if (states) {
 		digest = *states;
 		failed.states_digest = (ProtobufCBinaryData){sizeof digest.bytes, digest.bytes};
 	}
 	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
-	if (*text && fault != FAULT_LATER)
+	if (*text && fault != FAULT_NOBODY)
 		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k->job), LEASE_VALUES(k),
 			  log_quote(text).text);
 }
 
-void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
+void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool worker_at_fault)
 {
-	send_failure(a, k, text, own ? FAULT_OWN : FAULT_JOB, NULL);
+	send_failure(a, k, text, worker_at_fault ? FAULT_WORKER : FAULT_JOB, NULL);
 }
 
-void send_later(struct agent *a, const struct lease_key *k, const char *text)
+void send_lease_deferred(struct agent *a, const struct lease_key *k, const char *text)
 {
-	send_failure(a, k, text, FAULT_LATER, NULL);
+	send_failure(a, k, text, FAULT_NOBODY, NULL);
 }
 
 void send_bad_states(struct agent *a, const struct grant *g, const char *text)
@@ -66,7 +66,7 @@ void send_bad_states(struct agent *a, const struct grant *g, const char *text)
 
 void send_result(struct agent *a, struct lease_task *l)
 {
-	if (!a->conn || !a->welcome || l->sent || !l->job_cache->confirmed)
+	if (!a->conn || !a->is_accepted || l->is_sent || !l->job_cache->confirmed)
 		return;
 	unsigned char *copy = mem_alloc(l->frame_size, 1);
 	if (!copy) { /* the result will be sent on the next connection */
@@ -75,5 +75,5 @@ void send_result(struct agent *a, struct lease_task *l)
 	}
 	memcpy(copy, l->frame, l->frame_size);
 	conn_send_frame(a->conn, copy, l->frame_size);
-	l->sent = true;
+	l->is_sent = true;
 }

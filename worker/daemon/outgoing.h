@@ -9,13 +9,13 @@
 #include "worker/daemon/agent_state.h"
 
 void send_message(struct agent *a, const Farm__Envelope *m); /* any message */
-void send_request(struct agent *a);			     /* how many leases the worker wants to hold */
+void send_lease_request(struct agent *a);		     /* how many leases the worker wants to hold */
 void send_job_get(struct agent *a, uint64_t job);	     /* asks for the description of a job */
 /* Returns a lease as failed. With an empty text, nobody is blamed; own: this machine is at fault, not the job. */
-void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
+void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
 /* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator will offer it
  * again soon. */
-void send_later(struct agent *a, const struct lease_key *k, const char *text);
+void send_lease_deferred(struct agent *a, const struct lease_key *k, const char *text);
 /* Returns a lease because the chain states in its grant are invalid, and reports the worker that computed them. */
 void send_bad_states(struct agent *a, const struct grant *g, const char *text);
 /* Sends a result, at most once per connection, and only after the coordinator has described the job on this connection,

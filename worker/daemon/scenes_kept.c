@@ -25,31 +25,31 @@ void scenes_kept_drop(struct agent *a, struct job_cache *b)
 	job_cache_free(b);
 }
 
-struct job_cache *scenes_kept_who_wants(const struct agent *a, const struct blob_hash *h)
+struct job_cache *scenes_kept_find_waiting(const struct agent *a, const struct blob_hash *h)
 {
 	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted, h))
+		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted_file, h))
 			return b;
 	return NULL;
 }
 
 /* Drops the fetches that no job wants. One that has been requested stays until the answer arrives, so that the answer
  * is recognised. */
-static void tidy_fetches(struct agent *a)
+static void drop_unwanted_fetches(struct agent *a)
 {
 	for (struct fetch *f = a->fetches, *next; f; f = next) {
 		next = f->next;
-		if (!f->asked && !scenes_kept_who_wants(a, &f->hash))
+		if (!f->is_requested && !scenes_kept_find_waiting(a, &f->hash))
 			fetch_drop(a, f);
 	}
 }
 
 static bool is_in_use(const struct job_cache *b)
 {
-	return b->users || b->state == JOB_CACHE_BUILDING || b->reading.check;
+	return b->lease_count || b->state == JOB_CACHE_BUILDING || b->reading.check;
 }
 
-void scenes_kept_tidy(struct agent *a)
+void scenes_kept_drop_unused(struct agent *a)
 {
 	for (;;) {
 		struct job_cache *oldest = NULL, *ended = NULL;
@@ -65,12 +65,12 @@ void scenes_kept_tidy(struct agent *a)
 		}
 		if (ended)
 			scenes_kept_drop(a, ended);
-		else if (idle > WORLDS_KEPT)
+		else if (idle > IDLE_WORLDS_MAX)
 			scenes_kept_drop(a, oldest);
 		else
 			break;
 	}
-	tidy_fetches(a);
+	drop_unwanted_fetches(a);
 }
 
 /* Returns whether a scene is in use only by threads that have been told to stop, because its leases were revoked or its
@@ -78,9 +78,9 @@ void scenes_kept_tidy(struct agent *a)
 static bool is_ending(const struct agent *a, const struct job_cache *b)
 {
 	for (const struct lease_task *l = a->leases; l; l = l->next)
-		if (l->job_cache == b && !l->unwanted)
+		if (l->job_cache == b && !l->is_unwanted)
 			return false;
-	return b->users && b->state != JOB_CACHE_BUILDING && !b->reading.check;
+	return b->lease_count && b->state != JOB_CACHE_BUILDING && !b->reading.check;
 }
 
 bool scenes_kept_must_wait(const struct agent *a, const struct job_cache *b)
@@ -93,56 +93,56 @@ bool scenes_kept_must_wait(const struct agent *a, const struct job_cache *b)
 
 /* Drops all unused scenes but one. Returns the job whose scene stays: the first of those in use, otherwise `next`,
  * which may be NULL. */
-static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
+static struct job_cache *keep_one_scene(struct agent *a, struct job_cache *next)
 {
-	struct job_cache *left = NULL;
+	struct job_cache *kept = NULL;
 	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		left = is_in_use(b) && !is_ending(a, b) ? b : left;
-	left = left ? left : next;
-	for (struct job_cache *b = a->job_caches, *after; b; b = after) {
-		after = b->next;
-		if (b != left && !is_in_use(b))
+		kept = is_in_use(b) && !is_ending(a, b) ? b : kept;
+	kept = kept ? kept : next;
+	for (struct job_cache *b = a->job_caches, *following; b; b = following) {
+		following = b->next;
+		if (b != kept && !is_in_use(b))
 			scenes_kept_drop(a, b);
 	}
-	tidy_fetches(a);
-	return left;
+	drop_unwanted_fetches(a);
+	return kept;
 }
 
 /* turn_seconds: how long a job keeps the turn while another one waits. A job of which no lease has been granted for
- * asked_seconds no longer counts as waiting: it has ended, or other workers compute it. */
-static const double turn_seconds = 300, asked_seconds = 60;
+ * waiter_timeout_seconds no longer counts as waiting: it has ended, or other workers compute it. */
+static const double turn_seconds = 300, waiter_timeout_seconds = 60;
 
 /* Refuses a lease of a job that does not have the turn, and notes that the job waits. */
-static int wait_for(struct agent *a, uint64_t job, double now, struct error *e)
+static int refuse_until_turn(struct agent *a, uint64_t job, double now, struct error *e)
 {
-	struct scene_turn *t = &a->turn;
-	if (!t->waits)
+	struct scene_turn *t = &a->scene_turn;
+	if (!t->has_waiter)
 		log_event(
 			LOG_JOB_NOTE,
 			"job=j%llu text=\"waits: memory ran short, so this worker holds one scene at a time, now that of j%llu\"",
 			log_u64(job), log_u64(t->job));
-	t->since = t->waits ? t->since : now;
-	t->waits = true;
-	t->asked = now;
+	t->waiting_since = t->has_waiter ? t->waiting_since : now;
+	t->has_waiter = true;
+	t->last_refused_at = now;
 	return error_set(e, EAGAIN, "memory ran short, so it holds one scene at a time, now that of j%llu",
 			 log_u64(t->job));
 }
 
 int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e)
 {
-	struct scene_turn *t = &a->turn;
+	struct scene_turn *t = &a->scene_turn;
 	double now = clock_seconds();
 	if (!work_memory_was_short(now))
 		return 0;
-	const struct job_cache *first = keep_one(a, job_cache_find(a->job_caches, job));
+	const struct job_cache *first = keep_one_scene(a, job_cache_find(a->job_caches, job));
 	if (first && first->job != t->job)
 		*t = (struct scene_turn){.job = first->job};
 	if (first && first->job != job)
-		return wait_for(a, job, now, e);
+		return refuse_until_turn(a, job, now, e);
 	if (t->job != job)
 		*t = (struct scene_turn){.job = job};
-	t->waits = t->waits && now - t->asked < asked_seconds;
-	if (t->waits && now - t->since >= turn_seconds)
+	t->has_waiter = t->has_waiter && now - t->last_refused_at < waiter_timeout_seconds;
+	if (t->has_waiter && now - t->waiting_since >= turn_seconds)
 		return error_set(
 			e, EAGAIN,
 			"memory ran short, so it holds one scene at a time, and this one makes way for another job's");

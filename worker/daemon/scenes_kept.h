@@ -11,10 +11,10 @@
 
 void scenes_kept_drop(struct agent *a, struct job_cache *b); /* removes and frees a job */
 /* Returns the first job that waits for this file; NULL if none does. */
-struct job_cache *scenes_kept_who_wants(const struct agent *a, const struct blob_hash *h);
-/* Drops unused scenes of jobs that have ended or failed, the least recently used ones beyond WORLDS_KEPT, and fetches
- * that no job wants. Call whenever a scene may have become unused. */
-void scenes_kept_tidy(struct agent *a);
+struct job_cache *scenes_kept_find_waiting(const struct agent *a, const struct blob_hash *h);
+/* Drops unused scenes of jobs that have ended or failed, the least recently used ones beyond IDLE_WORLDS_MAX, and
+ * fetches that no job wants. Call whenever a scene may have become unused. */
+void scenes_kept_drop_unused(struct agent *a);
 /* Call for each lease that is granted. Returns 0 if the job's scene may be in memory now; -EAGAIN if memory has run
  * short, and another scene is in memory or this one has been for turn_seconds while others waited. If memory has run
  * short, scenes that are not in use are dropped first. */

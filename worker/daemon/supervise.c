@@ -16,14 +16,14 @@
 #include <time.h>
 #include <unistd.h>
 
-static const double first_pause = 0.05, longest_pause = 10, long_life = 30;
+static const double initial_pause = 0.05, max_pause = 10, long_run_seconds = 30;
 
 struct supervisor {
 	sigset_t signals, mask; /* the signals that it waits for; the mask at the start */
 	pid_t child;
-	int asked;    /* the last signal passed on to the process; 0: none */
-	bool again;   /* an earlier process has been lost, so a process that cannot start is tried again */
-	double pause; /* pause before the next start, s */
+	int forwarded_signal;  /* the last signal passed on to the process; 0: none */
+	bool has_lost_process; /* an earlier process has been lost, so a process that cannot start is tried again */
+	double pause_seconds;  /* pause before the next start, s */
 };
 
 /* Under nohup SIGHUP is ignored, also by the rendering process; sigwaitinfo would receive it nevertheless. */
@@ -33,7 +33,7 @@ static bool is_ignored(int number)
 	return sigaction(number, NULL, &a) == 0 && a.sa_handler == SIG_IGN;
 }
 
-static void choose_signals(struct supervisor *s)
+static void block_handled_signals(struct supervisor *s)
 {
 	sigemptyset(&s->signals);
 	sigaddset(&s->signals, SIGCHLD);
@@ -47,14 +47,14 @@ static void choose_signals(struct supervisor *s)
 /* Lets the rendering process notify the service manager's watchdog instead of the supervisor. */
 static void take_over_watchdog(pid_t parent)
 {
-	const char *of = getenv("WATCHDOG_PID");
-	char own[24];
-	snprintf(own, sizeof own, "%ld", (long)getpid());
-	if (of && strtol(of, NULL, 10) == parent)
-		setenv("WATCHDOG_PID", own, 1);
+	const char *watchdog_pid = getenv("WATCHDOG_PID");
+	char own_pid[24];
+	snprintf(own_pid, sizeof own_pid, "%ld", (long)getpid());
+	if (watchdog_pid && strtol(watchdog_pid, NULL, 10) == parent)
+		setenv("WATCHDOG_PID", own_pid, 1);
 }
 
-static int start(struct supervisor *s, int (*run)(void *), void *user)
+static int start_process(struct supervisor *s, int (*run)(void *), void *user)
 {
 	pid_t parent = getpid();
 	fflush(NULL);
@@ -65,7 +65,7 @@ static int start(struct supervisor *s, int (*run)(void *), void *user)
 	if (getppid() != parent)
 		_exit(1);
 	take_over_watchdog(parent);
-	work_catch();
+	work_catch_signals();
 	sigprocmask(SIG_SETMASK, &s->mask, NULL);
 	exit(run(user));
 }
@@ -79,7 +79,7 @@ static int wait_for_end(struct supervisor *s)
 			if (waitpid(s->child, &status, WNOHANG) == s->child)
 				return status;
 		} else if (number > 0) {
-			s->asked = number;
+			s->forwarded_signal = number;
 			kill(s->child, number);
 		}
 	}
@@ -88,9 +88,9 @@ static int wait_for_end(struct supervisor *s)
 /* Returns false if a signal asks the program to end during the pause. */
 static bool pause_before_start(struct supervisor *s)
 {
-	double end = clock_seconds() + s->pause;
-	for (double rest; (rest = end - clock_seconds()) > 0;) {
-		struct timespec t = {(time_t)rest, (long)(1e9 * (rest - (double)(time_t)rest))};
+	double end = clock_seconds() + s->pause_seconds;
+	for (double remaining; (remaining = end - clock_seconds()) > 0;) {
+		struct timespec t = {(time_t)remaining, (long)(1e9 * (remaining - (double)(time_t)remaining))};
 		int number = sigtimedwait(&s->signals, NULL, &t);
 		if (number > 0 && number != SIGCHLD)
 			return false;
@@ -100,23 +100,23 @@ static bool pause_before_start(struct supervisor *s)
 
 /* Exit codes 1 and 2 mean that the process could not start, for instance because a name is not resolved at the moment,
  * a certificate is being replaced, or the disk is full. */
-static bool says_it_cannot_start(int status)
+static bool has_failed_to_start(int status)
 {
 	return WIFEXITED(status) && (WEXITSTATUS(status) == 1 || WEXITSTATUS(status) == 2);
 }
 
 /* Waits for the end of a process that was started. Returns true if it must be replaced; otherwise *code is the
  * program's exit code. */
-static bool is_lost(struct supervisor *s, int *code)
+static bool wait_for_loss(struct supervisor *s, int *code)
 {
 	int status = wait_for_end(s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-	unsigned lost = work_lose(number, clock_seconds());
-	bool unable = s->again && says_it_cannot_start(status);
+	unsigned lost = work_record_loss(number, clock_seconds());
+	bool unable = s->has_lost_process && has_failed_to_start(status);
 	*code = WEXITSTATUS(status);
 	if (!number && !lost && !unable)
 		return false;
-	if (s->asked) {
-		*code = number == s->asked ? 0 : 1;
+	if (s->forwarded_signal) {
+		*code = number == s->forwarded_signal ? 0 : 1;
 		return false;
 	}
 	if (unable)
@@ -127,30 +127,30 @@ static bool is_lost(struct supervisor *s, int *code)
 	return true;
 }
 
-int supervise(unsigned threads, int (*run)(void *), void *user)
+int supervise_process(unsigned threads, int (*run)(void *), void *user)
 {
-	struct supervisor s = {.pause = first_pause};
+	struct supervisor s = {.pause_seconds = initial_pause};
 	struct error e;
 	int code;
-	if (work_share(threads, &e)) {
+	if (work_share_memory(threads, &e)) {
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
 		return 1;
 	}
-	choose_signals(&s);
-	for (;; s.again = true) {
+	block_handled_signals(&s);
+	for (;; s.has_lost_process = true) {
 		double begun = clock_seconds();
-		int rc = start(&s, run, user);
-		if (rc && !s.again) {
+		int rc = start_process(&s, run, user);
+		if (rc && !s.has_lost_process) {
 			fprintf(stderr, "hslt-worker: no process: %s\n", strerror(-rc));
 			return 1;
 		}
 		if (rc)
 			log_event(LOG_PROCESS_LOST, "text=\"no process: %s: it is tried again\"", strerror(-rc));
-		else if (!is_lost(&s, &code))
+		else if (!wait_for_loss(&s, &code))
 			return code;
-		s.pause = clock_seconds() - begun > long_life ? first_pause
-			  : s.pause * 2 < longest_pause	      ? s.pause * 2
-							      : longest_pause;
+		s.pause_seconds = clock_seconds() - begun > long_run_seconds ? initial_pause
+				  : s.pause_seconds * 2 < max_pause	     ? s.pause_seconds * 2
+									     : max_pause;
 		if (!pause_before_start(&s))
 			return 0;
 	}

@@ -11,6 +11,6 @@
 
 /* Calls `run` in a process of its own, and again in a new one after each signal that ends it. Returns the program's
  * exit code in the supervisor; the other process exits with the result of `run`. Call before there are threads. */
-int supervise(unsigned threads, int (*run)(void *user), void *user);
+int supervise_process(unsigned threads, int (*run)(void *user), void *user);
 
 #endif

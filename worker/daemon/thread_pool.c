@@ -13,11 +13,11 @@ struct queue {
 };
 
 struct thread_pool {
-	uv_async_t back;
+	uv_async_t finished_async;
 	pthread_mutex_t lock;
-	pthread_cond_t work;
+	pthread_cond_t work_available;
 	struct queue waiting, finished;
-	unsigned pending, thread_count;
+	unsigned pending_count, thread_count;
 	bool stopping;
 	pthread_t threads[];
 };
@@ -47,7 +47,7 @@ static void *thread_main(void *user)
 	for (;;) {
 		struct task *t = NULL;
 		while (!c->stopping && !(t = queue_pop(&c->waiting)))
-			pthread_cond_wait(&c->work, &c->lock);
+			pthread_cond_wait(&c->work_available, &c->lock);
 		if (!t)
 			break;
 		pthread_mutex_unlock(&c->lock);
@@ -57,13 +57,13 @@ static void *thread_main(void *user)
 		liveness_counter = NULL;
 		pthread_mutex_lock(&c->lock);
 		queue_push(&c->finished, t);
-		uv_async_send(&c->back);
+		uv_async_send(&c->finished_async);
 	}
 	pthread_mutex_unlock(&c->lock);
 	return NULL;
 }
 
-static void on_back(uv_async_t *a)
+static void on_tasks_finished(uv_async_t *a)
 {
 	struct thread_pool *c = a->data;
 	for (;;) {
@@ -72,8 +72,8 @@ static void on_back(uv_async_t *a)
 		pthread_mutex_unlock(&c->lock);
 		if (!t)
 			return;
-		c->pending--;
-		t->done(t);
+		c->pending_count--;
+		t->on_done(t);
 	}
 }
 
@@ -86,13 +86,13 @@ void thread_pool_close(struct thread_pool *c)
 {
 	pthread_mutex_lock(&c->lock);
 	c->stopping = true;
-	pthread_cond_broadcast(&c->work);
+	pthread_cond_broadcast(&c->work_available);
 	pthread_mutex_unlock(&c->lock);
 	for (unsigned i = 0; i < c->thread_count; i++)
 		pthread_join(c->threads[i], NULL);
 	pthread_mutex_destroy(&c->lock);
-	pthread_cond_destroy(&c->work);
-	uv_close((uv_handle_t *)&c->back, on_closed);
+	pthread_cond_destroy(&c->work_available);
+	uv_close((uv_handle_t *)&c->finished_async, on_closed);
 }
 
 int thread_pool_new(struct thread_pool **out, uv_loop_t *loop, unsigned threads, struct error *e)
@@ -100,16 +100,16 @@ int thread_pool_new(struct thread_pool **out, uv_loop_t *loop, unsigned threads,
 	struct thread_pool *c = mem_alloc(1, sizeof *c + threads * sizeof *c->threads);
 	if (!c)
 		return error_set(e, ENOMEM, "no memory for %u threads", threads);
-	int rc = uv_async_init(loop, &c->back, on_back);
+	int rc = uv_async_init(loop, &c->finished_async, on_tasks_finished);
 	if (rc) {
 		mem_free(c);
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
-	c->back.data = c;
+	c->finished_async.data = c;
 	c->waiting.last = &c->waiting.first;
 	c->finished.last = &c->finished.first;
 	pthread_mutex_init(&c->lock, NULL);
-	pthread_cond_init(&c->work, NULL);
+	pthread_cond_init(&c->work_available, NULL);
 	sigset_t all, before;
 	sigfillset(&all);
 	pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -129,12 +129,12 @@ void thread_pool_add(struct thread_pool *c, struct task *t)
 	atomic_store(&t->ticks, 0);
 	pthread_mutex_lock(&c->lock);
 	queue_push(&c->waiting, t);
-	pthread_cond_signal(&c->work);
+	pthread_cond_signal(&c->work_available);
 	pthread_mutex_unlock(&c->lock);
-	c->pending++;
+	c->pending_count++;
 }
 
-bool thread_pool_take_back(struct thread_pool *c, struct task *t)
+bool thread_pool_remove(struct thread_pool *c, struct task *t)
 {
 	bool found = false;
 	pthread_mutex_lock(&c->lock);
@@ -147,11 +147,11 @@ bool thread_pool_take_back(struct thread_pool *c, struct task *t)
 			break;
 		}
 	pthread_mutex_unlock(&c->lock);
-	c->pending -= found;
+	c->pending_count -= found;
 	return found;
 }
 
 unsigned thread_pool_pending(const struct thread_pool *c)
 {
-	return c->pending;
+	return c->pending_count;
 }

@@ -16,11 +16,11 @@
 struct task {
 	struct task *next;
 	void (*run)(struct task *);
-	void (*done)(struct task *); /* called on the loop's thread after `run` */
-	atomic_ullong ticks;	     /* ticks while it runs (common/base/liveness.h); 0: not started */
-	unsigned long long seen;     /* ticks at the last look of hang_watch.c */
-	unsigned still;		     /* looks in a row without progress */
-	bool hung;		     /* given up by hang_watch.c; a thread still has it */
+	void (*on_done)(struct task *); /* called on the loop's thread after `run` */
+	atomic_ullong ticks;		/* ticks while it runs (common/base/liveness.h); 0: not started */
+	unsigned long long last_ticks;	/* ticks at the last look of hang_watch.c */
+	unsigned stalled_checks;	/* looks in a row without progress */
+	bool is_hung;			/* given up by hang_watch.c; a thread still has it */
 };
 
 struct thread_pool;
@@ -28,10 +28,10 @@ struct thread_pool;
 int thread_pool_new(struct thread_pool **c, uv_loop_t *loop, unsigned threads, struct error *e);
 void thread_pool_add(struct thread_pool *c, struct task *t);
 /* Removes a task from the queue. Returns false if it has started. */
-bool thread_pool_take_back(struct thread_pool *c, struct task *t);
-unsigned thread_pool_pending(const struct thread_pool *c); /* tasks added for which `done` has not been called */
-/* Waits for running tasks, for ever if one never ends; `done` is not called any more. The memory is freed when the loop
- * has closed its handle. */
+bool thread_pool_remove(struct thread_pool *c, struct task *t);
+unsigned thread_pool_pending(const struct thread_pool *c); /* tasks added for which `on_done` has not been called */
+/* Waits for running tasks, for ever if one never ends; `on_done` is not called any more. The memory is freed when the
+ * loop has closed its handle. */
 void thread_pool_close(struct thread_pool *c);
 
 #endif

@@ -10,84 +10,86 @@
 #include <sys/mman.h>
 
 /* The work of one thread. */
-struct work {
+struct thread_work {
 	atomic_bool busy; /* key and scene are valid */
 	struct lease_key key;
-	char scene[WORK_SCENE];
+	char scene[WORK_SCENE_SIZE];
 };
 
 struct shared {
-	unsigned threads;
-	atomic_uint taken; /* entries of `of` that belong to a thread */
-	/* Written by the first thread that receives a signal, which sets `claimed` first, and `number` last. */
-	atomic_bool claimed;
-	atomic_int number; /* of the signal that ended the process; 0: none */
-	atomic_int hit;	   /* the entry of the thread that received it; -1: a thread without work */
-	char text[CRASH_TEXT];
-	double short_seconds, short_until; /* length and end of the last period of short memory; 0: none yet */
+	unsigned thread_count;
+	atomic_uint entry_count; /* entries of `entries` that belong to a thread */
+	/* Written by the first thread that receives a signal, which sets `signal_claimed` first, and `signal_number`
+	 * last. */
+	atomic_bool signal_claimed;
+	atomic_int signal_number; /* of the signal that ended the process; 0: none */
+	atomic_int hit_entry;	  /* the entry of the thread that received it; -1: a thread without work */
+	char text[CRASH_TEXT_MAX];
+	double short_period_seconds, short_until; /* length and end of the last period of short memory; 0: none yet */
 	unsigned lost_count;
-	struct lost_lease lost[WORK_THREADS];
-	struct work of[WORK_THREADS];
+	struct lost_lease lost_leases[WORK_THREADS_MAX];
+	struct thread_work entries[WORK_THREADS_MAX];
 };
 
 static struct shared *shared;
-static _Thread_local struct work *own;
+static _Thread_local struct thread_work *own_entry;
 
-int work_share(unsigned threads, struct error *e)
+int work_share_memory(unsigned threads, struct error *e)
 {
 	void *at = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	if (at == MAP_FAILED)
 		return error_set(e, ENOMEM, "no memory to share with the rendering process");
 	shared = at;
-	shared->threads = threads < WORK_THREADS ? threads : WORK_THREADS;
-	atomic_store(&shared->hit, -1);
+	shared->thread_count = threads < WORK_THREADS_MAX ? threads : WORK_THREADS_MAX;
+	atomic_store(&shared->hit_entry, -1);
 	return 0;
 }
 
-static void last_words(int number, const char *text)
+static void record_signal(int number, const char *text)
 {
-	if (atomic_exchange(&shared->claimed, true))
+	if (atomic_exchange(&shared->signal_claimed, true))
 		return; /* another thread came first. Returning may end the process before that thread is done */
-	atomic_store(&shared->hit, own && atomic_load(&own->busy) ? (int)(own - shared->of) : -1);
+	atomic_store(&shared->hit_entry,
+		     own_entry && atomic_load(&own_entry->busy) ? (int)(own_entry - shared->entries) : -1);
 	memcpy(shared->text, text, sizeof shared->text);
-	atomic_store(&shared->number, number);
+	atomic_store(&shared->signal_number, number);
 }
 
-void work_catch(void)
+void work_catch_signals(void)
 {
 	if (shared)
-		crash_catch(last_words);
+		crash_install_handler(record_signal);
 }
 
 void work_begin(const struct lease_key *k, const char *scene)
 {
 	if (!shared)
 		return;
-	if (!own) {
-		unsigned i = atomic_fetch_add(&shared->taken, 1);
-		if (i >= WORK_THREADS)
+	if (!own_entry) {
+		unsigned i = atomic_fetch_add(&shared->entry_count, 1);
+		if (i >= WORK_THREADS_MAX)
 			return;
-		own = &shared->of[i];
-		crash_thread();
+		own_entry = &shared->entries[i];
+		crash_init_thread();
 	}
-	own->key = *k;
-	text_copy(own->scene, sizeof own->scene, scene);
-	atomic_store(&own->busy, true);
+	own_entry->key = *k;
+	text_copy(own_entry->scene, sizeof own_entry->scene, scene);
+	atomic_store(&own_entry->busy, true);
 }
 
 void work_end(void)
 {
-	if (own)
-		atomic_store(&own->busy, false);
+	if (own_entry)
+		atomic_store(&own_entry->busy, false);
 }
 
-static void add_lost_lease(const struct work *w, const char *text, bool machine)
+static void add_lost_lease(const struct thread_work *w, const char *text, bool worker_at_fault)
 {
 	const struct lease_key *k = &w->key;
-	if (shared->lost_count == WORK_THREADS)
+	if (shared->lost_count == WORK_THREADS_MAX)
 		return;
-	struct lost_lease *l = &shared->lost[shared->lost_count++];
-	*l = (struct lost_lease){.key = *k, .own = machine};
+	struct lost_lease *l = &shared->lost_leases[shared->lost_count++];
+	*l = (struct lost_lease){.key = *k, .worker_at_fault = worker_at_fault};
 	text_print(l->text, sizeof l->text,
 		   "%s: the rendering process was ended by %s (j%llu, %s, group %u, part %u, epoch %llu)", w->scene,
 		   text, (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group,
@@ -99,31 +101,33 @@ static void drop_reported(void)
 {
 	unsigned kept = 0;
 	for (unsigned i = 0; i < shared->lost_count; i++)
-		if (!shared->lost[i].reported)
-			shared->lost[kept++] = shared->lost[i];
+		if (!shared->lost_leases[i].reported)
+			shared->lost_leases[kept++] = shared->lost_leases[i];
 	shared->lost_count = kept;
 }
 
-unsigned work_lose(int number, double now)
+unsigned work_record_loss(int number, double now)
 {
-	int said = atomic_load(&shared->number), hit = said ? atomic_load(&shared->hit) : -1;
+	int recorded_signal = atomic_load(&shared->signal_number),
+	    hit = recorded_signal ? atomic_load(&shared->hit_entry) : -1;
 	unsigned before;
 	drop_reported();
 	if (number == SIGKILL)
-		work_memory_short(now);
+		work_note_memory_short(now);
 	before = shared->lost_count;
-	if (said || number)
-		for (unsigned i = 0; i < WORK_THREADS; i++) {
-			const struct work *w = &shared->of[i];
+	if (recorded_signal || number)
+		for (unsigned i = 0; i < WORK_THREADS_MAX; i++) {
+			const struct thread_work *w = &shared->entries[i];
 			if (atomic_load(&w->busy) && (hit < 0 || (unsigned)hit == i))
-				add_lost_lease(w, said ? shared->text : crash_signal_name(number), !said);
+				add_lost_lease(w, recorded_signal ? shared->text : crash_signal_name(number),
+					       !recorded_signal);
 		}
-	for (unsigned i = 0; i < WORK_THREADS; i++)
-		atomic_store(&shared->of[i].busy, false);
-	atomic_store(&shared->taken, 0);
-	atomic_store(&shared->number, 0);
-	atomic_store(&shared->hit, -1);
-	atomic_store(&shared->claimed, false);
+	for (unsigned i = 0; i < WORK_THREADS_MAX; i++)
+		atomic_store(&shared->entries[i].busy, false);
+	atomic_store(&shared->entry_count, 0);
+	atomic_store(&shared->signal_number, 0);
+	atomic_store(&shared->hit_entry, -1);
+	atomic_store(&shared->signal_claimed, false);
 	return shared->lost_count - before;
 }
 
@@ -132,20 +136,20 @@ bool work_memory_was_short(double now)
 	return shared && now < shared->short_until;
 }
 
-void work_memory_short(double now)
+void work_note_memory_short(double now)
 {
-	static const double first = 600, longest = 19200;
+	static const double first_period = 600, max_period = 19200;
 	if (!shared)
 		return;
-	bool again = shared->short_seconds > 0 && now < shared->short_until + shared->short_seconds;
-	if (!again)
-		shared->short_seconds = first;
-	else if (now >= shared->short_until && shared->short_seconds < longest)
-		shared->short_seconds *= 2;
-	shared->short_until = now + shared->short_seconds;
+	bool is_repeated = shared->short_period_seconds > 0 && now < shared->short_until + shared->short_period_seconds;
+	if (!is_repeated)
+		shared->short_period_seconds = first_period;
+	else if (now >= shared->short_until && shared->short_period_seconds < max_period)
+		shared->short_period_seconds *= 2;
+	shared->short_until = now + shared->short_period_seconds;
 }
 
-struct lost_lease *work_lost(unsigned index)
+struct lost_lease *work_lost_lease(unsigned index)
 {
-	return shared && index < shared->lost_count ? &shared->lost[index] : NULL;
+	return shared && index < shared->lost_count ? &shared->lost_leases[index] : NULL;
 }

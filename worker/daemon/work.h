@@ -12,20 +12,20 @@
 
 #include <stdbool.h>
 
-enum { WORK_THREADS = 1024, WORK_SCENE = 128, WORK_TEXT = 512 };
+enum { WORK_THREADS_MAX = 1024, WORK_SCENE_SIZE = 128, WORK_TEXT_SIZE = 512 };
 
 /* A lease of a process that a signal has ended. */
 struct lost_lease {
 	struct lease_key key;
-	char text[WORK_TEXT];
-	bool own; /* this machine is to blame, since nothing shows that the lease was the cause (SIGKILL) */
+	char text[WORK_TEXT_SIZE];
+	bool worker_at_fault; /* this machine is to blame, since nothing shows that the lease was the cause (SIGKILL) */
 	bool reported;
 };
 
 /* Allocates the memory, which is shared with processes forked later. Returns 0 or -ENOMEM. */
-int work_share(unsigned threads, struct error *e);
+int work_share_memory(unsigned threads, struct error *e);
 /* Call in the rendering process: records the signal that ends it. */
-void work_catch(void);
+void work_catch_signals(void);
 
 /* Between the two calls, the calling thread renders the lease, or builds the scene for which the lease waits. */
 void work_begin(const struct lease_key *k, const char *scene);
@@ -34,17 +34,17 @@ void work_end(void);
 /* Call in the supervisor when the rendering process has ended; number: the signal that the kernel reports, 0 for none.
  * Records its leases as lost. Returns their number, which is 0 if the process ended without a signal. now, here and
  * below: time of clock_seconds. */
-unsigned work_lose(int number, double now);
+unsigned work_record_loss(int number, double now);
 
 /* Call when memory has run short: SIGKILL has ended a rendering process, or an allocation has failed while several
  * scenes were in memory. */
-void work_memory_short(double now);
+void work_note_memory_short(double now);
 /* Returns whether memory has run short recently: within the last ten minutes. If it runs short again soon after such a
  * period, within as much time as the period had, the next period is twice as long, up to 320 minutes: memory that runs
  * short so soon again needs the limit. */
 bool work_memory_was_short(double now);
 
 /* Returns the index-th lease lost with earlier processes; NULL after the last. */
-struct lost_lease *work_lost(unsigned index);
+struct lost_lease *work_lost_lease(unsigned index);
 
 #endif

@@ -21,7 +21,7 @@ static void make_seed(char seed[SEED_HEX])
 		snprintf(seed + 2 * i, 3, "%02x", bytes[i]);
 }
 
-static void read_last(const char *path, char seed[SEED_HEX], uint64_t *count)
+static void read_start_count(const char *path, char seed[SEED_HEX], uint64_t *count)
 {
 	char line[LINE_BYTES];
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
@@ -36,7 +36,7 @@ static void read_last(const char *path, char seed[SEED_HEX], uint64_t *count)
 	*count = 0;
 }
 
-static int write_next(const char *folder, const char *path, const char *seed, uint64_t count, struct error *e)
+static int write_start_count(const char *folder, const char *path, const char *seed, uint64_t count, struct error *e)
 {
 	char line[LINE_BYTES];
 	int n = snprintf(line, sizeof line, "%s %" PRIu64 "\n", seed, count);
@@ -44,22 +44,22 @@ static int write_next(const char *folder, const char *path, const char *seed, ui
 	return rc ? rc : disk_sync_folder(folder, e);
 }
 
-int worker_identity_begin(struct worker_identity *l, const char *folder, const char *name, struct error *e)
+int worker_identity_count_start(struct worker_identity *l, const char *folder, const char *name, struct error *e)
 {
 	char path[PATH_BYTES], seed[SEED_HEX] = "", text[SEED_HEX + 64], host[64] = "", hex[BLOB_HEX_SIZE];
 	struct blob_hash h;
 	*l = (struct worker_identity){"", 0};
 	snprintf(path, sizeof path, "%s/%s", folder, name);
-	read_last(path, seed, &l->restarts);
+	read_start_count(path, seed, &l->restarts);
 	l->restarts++;
-	int rc = write_next(folder, path, seed, l->restarts, e);
+	int rc = write_start_count(folder, path, seed, l->restarts, e);
 	gethostname(host, sizeof host - 1);
 	snprintf(text, sizeof text, "%s %s", seed, host);
 	if (!rc)
 		rc = blob_hash_bytes(text, strlen(text), &h, e);
 	if (rc)
 		return rc;
-	blob_hex(&h, hex);
-	memcpy(l->home, hex, WORKER_IDENTITY_HOME - 1);
+	blob_hash_to_hex(&h, hex);
+	memcpy(l->home, hex, WORKER_IDENTITY_HOME_SIZE - 1);
 	return 0;
 }

@@ -11,15 +11,15 @@
 
 #include <stdint.h>
 
-enum { WORKER_IDENTITY_HOME = 33 };
+enum { WORKER_IDENTITY_HOME_SIZE = 33 };
 
 struct worker_identity {
-	char home[WORKER_IDENTITY_HOME]; /* hexadecimal; "": starts are not counted */
+	char home[WORKER_IDENTITY_HOME_SIZE]; /* hexadecimal; "": starts are not counted */
 	uint64_t restarts;
 };
 
 /* Increments the number of starts in folder/name, durably; the caller holds a lock for that name. If the file is
  * missing or invalid, a new home begins. Returns 0, or -errno if the file cannot be written; the home is then "". */
-int worker_identity_begin(struct worker_identity *l, const char *folder, const char *name, struct error *e);
+int worker_identity_count_start(struct worker_identity *l, const char *folder, const char *name, struct error *e);
 
 #endif

@@ -35,41 +35,43 @@
 #define RENDER_CHOICES_TEXT RENDER_CHOICES(RENDER_CHOICES_FIRST, RENDER_CHOICES_OTHER)
 
 /* The measurements for one integrator. */
-struct render_found {
+struct render_measurement {
 	/* Variance of a sample's relative contribution, without the few largest contributions, times rays per sample;
 	 * infinite if there is no other light. */
 	double cost;
-	double rare;	/* share of the energy that exceeds RENDER_RARE times the brightness of its place */
-	double tail;	/* tail index of the largest contributions, one in RENDER_TAIL samples */
-	double extreme; /* tail index of one in RENDER_EXTREME; 1 where fewer carry light */
-	double evi;	/* extreme-value index of one in RENDER_EVI; 1 where fewer carry light */
-	double most;	/* share of the energy in the largest contribution of a single sample */
+	double rare_share; /* share of the energy that exceeds RENDER_RARE_FACTOR times the brightness of its place */
+	double tail_index; /* tail index of the largest contributions, one in RENDER_TAIL_INTERVAL samples */
+	double extreme_tail_index;  /* tail index of one in RENDER_EXTREME_INTERVAL; 1 where fewer carry light */
+	double extreme_value_index; /* extreme-value index of one in RENDER_EXTREME_VALUE_INTERVAL; 1 where fewer carry
+				       light */
+	double largest_share;	    /* share of the energy in the largest contribution of a single sample */
 };
-enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
+enum { RENDER_TAIL_INTERVAL = 128, RENDER_EXTREME_INTERVAL = 512, RENDER_EXTREME_VALUE_INTERVAL = 256 };
 
 struct render_choice {
-	struct render_found path, bdpt;
-	struct rare_light merged; /* rare light for bdpt, by merging; 0 if no lobe is narrow or media scatter */
-	double found; /* path's mean divided by bdpt's: the fraction of the light that path finds; 0: unknown */
+	struct render_measurement path, bdpt;
+	struct rare_light merging; /* rare light for bdpt, by merging; 0 if no lobe is narrow or media scatter */
+	double found_fraction; /* path's mean divided by bdpt's: the fraction of the light that path finds; 0: unknown
+				*/
 	/* Path cannot find all light: that of a point or a direction through a specular lobe, or any light at all. */
-	bool misses;
-	bool dark;	  /* path finds almost nothing */
-	bool media_shine; /* media emit light, which the chains of hslt cannot find */
-	bool focuses;	  /* there are narrow lobes, whose caustics a pilot may have missed */
+	bool path_misses_light;
+	bool path_is_dark;     /* path finds almost nothing */
+	bool media_emit;       /* media emit light, which the chains of hslt cannot find */
+	bool has_narrow_lobes; /* there are narrow lobes, whose caustics a pilot may have missed */
 	/* Surfaces let light through as well: a pilot may have missed the lamps behind them. */
-	bool refracts;
-	bool brief;   /* too few samples to trust a tail index where lobes are narrow */
-	bool settled; /* the choice was clear without bdpt, about which nothing is known */
+	bool transmits;
+	bool is_brief;	 /* too few samples to trust a tail index where lobes are narrow */
+	bool is_settled; /* the choice was clear without bdpt, about which nothing is known */
 	/* Samples of the pilot, of all kinds; of bdpt only a quarter if that is enough. At most about 1 in 7 of a short
 	 * render's samples, or 3 times 4,096; 1 in 30 of a long render's, 1 in 120 of one that takes hours. Samples of
 	 * `path` with which single bright samples of bdpt are compared, at most an eighth, are not included. */
-	uint64_t samples;
+	uint64_t sample_count;
 };
 
 /* Sets integrator, kind and mixture of the request; everything else is kept. Ticks. Returns -ENOMEM or -EINVAL. */
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e);
 /* Returns the name of the integrator to use according to the measurements. Pure. */
-const char *render_choice_of(const struct render_choice *c);
+const char *render_choice_integrator(const struct render_choice *c);
 /* Whether the measurements of path and of merging suffice for a choice. Pure. */
 bool render_choice_is_settled(const struct render_choice *c);
 /* Writes one sentence for people, without figures. Pure. */

@@ -3,16 +3,16 @@
 
 #include "worker/render/path/integrator.h"
 
-const struct render_integrator *render_integrator_find(const char *name)
+const struct integrator_properties *render_integrator_find(const char *name)
 {
 	const struct integrator *i = integrator_find(name);
-	return i ? &i->face : NULL;
+	return i ? &i->properties : NULL;
 }
 
-const struct render_integrator *render_integrator_at(size_t index)
+const struct integrator_properties *render_integrator_at(size_t index)
 {
 	for (size_t i = 0; i <= index; i++)
 		if (!integrator_registry[i])
 			return NULL;
-	return &integrator_registry[index]->face;
+	return &integrator_registry[index]->properties;
 }

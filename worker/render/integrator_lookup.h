@@ -3,12 +3,12 @@
 #ifndef WORKER_RENDER_INTEGRATOR_LOOKUP_H
 #define WORKER_RENDER_INTEGRATOR_LOOKUP_H
 
-#include "worker/render/path/integrator_face.h"
+#include "worker/render/path/integrator_properties.h"
 
 #include <stddef.h>
 
 /* Returns NULL if there is none of that name, or at the end; the index counts from 0. */
-const struct render_integrator *render_integrator_find(const char *name);
-const struct render_integrator *render_integrator_at(size_t index);
+const struct integrator_properties *render_integrator_find(const char *name);
+const struct integrator_properties *render_integrator_at(size_t index);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Runs leases. check() tests whether plan, key and input fit, prepare() allocates all memory that the lease needs,
- * and run_job() draws samples or runs chains into the film of the lease (film/sums.h), whose touched tiles make up
- * the batch. Samples are numbered by pixel and round, chains by their index, so that any thread on any machine draws
+ * Runs leases. check_job() tests whether plan, key and input fit, prepare_job() allocates all memory that the lease
+ * needs, and run_job() draws samples or runs chains into the film of the lease (film/sums.h), whose touched tiles make
+ * up the batch. Samples are numbered by pixel and round, chains by their index, so that any thread on any machine draws
  * the same random numbers.
  *
  * Failures: -EINVAL if the inputs do not fit, -EILSEQ for invalid states, -EDOM if an invalid operation was trapped
@@ -17,7 +17,7 @@
 #include "worker/render/chain/chain.h"
 #include "worker/render/chain/redistribution.h"
 #include "worker/render/halfvec/refract.h"
-#include "worker/render/map.h"
+#include "worker/render/brightness_map.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/longer.h"
@@ -29,17 +29,17 @@
 #include <string.h>
 
 /* The working state of one lease. */
-struct job {
+struct lease_job {
 	const struct plan *plan;
 	const struct lease_key *key;
 	const struct integrator *integrator;
 	const atomic_bool *stop;
 	struct path_context context;
 	struct path_sample sample;
-	struct film_sums film;
+	struct film_sums sums;
 	struct chain *chain;
 	struct redistribution *redistribution; /* NULL: the integrator does not redistribute */
-	struct brightness *own_map;
+	struct brightness *owned_map;
 	struct batch *out;
 	struct error *e;
 	/* Current position: row and column, or chain and mutation; for a bootstrap, index is the sample. */
@@ -48,10 +48,10 @@ struct job {
 
 enum { STOP_INTERVAL = 16 }; /* samples or mutations between checks of the stop flag; one sample may take 10 ms */
 enum {
-	BEYOND_INTERVAL = 16
+	LONGER_INTERVAL = 16
 }; /* one in this many bootstrap samples also estimates paths that are too long to simulate */
 
-static bool is_stopped(const struct job *j)
+static bool is_stopped(const struct lease_job *j)
 {
 	liveness_tick();
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
@@ -84,24 +84,24 @@ static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64
 }
 
 /* Evaluates sample i of the group in that pixel. */
-static void take_sample(struct job *j, struct sampler *s, uint64_t pixel, uint64_t i)
+static void evaluate_sample(struct lease_job *j, struct sampler *s, uint64_t pixel, uint64_t i)
 {
 	const struct film_window *w = &j->context.window;
 	double area = w->width * w->height;
 	if (j->redistribution)
 		j->context.split = redistribution_begin(j->redistribution, pixel, i * j->plan->groups + j->key->group);
 	j->integrator->evaluate(&j->context, s, &j->sample);
-	for (uint32_t k = 0; k < j->sample.count; k++)
-		film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
+	for (uint32_t k = 0; k < j->sample.splat_count; k++)
+		film_sums_splat(&j->sums, &j->sample.splats[k], 1 / area);
 	double intensity = j->sample.intensity;
 	if (j->redistribution)
-		intensity += redistribution_taken(j->redistribution);
+		intensity += redistribution_spread_intensity(j->redistribution);
 	j->out->independent_sum += intensity;
 	j->out->independent_square += intensity * intensity;
 	j->out->counters[COUNT_SAMPLES]++;
 }
 
-static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
+static enum lease_outcome sample_pixel(struct lease_job *j, uint64_t column, uint64_t row)
 {
 	const struct plan *p = j->plan;
 	const struct film_window *w = &j->context.window;
@@ -116,13 +116,13 @@ static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
 		uint64_t sample = j->key->epoch * p->epoch + i;
 		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel, j->key->group, sample);
 		s.sobol.base.block = pixel_block;
-		take_sample(j, &s.sobol.base, pixel, sample);
+		evaluate_sample(j, &s.sobol.base, pixel, sample);
 	}
 	j->out->counters[COUNT_INDEPENDENT] += p->epoch;
 	return LEASE_DONE;
 }
 
-static enum lease_end run_samples(struct job *j)
+static enum lease_outcome run_samples(struct lease_job *j)
 {
 	struct plan_range rows = plan_row_range(j->plan, j->key->part);
 	for (uint64_t row = rows.begin; row < rows.end; row++)
@@ -135,11 +135,11 @@ static enum lease_end run_samples(struct job *j)
 	return LEASE_DONE;
 }
 
-static enum lease_end run_bootstrap(struct job *j)
+static enum lease_outcome run_bootstrap(struct lease_job *j)
 {
 	struct plan_range r = plan_bootstrap_range(j->plan, j->key->group, j->key->part);
 	struct batch *out = j->out;
-	uint32_t longest = j->plan->max_depth < PATH_MAX_EDGES ? j->plan->max_depth : LONGER_EDGES;
+	uint32_t max_edges = j->plan->max_depth < PATH_EDGES_MAX ? j->plan->max_depth : LONGER_EDGES_MAX;
 	for (uint64_t i = r.begin; i < r.end; i++) {
 		if ((i - r.begin) % STOP_INTERVAL == 0 && is_stopped(j))
 			return LEASE_STOPPED;
@@ -148,31 +148,32 @@ static enum lease_end run_bootstrap(struct job *j)
 		sampler_random_init(&s, j->plan->seed, RNG_BOOTSTRAP, i, 0);
 		j->integrator->evaluate(&j->context, &s.base, &j->sample);
 		double intensity = j->sample.intensity;
-		for (uint32_t rest = j->sample.classes; rest; rest &= rest - 1) {
-			int k = __builtin_ctz(rest);
-			out->classes[k] += j->sample.of_class[k];
+		for (uint32_t remaining = j->sample.class_mask; remaining; remaining &= remaining - 1) {
+			int k = __builtin_ctz(remaining);
+			out->classes[k] += j->sample.class_intensity[k];
 		}
 		out->weights[i - r.begin] = (float)intensity;
 		out->independent_sum += intensity;
 		out->independent_square += intensity * intensity;
 		out->counters[COUNT_SAMPLES]++;
 		out->counters[COUNT_INDEPENDENT]++;
-		if (longest > j->context.max_depth && i % BEYOND_INTERVAL == 0)
-			out->beyond_sum +=
-				BEYOND_INTERVAL * longer_paths(&j->context, j->plan->seed, i, longest, &j->sample);
+		if (max_edges > j->context.max_depth && i % LONGER_INTERVAL == 0)
+			out->beyond_sum += LONGER_INTERVAL * longer_paths_sample_energy(&j->context, j->plan->seed, i,
+											max_edges, &j->sample);
 	}
 	return LEASE_DONE;
 }
 
-static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, uint64_t id, enum lease_end *end)
+static int run_chain(struct lease_job *j, const struct lease_input *in, uint32_t k, uint64_t id,
+		     enum lease_outcome *result)
 {
 	struct chain *c = j->chain;
 	const struct chain_ops *ops = j->integrator->chain;
 	*c = (struct chain){.integrator = j->integrator,
 			    .context = &j->context,
-			    .film = &j->film,
+			    .film = &j->sums,
 			    .mixture = j->plan->mutations,
-			    .strategy = j->out->strategy,
+			    .strategy_counters = j->out->strategies,
 			    .seed = j->plan->seed,
 			    .id = id,
 			    .step = j->key->epoch * j->plan->epoch};
@@ -191,90 +192,92 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 	uint64_t accepted = j->out->counters[COUNT_ACCEPTED];
 	for (uint64_t i = 0; i < j->plan->epoch; i++) {
 		if (i % STOP_INTERVAL == 0 && is_stopped(j)) {
-			*end = LEASE_STOPPED;
+			*result = LEASE_STOPPED;
 			return 0;
 		}
 		j->index = i + 1;
 		ops->step(c, &sums);
 	}
 	ops->flush(c);
-	if (batch_sequences(j->plan) > 1)
-		chain_moments_end_sequence(&j->film.moments, j->out->moments + (size_t)k * batch_film_tiles(j->plan));
+	if (batch_sequence_count(j->plan) > 1)
+		chain_moments_end_sequence(&j->sums.moments,
+					   j->out->moments + (size_t)k * batch_film_tile_count(j->plan));
 	j->out->counters[COUNT_STUCK] += j->out->counters[COUNT_ACCEPTED] == accepted;
 	j->out->independent_sum += sums.sum;
-	j->out->independent_square += sums.square;
+	j->out->independent_square += sums.square_sum;
 	return ops->save(c, &j->out->states[k]);
 }
 
-static int run_chains(struct job *j, const struct lease_input *in, enum lease_end *end)
+static int run_chains(struct lease_job *j, const struct lease_input *in, enum lease_outcome *result)
 {
 	struct plan_range r = plan_chain_range(j->plan, j->key->part);
 	if (!in || in->chain_count != r.end - r.begin || (!in->seeds && !in->states))
 		return error_set(j->e, EINVAL, "a lease of %llu chains came with another number of states or seeds",
 				 (unsigned long long)(r.end - r.begin));
-	*end = LEASE_DONE;
-	for (uint64_t k = r.begin; k < r.end && *end == LEASE_DONE; k++) {
-		int rc = run_chain(j, in, (uint32_t)(k - r.begin), j->key->group + j->plan->groups * k, end);
+	*result = LEASE_DONE;
+	for (uint64_t k = r.begin; k < r.end && *result == LEASE_DONE; k++) {
+		int rc = run_chain(j, in, (uint32_t)(k - r.begin), j->key->group + j->plan->groups * k, result);
 		if (rc)
 			return rc == -ENOMEM ? error_set(j->e, ENOMEM, "out of memory for chain states") : rc;
 	}
-	if (batch_sequences(j->plan) == 1)
-		chain_moments_end_sequence(&j->film.moments, j->out->moments);
-	size_t second = (size_t)batch_sequences(j->plan) * batch_film_tiles(j->plan);
-	chain_moments_end(&j->film.moments, j->out->moments + second, j->out->classes);
+	if (batch_sequence_count(j->plan) == 1)
+		chain_moments_end_sequence(&j->sums.moments, j->out->moments);
+	size_t second = (size_t)batch_sequence_count(j->plan) * batch_film_tile_count(j->plan);
+	chain_moments_end_lease(&j->sums.moments, j->out->moments + second, j->out->classes);
 	return 0;
 }
 
-static int check(const struct world *w, const struct plan *p, const struct integrator *i, struct error *e)
+static int check_job(const struct world *w, const struct plan *p, const struct integrator *i, struct error *e)
 {
 	if (!i)
 		return error_set(e, EINVAL, "no integrator is called '%s'", p->integrator);
-	if (i->face.kind != p->kind)
+	if (i->properties.kind != p->kind)
 		return error_set(e, EINVAL, "integrator '%s' and the plan differ in kind", p->integrator);
 	if (p->width != w->settings.width || p->height != w->settings.height || p->border != w->settings.border)
 		return error_set(
 			e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
 			p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
-	if (i->face.from_camera && world_has_beam(w))
-		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->face.name);
-	if (!i->face.from_camera && world_rolls(w))
-		return error_set(e, EINVAL, RENDER_NO_ROLL, i->face.name);
-	if (i->face.to_emitters && w->effects.medium_light)
-		return error_set(e, EINVAL, RENDER_NO_GLOW, i->face.name);
+	if (i->properties.only_from_camera && world_has_beam(w))
+		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->properties.name);
+	if (!i->properties.only_from_camera && world_has_rolling_shutter(w))
+		return error_set(e, EINVAL, RENDER_NO_ROLLING_SHUTTER, i->properties.name);
+	if (i->properties.ends_on_emitters && w->effects.medium_light)
+		return error_set(e, EINVAL, RENDER_NO_MEDIUM_LIGHT, i->properties.name);
 	struct mixture unused;
 	char accuracy[PLAN_ACCURACY_MAX];
 	accuracy_settings_print(&w->accuracy, accuracy);
 	if (strcmp(accuracy, p->accuracy) != 0)
 		return error_set(e, EINVAL, "the plan's settings are '%s', those of the world '%s'", p->accuracy,
 				 accuracy);
-	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
+	if (i->properties.has_mutations && mixture_parse(p->mutations, &unused, e))
 		return -EINVAL;
-	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
+	if (p->max_depth < 1 || p->max_depth > PATH_EDGES_MAX)
 		return error_set(e, EINVAL, "a depth of %u edges is not between 1 and %d", p->max_depth,
-				 PATH_MAX_EDGES);
+				 PATH_EDGES_MAX);
 	return 0;
 }
 
-static int prepare_redistribution(struct job *j, const struct brightness *map, struct error *e)
+static int prepare_redistribution(struct lease_job *j, const struct brightness *map, struct error *e)
 {
-	int rc = map ? 0 : render_map_new(j->context.w, j->plan, &j->own_map, e);
+	int rc = map ? 0 : render_brightness_map_new(j->context.w, j->plan, &j->owned_map, e);
 	if (rc)
 		return rc;
-	return redistribution_new(&j->redistribution, &redistribution_usual, &j->context, map ? map : j->own_map,
-				  j->plan->seed, &j->film.target, j->out->classes, e);
+	return redistribution_new(&j->redistribution, &redistribution_default_rule, &j->context,
+				  map ? map : j->owned_map, j->plan->seed, &j->sums.target, j->out->classes, e);
 }
 
-static int prepare(struct job *j, const struct world *w, const struct lease_input *in, struct error *e)
+static int prepare_job(struct lease_job *j, const struct world *w, const struct lease_input *in, struct error *e)
 {
 	const struct plan *p = j->plan;
-	uint32_t depth = p->max_depth < j->integrator->face.max_depth ? p->max_depth : j->integrator->face.max_depth;
+	uint32_t depth =
+		p->max_depth < j->integrator->properties.max_depth ? p->max_depth : j->integrator->properties.max_depth;
 	j->context.w = w;
-	j->context.window = film_window_of(p);
+	j->context.window = film_window_from_plan(p);
 	j->context.min_depth = p->min_depth;
 	j->context.max_depth = depth;
 	j->context.light_every = j->integrator->light_every;
-	j->context.roulette = p->kind == PLAN_SAMPLES ? PATH_ROULETTE : 0;
-	j->context.unclassed = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
+	j->context.max_survival = p->kind == PLAN_SAMPLES ? PATH_SURVIVAL_MAX : 0;
+	j->context.skips_classes = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
 	j->context.counters = j->out->counters;
 	j->context.refract = halfvec_refract;
 	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
@@ -297,26 +300,26 @@ static int prepare(struct job *j, const struct world *w, const struct lease_inpu
 			return error_set(e, ENOMEM, "out of memory for chain states");
 	}
 	int rc = j->integrator->redistributes ? prepare_redistribution(j, in ? in->map : NULL, e) : 0;
-	return rc ? rc : film_sums_init(&j->film, p, &w->settings, e);
+	return rc ? rc : film_sums_init(&j->sums, p, &w->settings, e);
 }
 
-static int run_job(struct job *j, const struct lease_input *in, enum lease_end *end)
+static int run_job(struct lease_job *j, const struct lease_input *in, enum lease_outcome *result)
 {
 	if (j->key->kind == LEASE_BOOTSTRAP) {
-		*end = run_bootstrap(j);
+		*result = run_bootstrap(j);
 		return 0;
 	}
 	int rc = 0;
 	if (j->plan->kind == PLAN_SAMPLES)
-		*end = run_samples(j);
+		*result = run_samples(j);
 	else
-		rc = run_chains(j, in, end);
-	if (rc || *end == LEASE_STOPPED)
+		rc = run_chains(j, in, result);
+	if (rc || *result == LEASE_STOPPED)
 		return rc;
-	return film_sums_take(&j->film, j->out, j->e);
+	return film_sums_add_tiles(&j->sums, j->out, j->e);
 }
 
-static int invalid_operation(const struct job *j)
+static int invalid_operation(const struct lease_job *j)
 {
 	char place[128];
 	unsigned long long sequence = j->sequence, index = j->index, group = j->key->group, epoch = j->key->epoch;
@@ -333,29 +336,29 @@ static int invalid_operation(const struct job *j)
 
 /* Runs a job and catches invalid operations. All memory belongs to the job, so that nothing leaks when an invalid
  * operation leaves it in the middle. */
-static int run_caught(struct job *j, const struct lease_input *in, enum lease_end *end)
+static int run_guarded(struct lease_job *j, const struct lease_input *in, enum lease_outcome *result)
 {
-	jmp_buf back;
-	if (setjmp(back))
+	jmp_buf jump;
+	if (setjmp(jump))
 		return invalid_operation(j);
-	jmp_buf *caught = fptrap_catch(&back);
-	bool watched = fptrap_watch();
-	int rc = run_job(j, in, end);
-	fptrap_unwatch(watched);
-	fptrap_catch(caught);
+	jmp_buf *previous_jump = fptrap_catch(&jump);
+	bool was_watched = fptrap_watch();
+	int rc = run_job(j, in, result);
+	fptrap_unwatch(was_watched);
+	fptrap_catch(previous_jump);
 	return rc;
 }
 
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
-		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e)
+		 const atomic_bool *stop, enum lease_outcome *result, struct batch *out, struct error *e)
 {
 	*out = (struct batch){.key = *k};
-	*end = LEASE_DONE;
+	*result = LEASE_DONE;
 	const struct integrator *integrator = integrator_find(p->integrator);
-	int rc = check(w, p, integrator, e);
+	int rc = check_job(w, p, integrator, e);
 	if (rc)
 		return rc;
-	struct job *j = mem_alloc(1, sizeof *j);
+	struct lease_job *j = mem_alloc(1, sizeof *j);
 	if (!j)
 		return error_set(e, ENOMEM, "out of memory for a lease");
 	j->plan = p;
@@ -365,18 +368,18 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	j->out = out;
 	j->e = e;
 	double start = clock_thread_seconds();
-	crash_place(k->kind == LEASE_BOOTSTRAP ? "rendering bootstrap samples" : "rendering", NULL, 0);
-	rc = prepare(j, w, in, e);
+	crash_set_context(k->kind == LEASE_BOOTSTRAP ? "rendering bootstrap samples" : "rendering", NULL, 0);
+	rc = prepare_job(j, w, in, e);
 	if (!rc)
-		rc = run_caught(j, in, end);
-	film_sums_fini(&j->film);
+		rc = run_guarded(j, in, result);
+	film_sums_fini(&j->sums);
 	redistribution_free(j->redistribution);
-	render_map_free(j->own_map);
+	render_brightness_map_free(j->owned_map);
 	mem_free(j->chain);
 	mem_free(j);
-	crash_place(NULL, NULL, 0);
+	crash_set_context(NULL, NULL, 0);
 	out->cpu_seconds = clock_thread_seconds() - start;
-	if (rc || *end == LEASE_STOPPED)
+	if (rc || *result == LEASE_STOPPED)
 		batch_fini(out);
 	return rc;
 }

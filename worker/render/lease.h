@@ -7,7 +7,7 @@
 
 #include <stdatomic.h>
 
-struct brightness; /* map.h */
+struct brightness; /* brightness_map.h */
 struct world;
 
 /* The input of a lease: at epoch 0 its seeds (bootstrap indices, one per chain), later the states after the previous
@@ -19,13 +19,13 @@ struct lease_input {
 	const struct brightness *map;	  /* NULL: a lease that needs a map makes an identical one itself */
 };
 
-enum lease_end { LEASE_DONE, LEASE_STOPPED };
+enum lease_outcome { LEASE_DONE, LEASE_STOPPED };
 
 /* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time; then the lease is
  * abandoned. Returns -ENOMEM, -EILSEQ (states that cannot be resumed), -EINVAL (plan and world do not fit), or -EDOM
  * (an invalid floating-point operation; the error message says where). Ticks (common/base/liveness.h) at least every
  * 16 samples or mutations. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
-		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);
+		 const atomic_bool *stop, enum lease_outcome *result, struct batch *out, struct error *e);
 
 #endif

@@ -12,8 +12,8 @@ const char *render_mutation_at(size_t index, const char **summary)
 	return mutation_registry[index]->name;
 }
 
-int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
-		     struct error *e)
+int render_canonical_mutations(const char *text, const struct render_summary *summary,
+			       char canonical[PLAN_MUTATIONS_MAX], struct error *e)
 {
 	struct mixture m;
 	if (text && *text) {
@@ -21,7 +21,7 @@ int render_mutations(const char *text, const struct render_summary *summary, cha
 		if (rc)
 			return rc;
 	} else {
-		mixture_default(summary, &m);
+		mixture_init_default(summary, &m);
 	}
 	mixture_print(&m, canonical);
 	return 0;

@@ -13,7 +13,7 @@ const char *render_mutation_at(size_t index, const char **summary);
 /* Writes the mixture of an integrator with has_mutations as stored in a plan: "independent=0.1,hslt=0.9". text: NAME or
  * NAME=WEIGHT, separated by commas; NULL or "": the default for the scene. A canonical text does not change. Returns
  * -EINVAL and an error message. */
-int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
-		     struct error *e);
+int render_canonical_mutations(const char *text, const struct render_summary *summary,
+			       char canonical[PLAN_MUTATIONS_MAX], struct error *e);
 
 #endif

@@ -15,9 +15,9 @@ enum pilot_step {
 	PILOT_PATH,
 	PILOT_BDPT,
 	PILOT_PIXEL,
-	PILOT_BESIDE,
-	PILOT_MERGED, /* also uses the next number */
-	PILOT_UNSEEN_MAP = PILOT_MERGED + 2,
+	PILOT_COMPARED,
+	PILOT_MERGING, /* also uses the next number */
+	PILOT_UNSEEN_MAP = PILOT_MERGING + 2,
 	PILOT_UNSEEN, /* also uses the next three numbers */
 };
 
@@ -33,7 +33,7 @@ uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels);
 /* Makes a plan with the film and the random numbers of the render, checked like the render's own; then
  * extends it to the whole film, so that a crop has the same pilot as the whole, and the same pixels. Returns
  * -EINVAL and an error message. */
-int pilot_film(const struct plan_request *r, struct plan *p, struct error *e);
+int pilot_make_plan(const struct plan_request *r, struct plan *p, struct error *e);
 
 /* Whether the scene itself has the effect, regardless of what the user forces. */
 bool pilot_scene_has(const struct render_summary *s, const char *effect);

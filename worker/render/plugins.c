@@ -15,12 +15,12 @@
 enum { PLUGINS_MAX = 128 };
 
 static struct plugin_decl decls[PLUGINS_MAX];
-static size_t count;
+static size_t decl_count;
 
 static void add_plugin(struct plugin_decl d)
 {
-	assert(count + 1 < PLUGINS_MAX);
-	decls[count++] = d;
+	assert(decl_count + 1 < PLUGINS_MAX);
+	decls[decl_count++] = d;
 }
 
 static void gather_plugins(void)
@@ -45,8 +45,8 @@ static void gather_plugins(void)
 
 const struct plugin_decl *render_plugins(void)
 {
-	static pthread_once_t once = PTHREAD_ONCE_INIT;
-	pthread_once(&once, gather_plugins);
+	static pthread_once_t gather_once = PTHREAD_ONCE_INIT;
+	pthread_once(&gather_once, gather_plugins);
 	return decls;
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * rare_light traces light sub-paths, then camera sub-paths, each of which is merged with the photons around it.
- * Contributions count as far as they exceed RENDER_RARE times the brightness of their place.
+ * rare_light_estimate traces light sub-paths, then camera sub-paths, each of which is merged with the photons around
+ * it. Contributions count as far as they exceed RENDER_RARE_FACTOR times the brightness of their place.
  *
  * The map of brightness is made from few samples: where they found no light it is too dark. A bright spot in a dark
  * corner would then be called rare however easily it is found, so its photons correct the map (merging_scale). Light
@@ -12,34 +12,35 @@
 
 #include "worker/render/path/merging.h"
 
-struct sums {
-	double scale;	     /* 1 / the brightness of the place */
-	double here, beyond; /* light of its photons, and the rare part of it */
+struct rare_light_sums {
+	double scale;		  /* 1 / the brightness of the place */
+	double light, rare_light; /* light of its photons, and the rare part of it */
 };
 
-static void add_beyond(void *user, const struct merged *m)
+static void add_rare_light(void *user, const struct merged *m)
 {
-	struct sums *s = user;
-	s->beyond += s->scale * m->brings * fmax(1 - RENDER_RARE / (s->scale * m->bdpt), 0);
+	struct rare_light_sums *s = user;
+	s->rare_light +=
+		s->scale * m->contribution * fmax(1 - RENDER_RARE_FACTOR / (s->scale * m->bdpt_contribution), 0);
 }
 
-int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
-	       struct rare_light *out)
+int rare_light_estimate(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step,
+			uint64_t samples, struct rare_light *out)
 {
 	struct merging m;
 	*out = (struct rare_light){0, 0};
-	int rc = merging_photons(&m, c, seed, step, samples);
-	for (uint64_t i = 0; i < m.paths && m.count && !rc; i++) {
-		struct merging_place place;
-		struct sums s = {0};
-		if (!merging_walk(&m, c, seed, step + 1, i, &place))
+	int rc = merging_trace_photons(&m, c, seed, step, samples);
+	for (uint64_t i = 0; i < m.path_count && m.photon_count && !rc; i++) {
+		struct merging_point point;
+		struct rare_light_sums s = {0};
+		if (!merging_walk_camera(&m, c, seed, step + 1, i, &point))
 			continue;
-		s.scale = merging_scale(&m, c, &place, map, &s.here);
+		s.scale = merging_scale(&m, c, &point, map, &s.light);
 		if (!(s.scale > 0))
 			continue;
-		merging_each(&m, c, &place, add_beyond, &s);
-		out->share += s.beyond / (double)m.paths;
-		out->seen += s.scale * s.here / (double)m.paths;
+		merging_for_each(&m, c, &point, add_rare_light, &s);
+		out->rare_share += s.rare_light / (double)m.path_count;
+		out->seen_share += s.scale * s.light / (double)m.path_count;
 	}
 	merging_fini(&m);
 	return rc;

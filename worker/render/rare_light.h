@@ -10,16 +10,16 @@
 #include "worker/render/path/brightness.h"
 
 /* Contributions are rare if they exceed the brightness of their place by this factor. */
-#define RENDER_RARE 32
+#define RENDER_RARE_FACTOR 32
 
 struct rare_light {
-	double share; /* rare share of the film's light; 0 to 1 except for noise */
-	double seen;  /* share of all light that photons bring to what the camera sees */
+	double rare_share; /* rare share of the film's light; 0 to 1 except for noise */
+	double seen_share; /* share of all light that photons bring to what the camera sees */
 };
 
 /* Traces `samples` sub-paths from each end, with numbers of RNG_CHOICE, for which it uses `step` and the next step.
  * Ticks. Returns -ENOMEM if out of memory. */
-int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
-	       struct rare_light *out);
+int rare_light_estimate(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step,
+			uint64_t samples, struct rare_light *out);
 
 #endif

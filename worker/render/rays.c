@@ -11,21 +11,21 @@
 #include "common/plan/resample.h"
 
 enum {
-	GROUPS = PLAN_MAX_GROUPS,
-	SAMPLES = 16, /* samples of a group's bootstrap; one of them also looks for paths that are too long */
-	MUTATIONS = 32,
-	ENOUGH = 1 << 18, /* rays that are enough, for bootstrap samples and for mutations each */
-	LEAST_GROUPS = 2,
+	GROUPS = PLAN_GROUPS_MAX,
+	SAMPLES_PER_GROUP = 16, /* samples of a group's bootstrap; one of them also looks for paths that are too long */
+	MUTATIONS_PER_EPOCH = 32,
+	ENOUGH_RAYS = 1 << 18, /* rays that are enough, for bootstrap samples and for mutations each */
+	GROUPS_MIN = 2,
 };
 
-struct counted {
+struct ray_count {
 	double rays, steps;
 };
 
-struct counter {
+struct ray_counter {
 	const struct world *w;
 	struct plan plan;
-	struct counted bootstrap, chain;
+	struct ray_count bootstrap, chain;
 	struct error *e;
 };
 
@@ -41,26 +41,26 @@ static int make_plan(const struct plan_request *r, struct plan *p, struct error 
 	q.groups = GROUPS;
 	q.parts = 1;
 	q.chains = r->kind == PLAN_CHAINS ? GROUPS : 0;
-	q.bootstrap = (uint64_t)GROUPS * SAMPLES;
-	q.epoch = r->kind == PLAN_CHAINS ? MUTATIONS : 1;
+	q.bootstrap = (uint64_t)GROUPS * SAMPLES_PER_GROUP;
+	q.epoch = r->kind == PLAN_CHAINS ? MUTATIONS_PER_EPOCH : 1;
 	return plan_make(&q, p, e);
 }
 
-static void add_counts(struct counted *c, const struct batch *b)
+static void add_counts(struct ray_count *c, const struct batch *b)
 {
-	c->rays += (double)batch_rays(b->counters);
+	c->rays += (double)batch_ray_count(b->counters);
 	c->steps += (double)b->counters[COUNT_SAMPLES];
 }
 
-static int run_lease(struct counter *c, enum lease_kind kind, uint32_t group, uint64_t epoch,
+static int run_lease(struct ray_counter *c, enum lease_kind kind, uint32_t group, uint64_t epoch,
 		     const struct lease_input *in, struct batch *b)
 {
 	const struct lease_key k = {.kind = kind, .group = group, .epoch = epoch};
-	enum lease_end end;
-	return render_lease(c->w, &c->plan, &k, in, NULL, &end, b, c->e);
+	enum lease_outcome result;
+	return render_lease(c->w, &c->plan, &k, in, NULL, &result, b, c->e);
 }
 
-static int count_chain(struct counter *c, uint32_t group, uint64_t seed)
+static int count_chain(struct ray_counter *c, uint32_t group, uint64_t seed)
 {
 	struct lease_input in = {.chain_count = 1, .seeds = &seed};
 	struct batch first, second;
@@ -77,7 +77,7 @@ static int count_chain(struct counter *c, uint32_t group, uint64_t seed)
 	return 0;
 }
 
-static int count_group(struct counter *c, uint32_t group)
+static int count_group(struct ray_counter *c, uint32_t group)
 {
 	struct batch b;
 	uint64_t seed;
@@ -85,20 +85,20 @@ static int count_group(struct counter *c, uint32_t group)
 	if (rc)
 		return rc;
 	add_counts(&c->bootstrap, &b);
-	bool lit =
-		plan_resample(&c->plan, group, b.weights, b.weight_count, plan_resample_u(&c->plan, group), 1, &seed);
+	bool has_seed = plan_resample(&c->plan, group, b.weights, b.weight_count, plan_resample_offset(&c->plan, group),
+				      1, &seed);
 	batch_fini(&b);
-	if (c->plan.kind != PLAN_CHAINS || !lit || c->chain.rays >= ENOUGH)
+	if (c->plan.kind != PLAN_CHAINS || !has_seed || c->chain.rays >= ENOUGH_RAYS)
 		return 0;
 	return count_chain(c, group, seed);
 }
 
 int render_count_rays(const struct world *w, const struct plan_request *r, struct plan_rays *out, struct error *e)
 {
-	struct counter c = {.w = w, .e = e};
+	struct ray_counter c = {.w = w, .e = e};
 	int rc = make_plan(r, &c.plan, e);
 	*out = (struct plan_rays){0, 0};
-	for (uint32_t g = 0; !rc && g < GROUPS && (g < LEAST_GROUPS || c.bootstrap.rays < ENOUGH); g++)
+	for (uint32_t g = 0; !rc && g < GROUPS && (g < GROUPS_MIN || c.bootstrap.rays < ENOUGH_RAYS); g++)
 		rc = count_group(&c, g);
 	if (rc)
 		return rc;

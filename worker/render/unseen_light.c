@@ -7,12 +7,12 @@
  *
  *     N sum_{i >= k} sum b / c
  *
- * times. Light is unseen if its class is among the brightest ones that are together found at most `few` times. Light
- * that has been found more often was found by different groups of samples, and the spread between them shows it.
+ * times. Light is unseen if its class is among the brightest ones that are together found at most `max_finds` times.
+ * Light that has been found more often was found by different groups of samples, and the spread between them shows it.
  *
  * The unseen light, squared and averaged over the film, is its contribution to relMSE. The square of a sum
  * over few photons would be too large by the variance of the sum, so the sums of two independent sets of
- * photons are multiplied, in each of ACROSS x ACROSS cells. If light is missing from only a part of a cell,
+ * photons are multiplied, in each of CELLS_ACROSS x CELLS_ACROSS cells. If light is missing from only a part of a cell,
  * the mean over the cell is too small.
  *
  * Failures: -ENOMEM. A scene without light has no unseen light.
@@ -32,82 +32,87 @@
  * same value as a longer one. */
 enum { SAMPLES = 1 << 13 };
 
-enum { SETS = 2, ACROSS = 8, CELLS = ACROSS * ACROSS, CLASSES = 24 };
-static const double few = 3;
+enum { SETS = 2, CELLS_ACROSS = 8, CELLS = CELLS_ACROSS * CELLS_ACROSS, CLASSES = 24 };
+static const double max_finds = 3;
 
 /* The results of one set of photons. */
-struct seen_by_merging {
+struct merged_light {
 	double light[CELLS][CLASSES]; /* relative light, summed over the camera's samples */
 	double finds[CLASSES];	      /* expected number of finds by one sample of the integrator */
 	double samples[CELLS];	      /* samples of the camera */
 };
 
-struct place {
-	struct seen_by_merging *to;
-	double with_light, scale;
+struct merge_target {
+	struct merged_light *light;
+	double light_fraction, scale;
 	unsigned cell;
 };
 
 static void add_to_class(void *user, const struct merged *m)
 {
-	struct place *p = user;
-	double finds = (1 - p->with_light) * m->brings / m->path + p->with_light * m->brings / m->bdpt,
-	       brings = p->scale * m->brings, each = finds > 0 ? brings / finds : INFINITY;
-	int k = each < 1 ? 0 : each < ldexp(1, 2 * CLASSES - 2) ? (int)(log2(each) / 2) : CLASSES - 1;
-	p->to->light[p->cell][k] += brings;
-	p->to->finds[k] += finds;
+	struct merge_target *p = user;
+	double finds = (1 - p->light_fraction) * m->contribution / m->path_contribution +
+		       p->light_fraction * m->contribution / m->bdpt_contribution,
+	       light = p->scale * m->contribution, contribution = finds > 0 ? light / finds : INFINITY;
+	int k = contribution < 1			   ? 0
+		: contribution < ldexp(1, 2 * CLASSES - 2) ? (int)(log2(contribution) / 2)
+							   : CLASSES - 1;
+	p->light->light[p->cell][k] += light;
+	p->light->finds[k] += finds;
 }
 
 static unsigned cell_of(const struct film_window *w, const double film[2])
 {
-	double x = (film[0] - w->x) / w->width * ACROSS, y = (film[1] - w->y) / w->height * ACROSS;
-	return (unsigned)fmin(fmax(y, 0), ACROSS - 1) * ACROSS + (unsigned)fmin(fmax(x, 0), ACROSS - 1);
+	double x = (film[0] - w->x) / w->width * CELLS_ACROSS, y = (film[1] - w->y) / w->height * CELLS_ACROSS;
+	return (unsigned)fmin(fmax(y, 0), CELLS_ACROSS - 1) * CELLS_ACROSS +
+	       (unsigned)fmin(fmax(x, 0), CELLS_ACROSS - 1);
 }
 
-static int merge_one_set(struct path_context *c, const struct brightness *map, double with_light, uint64_t seed,
-			 uint64_t step, uint64_t samples, struct seen_by_merging *out)
+static int merge_one_set(struct path_context *c, const struct brightness *map, double light_fraction, uint64_t seed,
+			 uint64_t step, uint64_t samples, struct merged_light *out)
 {
 	struct merging m;
-	int rc = merging_photons(&m, c, seed, step, samples);
-	for (uint64_t i = 0; i < m.paths && !rc; i++) {
-		struct merging_place at;
+	int rc = merging_trace_photons(&m, c, seed, step, samples);
+	for (uint64_t i = 0; i < m.path_count && !rc; i++) {
+		struct merging_point point;
 		double photons;
-		bool rough = merging_walk(&m, c, seed, step + 1, i, &at);
-		struct place p = {.to = out, .with_light = with_light, .cell = cell_of(&c->window, at.film)};
+		bool is_rough = merging_walk_camera(&m, c, seed, step + 1, i, &point);
+		struct merge_target p = {
+			.light = out, .light_fraction = light_fraction, .cell = cell_of(&c->window, point.film)};
 		out->samples[p.cell]++;
-		if (!rough || !m.count)
+		if (!is_rough || !m.photon_count)
 			continue;
-		p.scale = merging_scale(&m, c, &at, map, &photons);
+		p.scale = merging_scale(&m, c, &point, map, &photons);
 		if (p.scale > 0)
-			merging_each(&m, c, &at, add_to_class, &p);
+			merging_for_each(&m, c, &point, add_to_class, &p);
 	}
 	for (int k = 0; k < CLASSES && !rc; k++)
-		out->finds[k] /= (double)m.paths;
+		out->finds[k] /= (double)m.path_count;
 	merging_fini(&m);
 	return rc;
 }
 
 /* Returns the index of the dimmest of the brightest classes that so many samples find at most a few times in all. */
-static int first_unseen(const struct seen_by_merging *s, double samples)
+static int first_unseen_class(const struct merged_light *s, double samples)
 {
 	double finds = 0;
 	int k = CLASSES;
 	while (k > 0) {
 		finds += samples * (s[0].finds[k - 1] + s[1].finds[k - 1]) / SETS;
-		if (finds > few)
+		if (finds > max_finds)
 			break;
 		k--;
 	}
 	return k;
 }
 
-static double mean_square(const struct seen_by_merging *s, int from)
+static double mean_square(const struct merged_light *s, int first_class)
 {
 	double sum = 0, samples = 0;
 	for (int i = 0; i < CELLS; i++) {
 		double light[SETS] = {0}, n = s[0].samples[i] + s[1].samples[i];
 		samples += n;
-		for (int k = from; k < CLASSES; k++)
+		for (int k = first_class; k < CLASSES; k++)
 			for (int j = 0; j < SETS; j++)
 				light[j] += s[j].light[i][k];
 		if (s[0].samples[i] > 0 && s[1].samples[i] > 0)
@@ -116,16 +121,16 @@ static double mean_square(const struct seen_by_merging *s, int from)
 	return samples > 0 ? sum / samples : 0;
 }
 
-int unseen_light(struct path_context *c, const struct brightness *map, double with_light, uint64_t seed, uint64_t step,
-		 uint64_t samples, struct plan_unseen *out)
+int unseen_light_estimate(struct path_context *c, const struct brightness *map, double light_fraction, uint64_t seed,
+			  uint64_t step, uint64_t samples, struct plan_unseen *out)
 {
 	double pixels = c->window.width * c->window.height;
-	struct seen_by_merging *s = mem_alloc(SETS, sizeof *s);
+	struct merged_light *s = mem_alloc(SETS, sizeof *s);
 	int rc = s ? 0 : -ENOMEM;
 	for (unsigned j = 0; j < SETS && !rc; j++)
-		rc = merge_one_set(c, map, with_light, seed, step + 2 * j, samples, &s[j]);
-	for (int i = 0; i < PLAN_UNSEEN && !rc; i++)
-		out->at[i] = mean_square(s, first_unseen(s, pixels * ldexp(1, 2 * i)));
+		rc = merge_one_set(c, map, light_fraction, seed, step + 2 * j, samples, &s[j]);
+	for (int i = 0; i < PLAN_UNSEEN_COUNT && !rc; i++)
+		out->mean_squares[i] = mean_square(s, first_unseen_class(s, pixels * ldexp(1, 2 * i)));
 	mem_free(s);
 	return rc;
 }
@@ -138,15 +143,18 @@ struct pilot {
 	uint64_t counters[BATCH_COUNTERS];
 };
 
-static int run_pilot(struct pilot *p, const struct world *w, const struct plan *film, const struct integrator *of,
-		     struct plan_request *r, struct error *e)
+static int run_pilot(struct pilot *p, const struct world *w, const struct plan *film,
+		     const struct integrator *integrator, struct plan_request *r, struct error *e)
 {
-	path_context_for_samples(&p->context, w, film, p->counters);
+	path_context_init_for_samples(&p->context, w, film, p->counters);
 	p->context.refract = halfvec_refract;
-	int rc = brightness_of_samples(&p->map, &p->context, path_trace_candidates, r->seed, RNG_CHOICE,
-				       PILOT_UNSEEN_MAP, SAMPLES, e);
-	double with_light = of->face.from_camera ? 0 : of->light_every > 1 ? 1.0 / of->light_every : 1;
-	if (!rc && unseen_light(&p->context, &p->map, with_light, r->seed, PILOT_UNSEEN, SAMPLES, &r->unseen))
+	int rc = brightness_init_from_samples(&p->map, &p->context, path_trace_candidates, r->seed, RNG_CHOICE,
+					      PILOT_UNSEEN_MAP, SAMPLES, e);
+	double light_fraction = integrator->properties.only_from_camera ? 0
+				: integrator->light_every > 1		? 1.0 / integrator->light_every
+									: 1;
+	if (!rc &&
+	    unseen_light_estimate(&p->context, &p->map, light_fraction, r->seed, PILOT_UNSEEN, SAMPLES, &r->unseen))
 		rc = error_set(e, ENOMEM, "no memory for a pilot");
 	brightness_fini(&p->map);
 	return rc;
@@ -154,17 +162,17 @@ static int run_pilot(struct pilot *p, const struct world *w, const struct plan *
 
 int render_unseen_light(const struct world *w, struct plan_request *r, struct error *e)
 {
-	const struct integrator *of = integrator_find(r->integrator);
+	const struct integrator *integrator = integrator_find(r->integrator);
 	struct render_summary summary;
 	struct plan film;
 	r->unseen = (struct plan_unseen){0};
 	world_summary(w, &summary);
-	if (!of || !pilot_scene_has(&summary, "half-vectors"))
+	if (!integrator || !pilot_scene_has(&summary, "half-vectors"))
 		return 0;
-	int rc = pilot_film(r, &film, e);
+	int rc = pilot_make_plan(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc)
-		rc = p ? run_pilot(p, w, &film, of, r, e) : error_set(e, ENOMEM, "no memory for a pilot");
+		rc = p ? run_pilot(p, w, &film, integrator, r, e) : error_set(e, ENOMEM, "no memory for a pilot");
 	mem_free(p);
 	return rc;
 }

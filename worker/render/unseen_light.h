@@ -17,10 +17,10 @@
  * Returns -ENOMEM or -EINVAL. */
 int render_unseen_light(const struct world *w, struct plan_request *r, struct error *e);
 
-/* Like render_unseen_light(), for a given context and map of brightness. with_light: fraction of the samples that have
- * a light sub-path. samples: number of sub-paths from each end, which are traced twice, with numbers of RNG_CHOICE for
- * `step` and the next three steps. Returns -ENOMEM if out of memory. */
-int unseen_light(struct path_context *c, const struct brightness *map, double with_light, uint64_t seed, uint64_t step,
-		 uint64_t samples, struct plan_unseen *out);
+/* Like render_unseen_light(), for a given context and map of brightness. light_fraction: fraction of the samples that
+ * have a light sub-path. samples: number of sub-paths from each end, which are traced twice, with numbers of RNG_CHOICE
+ * for `step` and the next three steps. Returns -ENOMEM if out of memory. */
+int unseen_light_estimate(struct path_context *c, const struct brightness *map, double light_fraction, uint64_t seed,
+			  uint64_t step, uint64_t samples, struct plan_unseen *out);
 
 #endif

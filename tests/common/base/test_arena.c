@@ -38,7 +38,7 @@ static void test_equal_bytes_are_shared(void **state)
 	arena_fini(&a);
 }
 
-static void test_many(void **state)
+static void test_copies_keep_their_user_pointers(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -56,7 +56,7 @@ static void test_many(void **state)
 }
 
 /* A table that gave up after a few entries of other hashes would copy an unlucky one for each use. */
-static void test_all_are_found(void **state)
+static void test_crowded_table_finds_every_copy(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -78,7 +78,7 @@ static void test_all_are_found(void **state)
 }
 
 /* Of 34 numbers the last but one is not part of the hash. 120,000 such copies took 7 s when each passed all others. */
-static void test_equal_hashes(void **state)
+static void test_equal_hashes_do_not_slow_lookups(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -96,17 +96,17 @@ static void test_equal_hashes(void **state)
 	arena_fini(&a);
 }
 
-static void test_limit(void **state)
+static void test_copies_respect_the_limit_of_the_arena(void **state)
 {
 	(void)state;
 	struct arena a = {.limit = 64 << 10};
 	static unsigned char bytes[SIZE];
-	uint32_t made = 0;
+	uint32_t copy_count = 0;
 	for (uint32_t i = 0; i < 100; i++) {
 		memcpy(bytes, &i, sizeof i);
-		made += arena_share(&a, bytes, SIZE) != NULL;
+		copy_count += arena_share(&a, bytes, SIZE) != NULL;
 	}
-	assert_in_range(made, 10, 16);
+	assert_in_range(copy_count, 10, 16);
 	memset(bytes, 0, sizeof bytes);
 	assert_non_null(arena_share(&a, bytes, SIZE));
 	assert_true(a.used <= a.limit);
@@ -117,10 +117,10 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_equal_bytes_are_shared),
-		cmocka_unit_test(test_many),
-		cmocka_unit_test(test_all_are_found),
-		cmocka_unit_test(test_equal_hashes),
-		cmocka_unit_test(test_limit),
+		cmocka_unit_test(test_copies_keep_their_user_pointers),
+		cmocka_unit_test(test_crowded_table_finds_every_copy),
+		cmocka_unit_test(test_equal_hashes_do_not_slow_lookups),
+		cmocka_unit_test(test_copies_respect_the_limit_of_the_arena),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-static uint32_t by_bits(uint32_t crc, const uint8_t *p, size_t size)
+static uint32_t crc_by_bits(uint32_t crc, const uint8_t *p, size_t size)
 {
 	crc = ~crc;
 	for (size_t i = 0; i < size; i++) {
@@ -20,22 +20,23 @@ static uint32_t by_bits(uint32_t crc, const uint8_t *p, size_t size)
 	return ~crc;
 }
 
-static void every_length(void **state)
+static void crc_is_right_at_every_length_and_alignment(void **state)
 {
 	(void)state;
 	uint8_t bytes[80];
 	for (size_t i = 0; i < sizeof bytes; i++)
 		bytes[i] = (uint8_t)(i * 151 + 7);
-	for (size_t at = 0; at < 8; at++)
-		for (size_t n = 0; n + at <= sizeof bytes; n++) {
-			assert_int_equal(crc32c(0, bytes + at, n), by_bits(0, bytes + at, n));
-			assert_int_equal(crc32c(crc32c(0, bytes, at), bytes + at, n), by_bits(0, bytes, at + n));
+	for (size_t offset = 0; offset < 8; offset++)
+		for (size_t n = 0; n + offset <= sizeof bytes; n++) {
+			assert_int_equal(crc32c(0, bytes + offset, n), crc_by_bits(0, bytes + offset, n));
+			assert_int_equal(crc32c(crc32c(0, bytes, offset), bytes + offset, n),
+					 crc_by_bits(0, bytes, offset + n));
 		}
 	assert_int_equal(crc32c(0, "123456789", 9), 0xE3069283u);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(every_length)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(crc_is_right_at_every_length_and_alignment)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

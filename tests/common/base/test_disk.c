@@ -3,7 +3,7 @@
  * already has the name of the temporary file is not written to, and its mode is not copied. */
 #include "common/base/disk.h"
 #include "tests/support/failing_list.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,74 +19,74 @@
 static char path[200], temporary[210];
 static struct error e;
 
-static int no_open(const char *name, int flags, mode_t mode)
+static int fail_open(const char *name, int flags, mode_t mode)
 {
 	(void)name, (void)flags, (void)mode;
 	errno = EMFILE;
 	return -1;
 }
 
-static ssize_t no_room(int fd, const void *bytes, size_t size)
+static ssize_t fail_write(int fd, const void *bytes, size_t size)
 {
 	(void)fd, (void)bytes, (void)size;
 	errno = 0; /* the answer of a full disk */
 	return 0;
 }
 
-static int no_flush(int fd)
+static int fail_fsync(int fd)
 {
 	(void)fd;
 	errno = EIO;
 	return -1;
 }
 
-static int no_close(int fd)
+static int fail_close(int fd)
 {
 	disk_system.close(fd);
 	errno = EDQUOT;
 	return -1;
 }
 
-static int no_rename(const char *from, const char *to)
+static int fail_rename(const char *from, const char *to)
 {
 	(void)from, (void)to;
 	errno = EACCES;
 	return -1;
 }
 
-static void check(struct disk own, int want)
+static void check_replace(struct disk failing_disk, int expected_rc)
 {
 	char text[8] = "";
 	e.text[0] = 0;
-	disk_use(&own);
+	disk_set_calls(&failing_disk);
 	int rc = disk_replace(path, "new", 3, 0600, &e);
-	disk_use(NULL);
-	assert_int_equal(rc, want);
-	assert_true(!want || strstr(e.text, strerror(-want)));
+	disk_set_calls(NULL);
+	assert_int_equal(rc, expected_rc);
+	assert_true(!expected_rc || strstr(e.text, strerror(-expected_rc)));
 	FILE *f = fopen(path, "r");
 	assert_non_null(f);
 	assert_int_equal(fread(text, 1, sizeof text, f), 3);
 	fclose(f);
-	assert_string_equal(text, want ? "old" : "new");
+	assert_string_equal(text, expected_rc ? "old" : "new");
 	assert_int_not_equal(access(temporary, F_OK), 0);
 }
 
-static void replaced_or_unchanged(void **state)
+static void failed_replace_keeps_the_old_file(void **state)
 {
 	(void)state;
-	snprintf(path, sizeof path, "%s/file", folder);
+	snprintf(path, sizeof path, "%s/file", temporary_folder);
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	assert_int_equal(disk_replace(path, "old", 3, 0600, &e), 0);
 	struct disk bad[5] = {disk_system, disk_system, disk_system, disk_system, disk_system};
-	bad[0].open = no_open;
-	bad[1].write = no_room;
-	bad[2].fsync = no_flush;
-	bad[3].close = no_close;
-	bad[4].rename = no_rename;
+	bad[0].open = fail_open;
+	bad[1].write = fail_write;
+	bad[2].fsync = fail_fsync;
+	bad[3].close = fail_close;
+	bad[4].rename = fail_rename;
 	const int codes[5] = {-EMFILE, -ENOSPC, -EIO, -EDQUOT, -EACCES};
 	for (int i = 0; i < 5; i++)
-		check(bad[i], codes[i]);
-	check(disk_system, 0);
+		check_replace(bad[i], codes[i]);
+	check_replace(disk_system, 0);
 }
 
 static void replace_with_mode(mode_t mode)
@@ -97,14 +97,14 @@ static void replace_with_mode(mode_t mode)
 	assert_int_equal(st.st_mode, S_IFREG | mode);
 }
 
-static void another_file_in_its_way(void **state)
+static void existing_temporary_file_is_not_written_to(void **state)
 {
 	(void)state;
 	char other[200];
 	struct stat st;
-	snprintf(path, sizeof path, "%s/file", folder);
+	snprintf(path, sizeof path, "%s/file", temporary_folder);
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	snprintf(other, sizeof other, "%s/other", folder);
+	snprintf(other, sizeof other, "%s/other", temporary_folder);
 	const mode_t before = umask(077);
 	replace_with_mode(0644); /* others may read the file, as requested */
 	umask(before);
@@ -118,31 +118,31 @@ static void another_file_in_its_way(void **state)
 }
 
 /* A list that fails after any number of names reports the failure instead of the end; the names before it are seen. */
-static void a_list_that_fails_midway(void **state)
+static void failed_listing_reports_its_error(void **state)
 {
 	(void)state;
 	enum { FILES = 4 };
 	struct disk_list l;
 	char inside[200];
 	for (int i = 0; i < FILES; i++) {
-		snprintf(inside, sizeof inside, "%s/%d", folder, i);
+		snprintf(inside, sizeof inside, "%s/%d", temporary_folder, i);
 		fclose(fopen(inside, "w"));
 	}
-	for (int most = 0; most <= FILES + 1; most++) {
-		int seen = 0;
-		failing_list_begin(folder, most, ESTALE);
-		disk_list_begin(&l, folder);
+	for (int readable_count = 0; readable_count <= FILES + 1; readable_count++) {
+		int seen_count = 0;
+		failing_list_begin(temporary_folder, readable_count, ESTALE);
+		disk_list_begin(&l, temporary_folder);
 		for (const char *name; (name = disk_list_next(&l));) {
 			assert_true(name[0] >= '0' && name[0] < '0' + FILES && !name[1]);
-			seen++;
+			seen_count++;
 		}
-		assert_true(most > FILES || !disk_list_next(&l)); /* and returns no more names */
-		assert_int_equal(disk_list_end(&l, 0, &e), most > FILES ? 0 : -ESTALE);
-		assert_int_equal(seen, most > FILES ? FILES : most);
-		assert_true(most > FILES || strstr(e.text, folder));
+		assert_true(readable_count > FILES || !disk_list_next(&l)); /* and returns no more names */
+		assert_int_equal(disk_list_end(&l, 0, &e), readable_count > FILES ? 0 : -ESTALE);
+		assert_int_equal(seen_count, readable_count > FILES ? FILES : readable_count);
+		assert_true(readable_count > FILES || strstr(e.text, temporary_folder));
 		failing_list_end();
 	}
-	snprintf(inside, sizeof inside, "%s/none", folder);
+	snprintf(inside, sizeof inside, "%s/none", temporary_folder);
 	disk_list_begin(&l, inside);
 	assert_null(disk_list_next(&l));
 	assert_int_equal(disk_list_end(&l, 0, NULL), -ENOENT);
@@ -151,9 +151,12 @@ static void a_list_that_fails_midway(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(replaced_or_unchanged, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(another_file_in_its_way, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_list_that_fails_midway, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(failed_replace_keeps_the_old_file, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(existing_temporary_file_is_not_written_to, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(failed_listing_reports_its_error, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
-static unsigned lines_logged(struct log_bucket *b, unsigned lines, double from, double to)
+static unsigned count_logged_lines(struct log_bucket *b, unsigned lines, double from, double to)
 {
 	unsigned n = 0;
 	for (unsigned i = 0; i < lines; i++)
@@ -16,41 +16,42 @@ static unsigned lines_logged(struct log_bucket *b, unsigned lines, double from, 
 	return n;
 }
 
-static void a_rush_is_cut(void **state)
+static void burst_of_lines_is_cut(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(lines_logged(&b, 4000, 1000, 1000), LOG_BURST);
-	assert_int_equal(log_bucket_withheld(&b, 1000), 0); /* the burst may go on */
-	assert_int_equal(log_bucket_withheld(&b, 1000.5), 4000 - LOG_BURST);
-	assert_int_equal(log_bucket_withheld(&b, 1100), 0); /* reported once */
+	assert_int_equal(count_logged_lines(&b, 4000, 1000, 1000), LOG_BURST);
+	assert_int_equal(log_bucket_take_withheld(&b, 1000), 0); /* the burst may go on */
+	assert_int_equal(log_bucket_take_withheld(&b, 1000.5), 4000 - LOG_BURST);
+	assert_int_equal(log_bucket_take_withheld(&b, 1100), 0); /* reported once */
 	/* 4,000 lines in ten seconds, from an empty bucket: those pass for which the bucket is refilled meanwhile. */
-	assert_int_equal(lines_logged(&b, LOG_BURST, 2000, 2000), LOG_BURST);
-	assert_in_range(lines_logged(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);
+	assert_int_equal(count_logged_lines(&b, LOG_BURST, 2000, 2000), LOG_BURST);
+	assert_in_range(count_logged_lines(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);
 }
 
-static void a_trickle_passes(void **state)
+static void occasional_lines_pass(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(lines_logged(&b, 10000, 5, 5 + 10000.0 / LOG_PER_SECOND), 10000);
-	assert_int_equal(log_bucket_withheld(&b, 1e6), 0);
+	assert_int_equal(count_logged_lines(&b, 10000, 5, 5 + 10000.0 / LOG_PER_SECOND), 10000);
+	assert_int_equal(log_bucket_take_withheld(&b, 1e6), 0);
 }
 
 /* The monotonic clock does not go back; if a caller's clock did, its bucket would only fill later. */
-static void time_that_stands_still(void **state)
+static void clock_going_back_adds_no_lines(void **state)
 {
 	(void)state;
 	struct log_bucket b = {0};
-	assert_int_equal(lines_logged(&b, LOG_BURST + 1, 50, 50), LOG_BURST);
+	assert_int_equal(count_logged_lines(&b, LOG_BURST + 1, 50, 50), LOG_BURST);
 	assert_false(log_bucket_take(&b, 40));
 	assert_true(log_bucket_take(&b, 50 + 1.0 / LOG_PER_SECOND));
-	assert_int_equal(log_bucket_withheld(&b, 60), 2);
+	assert_int_equal(log_bucket_take_withheld(&b, 60), 2);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(a_rush_is_cut), cmocka_unit_test(a_trickle_passes),
-					   cmocka_unit_test(time_that_stands_still)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(burst_of_lines_is_cut),
+					   cmocka_unit_test(occasional_lines_pass),
+					   cmocka_unit_test(clock_going_back_adds_no_lines)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,13 +13,13 @@
 
 #include <cmocka.h>
 
-struct part {
+struct shared_arguments {
 	uint64_t spp;
 	double seconds;
 };
 
 struct arguments {
-	struct part part;
+	struct shared_arguments part;
 	const char *output, *tls, *name, *word[2];
 	bool wait, quiet;
 	double stops, share, trim, keep;
@@ -28,19 +28,19 @@ struct arguments {
 	char kind[16];
 };
 
-static const char *kinds(size_t i)
+static const char *kind_name(size_t i)
 {
 	static const char *const names[] = {"path", "bdpt", "hslt", NULL};
 	return names[i];
 }
 
-static const char *verbs(size_t i)
+static const char *verb_name(size_t i)
 {
 	static const char *const names[] = {"list", "fetch", NULL};
 	return names[i];
 }
 
-static int take_kind(void *target, char *arg, struct error *e)
+static int store_kind(void *target, char *arg, struct error *e)
 {
 	struct arguments *a = target;
 	(void)e;
@@ -48,48 +48,51 @@ static int take_kind(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static void say_more(char *text, size_t size)
+static void append_remark(char *text, size_t size)
 {
 	snprintf(text, size, ". There are more");
 }
 
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .needed = true},
+	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .required = true},
 	{"tls", 0, "DIR", "Certificates", OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TEST_TLS"},
 	{"name", 'n', "NAME", "Displayed", OPTION_NAME(struct arguments, name, 9)},
 	{"wait", 'w', NULL, "Show progress", OPTION_FLAG(struct arguments, wait)},
 	{"quiet", 'q', NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
-	 .standard = "0.5"},
-	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .below = true},
+	 .default_value = "0.5"},
+	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .max_excluded = true},
 	{"share", 0, "P", "Share of the epochs", OPTION_RATIO(struct arguments, share, 0, 1)},
-	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .standard = "3"},
-	{"blobs", 0, "GB", "Of the spool", OPTION_SIZE(struct arguments, bytes, 0.01, 1e6, 1e9), .standard = "100"},
+	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .default_value = "3"},
+	{"blobs", 0, "GB", "Of the spool", OPTION_SIZE(struct arguments, bytes, 0.01, 1e6, 1e9),
+	 .default_value = "100"},
 	{"keep", 0, "N", "Days", OPTION_TIME(struct arguments, keep, 0, 36, 86400)},
-	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = say_more},
+	{"kind", 'k', "NAME", "(chosen)", OPTION_CUSTOM(store_kind), .values = kind_name,
+	 .append_default = append_remark},
 	{"wait-for", 0, NULL, "A longer name", OPTION_FLAG(struct arguments, quiet)},
 	{0},
 };
 
-static const struct option_row part_rows[] = {
-	{"spp", 0, "+N", "Samples", OPTION_COUNT(struct part, spp, 1, 1e9)},
-	{"time", 0, "SECONDS", "Wall clock", OPTION_SECONDS(struct part, seconds, 0, 1e9), .above = true},
+static const struct option_row shared_rows[] = {
+	{"spp", 0, "+N", "Samples", OPTION_COUNT(struct shared_arguments, spp, 1, 1e9)},
+	{"time", 0, "SECONDS", "Wall clock", OPTION_SECONDS(struct shared_arguments, seconds, 0, 1e9),
+	 .min_excluded = true},
 	{0},
 };
 
-static int check_part(void *target, struct error *e)
+static int check_shared_arguments(void *target, struct error *e)
 {
-	const struct part *p = target;
+	const struct shared_arguments *p = target;
 	return p->spp == 13 ? error_set(e, EINVAL, "no 13") : 0;
 }
 
-static int check(void *target, struct error *e)
+static int check_arguments(void *target, struct error *e)
 {
 	const struct arguments *a = target;
 	return a->wait && a->quiet ? error_set(e, EINVAL, "--wait is not quiet") : 0;
 }
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int store_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
@@ -98,23 +101,24 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return 0;
 }
 
-static const struct option_table part = {(const struct option_group[]){{"When to stop:", part_rows}, {0}}, check_part};
+static const struct option_table shared_table = {(const struct option_group[]){{"When to stop:", shared_rows}, {0}},
+						 check_shared_arguments};
 static const struct program program = {
 	.name = "hslt-test",
-	.words = "VERB [JOB]\nA.exr",
+	.synopsis = "VERB [JOB]\nA.exr",
 	.summary = "Tests options.",
 	.examples = "hslt-test list",
 	.details = ".dot begins 'this'\n\\fB is no escape",
-	.exits = "0 done, 2 usage",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
-	.shared = &part,
-	.verbs = verbs,
-	.word = take_word,
+	.exit_codes = "0 done, 2 usage",
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_arguments},
+	.shared_options = &shared_table,
+	.verbs = verb_name,
+	.parse_word = store_word,
 };
 
 static struct arguments a;
 static struct error e;
-static enum option_kind asked;
+static enum option_kind requested_output;
 
 /* Parses the words of a command line, without the program's name. */
 static int parse(const char *line)
@@ -127,7 +131,7 @@ static int parse(const char *line)
 		argv[argc++] = word;
 	memset(&a, 0, sizeof a);
 	e.text[0] = 0;
-	return options_parse(&program, argc, argv, &a, &asked, &e);
+	return options_parse(&program, argc, argv, &a, &requested_output, &e);
 }
 
 static void expect_accepted(const char *line)
@@ -136,13 +140,13 @@ static void expect_accepted(const char *line)
 		fail_msg("%s: %s", line, e.text);
 }
 
-static void refused(const char *line, const char *why)
+static void expect_refused(const char *line, const char *why)
 {
 	assert_int_equal(parse(line), -EINVAL);
 	assert_string_equal(e.text, why);
 }
 
-static void test_kinds(void **state)
+static void test_every_kind_of_value_is_parsed(void **state)
 {
 	(void)state;
 	expect_accepted(
@@ -160,49 +164,51 @@ static void test_kinds(void **state)
 	assert_true(a.bytes == 2000000000000 && a.keep == 129600 && a.share == 1);
 }
 
-static void test_bounds(void **state)
+static void test_values_out_of_bounds_are_refused(void **state)
 {
 	(void)state;
-	refused("list -o x --threads 0", "--threads takes a whole number from 1 to 1024, not '0'");
-	refused("list -o x --threads 1025", "--threads takes a whole number from 1 to 1024, not '1025'");
-	refused("list -o x --threads 1.5", "--threads takes a whole number from 1 to 1024, not '1.5'");
-	refused("list -o x --trim 1", "--trim takes a number of at least 0 and below 1, not '1'");
-	refused("list -o x --exposure nan", "--exposure takes a number from -100 to 100, not 'nan'");
-	refused("list -o x --exposure 1x", "--exposure takes a number from -100 to 100, not '1x'");
-	refused("list -o x --share 2", "--share: 200 % is above 100 %; did you mean 2%?");
-	refused("list -o x --share 200%", "--share: 200 % is above 100 %; did you mean 2%?");
-	refused("list -o x --share 1.5", "--share: 150 % is above 100 %; did you mean 1.5%?");
-	refused("list -o x --share 100.0001%", "--share: 100.0001 % is above 100 %; did you mean 1.000001%?");
-	refused("list -o x --share 15000%", "--share takes a number from 0 to 1, or percent, not '15000%'");
-	refused("list -o x --share -1%", "--share takes a number from 0 to 1, or percent, not '-1%'");
-	refused("list -o x --share two", "--share takes something like 0.02 or 2%, not 'two'");
-	refused("list -o x --time 0", "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
-	refused("list -o x --time 5y",
-		"--time takes a time such as 90s, 5m, 2h or 3d, or a number of seconds, not '5y'");
-	refused("list -o x --keep 40", "--keep takes a number of days from 0 to 36, not '40'");
-	refused("list -o x --blobs 5M", "--blobs takes a number of GB from 0.01 to 1000000, not '5M'");
-	refused("list -o x --blobs big", "--blobs takes a size in GB, or one such as 500M, 20G or 2T, not 'big'");
-	refused("list --output=", "--output takes the name of a file, not ''");
-	refused("list -o x --name=", "--name takes 1 to 9 bytes of UTF-8 without control characters");
-	refused("list -o x --name 0123456789", "--name takes 1 to 9 bytes of UTF-8 without control characters");
-	refused("list -o x --name a\033[2J", "--name takes 1 to 9 bytes of UTF-8 without control characters");
-	refused("list -o x --name a\xff", "--name takes 1 to 9 bytes of UTF-8 without control characters");
-	refused("list -o x --spp 8", "--spp takes what is to be added, such as +8, not '8'");
-	refused("list -o x --spp ++8", "--spp takes a whole number from 1 to 1000000000, not '+8'");
-	refused("list -o x --threads +3", "--threads takes a whole number from 1 to 1024, not '+3'");
+	expect_refused("list -o x --threads 0", "--threads takes a whole number from 1 to 1024, not '0'");
+	expect_refused("list -o x --threads 1025", "--threads takes a whole number from 1 to 1024, not '1025'");
+	expect_refused("list -o x --threads 1.5", "--threads takes a whole number from 1 to 1024, not '1.5'");
+	expect_refused("list -o x --trim 1", "--trim takes a number of at least 0 and below 1, not '1'");
+	expect_refused("list -o x --exposure nan", "--exposure takes a number from -100 to 100, not 'nan'");
+	expect_refused("list -o x --exposure 1x", "--exposure takes a number from -100 to 100, not '1x'");
+	expect_refused("list -o x --share 2", "--share: 200 % is above 100 %; did you mean 2%?");
+	expect_refused("list -o x --share 200%", "--share: 200 % is above 100 %; did you mean 2%?");
+	expect_refused("list -o x --share 1.5", "--share: 150 % is above 100 %; did you mean 1.5%?");
+	expect_refused("list -o x --share 100.0001%", "--share: 100.0001 % is above 100 %; did you mean 1.000001%?");
+	expect_refused("list -o x --share 15000%", "--share takes a number from 0 to 1, or percent, not '15000%'");
+	expect_refused("list -o x --share -1%", "--share takes a number from 0 to 1, or percent, not '-1%'");
+	expect_refused("list -o x --share two", "--share takes something like 0.02 or 2%, not 'two'");
+	expect_refused("list -o x --time 0",
+		       "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
+	expect_refused("list -o x --time 5y",
+		       "--time takes a time such as 90s, 5m, 2h or 3d, or a number of seconds, not '5y'");
+	expect_refused("list -o x --keep 40", "--keep takes a number of days from 0 to 36, not '40'");
+	expect_refused("list -o x --blobs 5M", "--blobs takes a number of GB from 0.01 to 1000000, not '5M'");
+	expect_refused("list -o x --blobs big",
+		       "--blobs takes a size in GB, or one such as 500M, 20G or 2T, not 'big'");
+	expect_refused("list --output=", "--output takes the name of a file, not ''");
+	expect_refused("list -o x --name=", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	expect_refused("list -o x --name 0123456789", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	expect_refused("list -o x --name a\033[2J", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	expect_refused("list -o x --name a\xff", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	expect_refused("list -o x --spp 8", "--spp takes what is to be added, such as +8, not '8'");
+	expect_refused("list -o x --spp ++8", "--spp takes a whole number from 1 to 1000000000, not '+8'");
+	expect_refused("list -o x --threads +3", "--threads takes a whole number from 1 to 1024, not '+3'");
 }
 
 /* Counts with the largest bounds, which are printed in full. */
-static void test_wide_bounds(void **state)
+static void test_widest_bounds_are_printed_in_full(void **state)
 {
 	(void)state;
 	static const struct option_row wide_rows[] = {
-		{"seed", 0, "N", "Seed", OPTION_COUNT(struct part, spp, 0, DBL_MAX)},
-		{"work", 0, "N", "Work", OPTION_COUNT(struct part, spp, 1, 1e18)},
+		{"seed", 0, "N", "Seed", OPTION_COUNT(struct shared_arguments, spp, 0, DBL_MAX)},
+		{"work", 0, "N", "Work", OPTION_COUNT(struct shared_arguments, spp, 1, 1e18)},
 		{0},
 	};
 	static const struct option_group wide_groups[] = {{NULL, wide_rows}, {0}};
-	static const struct program wide = {.name = "hslt-test", .own = {wide_groups, NULL}};
+	static const struct program wide = {.name = "hslt-test", .options = {wide_groups, NULL}};
 	static const char *const cases[][3] = {
 		{"--seed", "-1", "--seed takes a whole number of at least 0 and below 2^64, not '-1'"},
 		{"--seed", "18446744073709551616",
@@ -210,14 +216,14 @@ static void test_wide_bounds(void **state)
 		{"--work", "0", "--work takes a whole number from 1 to 1000000000000000000, not '0'"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct part p = {0};
-		char *argv[] = {text_borrow("hslt-test"), text_borrow(cases[i][0]), text_borrow(cases[i][1]), NULL};
-		assert_int_equal(options_parse(&wide, 3, argv, &p, &asked, &e), -EINVAL);
+		struct shared_arguments p = {0};
+		char *argv[] = {text_unconst("hslt-test"), text_unconst(cases[i][0]), text_unconst(cases[i][1]), NULL};
+		assert_int_equal(options_parse(&wide, 3, argv, &p, &requested_output, &e), -EINVAL);
 		assert_string_equal(e.text, cases[i][2]);
 	}
 }
 
-static void test_defaults_and_environment(void **state)
+static void test_environment_overrides_defaults(void **state)
 {
 	(void)state;
 	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
@@ -231,7 +237,7 @@ static void test_defaults_and_environment(void **state)
 	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
 }
 
-static void test_order_and_forms(void **state)
+static void test_options_are_accepted_in_any_order_and_form(void **state)
 {
 	(void)state;
 	static const char *const lines[] = {"fetch j1 -o x -w -e 3 --threads 2", "-wox fetch --threads=2 -e3 j1",
@@ -255,47 +261,47 @@ static void test_order_and_forms(void **state)
 	assert_string_equal(a.output, "--wait");
 }
 
-static void test_mistyped(void **state)
+static void test_mistyped_words_get_a_suggestion(void **state)
 {
 	(void)state;
-	refused("list --ouptut x", "unknown option '--ouptut'; did you mean '--output'?");
-	refused("list --tiem=5", "unknown option '--tiem'; did you mean '--time'?");
-	refused("list --wall-clock-time=5", "unknown option '--wall-clock-time'; did you mean '--time'?");
-	refused("list -x", "unknown option '-x'");
-	refused("list -spp 5", "unknown option '-spp'; did you mean '--spp'?");
-	refused("list --entirely-other", "unknown option '--entirely-other'");
-	refused("list --t 5", "option '--t' is ambiguous: --tls, --trim, --threads, --time");
-	refused("list --wait=1", "option '--wait' takes no argument");
-	refused("list --output", "option '--output' needs an argument: FILE");
-	refused("list -o x --kind hslr", "there is no kind 'hslr'; did you mean `hslt`?");
-	refused("list -o x --kind zzz", "there is no kind 'zzz'; there are path, bdpt, hslt");
-	refused("fecth j1 -o x", "there is no verb 'fecth'; did you mean `fetch`?");
-	refused("-o x", "a verb is missing: list, fetch");
-	refused("list a b -o x", "one word too many");
+	expect_refused("list --ouptut x", "unknown option '--ouptut'; did you mean '--output'?");
+	expect_refused("list --tiem=5", "unknown option '--tiem'; did you mean '--time'?");
+	expect_refused("list --wall-clock-time=5", "unknown option '--wall-clock-time'; did you mean '--time'?");
+	expect_refused("list -x", "unknown option '-x'");
+	expect_refused("list -spp 5", "unknown option '-spp'; did you mean '--spp'?");
+	expect_refused("list --entirely-other", "unknown option '--entirely-other'");
+	expect_refused("list --t 5", "option '--t' is ambiguous: --tls, --trim, --threads, --time");
+	expect_refused("list --wait=1", "option '--wait' takes no argument");
+	expect_refused("list --output", "option '--output' needs an argument: FILE");
+	expect_refused("list -o x --kind hslr", "there is no kind 'hslr'; did you mean `hslt`?");
+	expect_refused("list -o x --kind zzz", "there is no kind 'zzz'; there are path, bdpt, hslt");
+	expect_refused("fecth j1 -o x", "there is no verb 'fecth'; did you mean `fetch`?");
+	expect_refused("-o x", "a verb is missing: list, fetch");
+	expect_refused("list a b -o x", "one word too many");
 }
 
-static void test_checks(void **state)
+static void test_required_options_and_checks_are_enforced(void **state)
 {
 	(void)state;
-	refused("list", "--output FILE is needed");
-	refused("list -o x -w -q", "--wait is not quiet");
-	refused("list -o x --spp +13", "no 13");
+	expect_refused("list", "--output FILE is needed");
+	expect_refused("list -o x -w -q", "--wait is not quiet");
+	expect_refused("list -o x --spp +13", "no 13");
 }
 
 /* --help and --version take precedence over all errors. */
-static void test_asked(void **state)
+static void test_help_and_version_take_precedence(void **state)
 {
 	(void)state;
 	expect_accepted("list -o x");
-	assert_int_equal(asked, OPTION_IS_END);
+	assert_int_equal(requested_output, OPTION_KIND_END);
 	expect_accepted("--help --no-such-option");
-	assert_int_equal(asked, OPTION_IS_HELP);
+	assert_int_equal(requested_output, OPTION_KIND_HELP);
 	expect_accepted("-wV");
-	assert_int_equal(asked, OPTION_IS_VERSION);
-	refused("--no-such-option --help", "unknown option '--no-such-option'");
+	assert_int_equal(requested_output, OPTION_KIND_VERSION);
+	expect_refused("--no-such-option --help", "unknown option '--no-such-option'");
 }
 
-static char *printed(enum option_kind what)
+static char *print_to_text(enum option_kind what)
 {
 	static char text[16384];
 	FILE *f = fmemopen(text, sizeof text, "w");
@@ -305,7 +311,7 @@ static char *printed(enum option_kind what)
 	return text;
 }
 
-static void expect_part(const char *text, const char *wanted)
+static void expect_substring(const char *text, const char *wanted)
 {
 	if (strstr(text, wanted))
 		return;
@@ -313,63 +319,63 @@ static void expect_part(const char *text, const char *wanted)
 	fail();
 }
 
-static void test_help(void **state)
+static void test_help_lists_every_option(void **state)
 {
 	(void)state;
-	const char *text = printed(OPTION_IS_HELP);
-	expect_part(text,
-		    "Usage: hslt-test [OPTION...] VERB [JOB]\n  or:  hslt-test [OPTION...] A.exr\nTests options.\n");
-	expect_part(text, "\n  -o, --output=FILE          The image\n");
-	expect_part(text, "\n      --tls=DIR              Certificates (or $HSLT_TEST_TLS)\n");
-	expect_part(text, "\n      --blobs=GB             Of the spool (100)\n");
-	expect_part(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
-	expect_part(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
-	expect_part(text, "\n      --man                  Print the manual page (for man -l)\n");
-	expect_part(text, "\n      --completion           Print a bash completion script\n");
-	expect_part(text, "\nExamples:\n  hslt-test list\n");
-	expect_part(text, "\nExit codes: 0 done, 2 usage.\n");
+	const char *text = print_to_text(OPTION_KIND_HELP);
+	expect_substring(
+		text, "Usage: hslt-test [OPTION...] VERB [JOB]\n  or:  hslt-test [OPTION...] A.exr\nTests options.\n");
+	expect_substring(text, "\n  -o, --output=FILE          The image\n");
+	expect_substring(text, "\n      --tls=DIR              Certificates (or $HSLT_TEST_TLS)\n");
+	expect_substring(text, "\n      --blobs=GB             Of the spool (100)\n");
+	expect_substring(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
+	expect_substring(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
+	expect_substring(text, "\n      --man                  Print the manual page (for man -l)\n");
+	expect_substring(text, "\n      --completion           Print a bash completion script\n");
+	expect_substring(text, "\nExamples:\n  hslt-test list\n");
+	expect_substring(text, "\nExit codes: 0 done, 2 usage.\n");
 }
 
-static void test_man(void **state)
+static void test_man_page_has_every_section(void **state)
 {
 	(void)state;
-	const char *text = printed(OPTION_IS_MAN);
-	expect_part(text, ".TH \"hslt\\-test\" 1 ");
-	expect_part(text, "\n.SH NAME\nhslt\\-test \\- Tests options.\n.SH SYNOPSIS\n");
-	expect_part(text, "\n.SH DESCRIPTION\n\\&.dot begins \\(aqthis\\(aq\n.PP\n\\efB is no escape\n");
-	expect_part(text, "\n.TP\n\\fB\\-o\\fR, \\fB\\-\\-output\\fR=\\fIFILE\\fR\nThe image.\n");
-	expect_part(text, "\n.SS \"When to stop\"\n");
-	expect_part(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
-	expect_part(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
+	const char *text = print_to_text(OPTION_KIND_MAN);
+	expect_substring(text, ".TH \"hslt\\-test\" 1 ");
+	expect_substring(text, "\n.SH NAME\nhslt\\-test \\- Tests options.\n.SH SYNOPSIS\n");
+	expect_substring(text, "\n.SH DESCRIPTION\n\\&.dot begins \\(aqthis\\(aq\n.PP\n\\efB is no escape\n");
+	expect_substring(text, "\n.TP\n\\fB\\-o\\fR, \\fB\\-\\-output\\fR=\\fIFILE\\fR\nThe image.\n");
+	expect_substring(text, "\n.SS \"When to stop\"\n");
+	expect_substring(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
+	expect_substring(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
 }
 
-static void test_completion(void **state)
+static void test_completion_script_covers_every_option(void **state)
 {
 	(void)state;
-	const char *text = printed(OPTION_IS_COMPLETION);
-	expect_part(text, "\t-o | --output) mapfile -t COMPREPLY < <(compgen -f -- \"$word\") ;;\n");
-	expect_part(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
-	expect_part(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
-	expect_part(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
-	expect_part(text, "-W \"--output --tls --name --wait --quiet --exposure ");
-	expect_part(text, "-W \"list fetch\" -f -- ");
-	expect_part(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
+	const char *text = print_to_text(OPTION_KIND_COMPLETION);
+	expect_substring(text, "\t-o | --output) mapfile -t COMPREPLY < <(compgen -f -- \"$word\") ;;\n");
+	expect_substring(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
+	expect_substring(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
+	expect_substring(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
+	expect_substring(text, "-W \"--output --tls --name --wait --quiet --exposure ");
+	expect_substring(text, "-W \"list fetch\" -f -- ");
+	expect_substring(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_kinds),
-		cmocka_unit_test(test_bounds),
-		cmocka_unit_test(test_wide_bounds),
-		cmocka_unit_test(test_defaults_and_environment),
-		cmocka_unit_test(test_order_and_forms),
-		cmocka_unit_test(test_mistyped),
-		cmocka_unit_test(test_checks),
-		cmocka_unit_test(test_asked),
-		cmocka_unit_test(test_help),
-		cmocka_unit_test(test_man),
-		cmocka_unit_test(test_completion),
+		cmocka_unit_test(test_every_kind_of_value_is_parsed),
+		cmocka_unit_test(test_values_out_of_bounds_are_refused),
+		cmocka_unit_test(test_widest_bounds_are_printed_in_full),
+		cmocka_unit_test(test_environment_overrides_defaults),
+		cmocka_unit_test(test_options_are_accepted_in_any_order_and_form),
+		cmocka_unit_test(test_mistyped_words_get_a_suggestion),
+		cmocka_unit_test(test_required_options_and_checks_are_enforced),
+		cmocka_unit_test(test_help_and_version_take_precedence),
+		cmocka_unit_test(test_help_lists_every_option),
+		cmocka_unit_test(test_man_page_has_every_section),
+		cmocka_unit_test(test_completion_script_covers_every_option),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,11 +14,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static const struct program program = {.name = "ends", .summary = "Ends.", .exits = "0 done"};
-static char name[] = "ends", *argv[] = {name, NULL};
+static const struct program program = {.name = "ends", .summary = "Ends.", .exit_codes = "0 done"};
+static char program_name[] = "ends", *argv[] = {program_name, NULL};
 
 /* Returns the exit code of a process that prints so many lines to `path`. */
-static int exit_code_of(const char *path, size_t lines, bool flush, int code)
+static int exit_code_after_printing(const char *path, size_t lines, bool flush, int code)
 {
 	int status = -1;
 	fflush(NULL);
@@ -26,7 +26,7 @@ static int exit_code_of(const char *path, size_t lines, bool flush, int code)
 	if (pid == 0) {
 		if (!freopen(path, "w", stdout) || !freopen("/dev/null", "w", stderr))
 			_exit(99);
-		program_options(&program, 1, argv, NULL);
+		program_parse_options(&program, 1, argv, NULL);
 		for (size_t i = 0; i < lines; i++)
 			puts("j1");
 		if (flush)
@@ -38,21 +38,22 @@ static int exit_code_of(const char *path, size_t lines, bool flush, int code)
 	return WEXITSTATUS(status);
 }
 
-static void a_full_disk_is_noticed(void **state)
+static void full_disk_behind_stdout_is_an_error(void **state)
 {
 	(void)state;
 	for (int flush = 0; flush < 2; flush++) {
-		assert_int_equal(exit_code_of("/dev/full", 1, flush, 0), 1);
-		assert_int_equal(exit_code_of("/dev/full", 100000, flush, 0), 1); /* more than the buffer holds */
-		assert_int_equal(exit_code_of("/dev/full", 1, flush, 75), 75);
-		assert_int_equal(exit_code_of("/dev/full", 0, flush, 0), 0);
-		assert_int_equal(exit_code_of("/dev/null", 100000, flush, 0), 0);
-		assert_int_equal(exit_code_of("/dev/null", 1, flush, 6), 6);
+		assert_int_equal(exit_code_after_printing("/dev/full", 1, flush, 0), 1);
+		assert_int_equal(exit_code_after_printing("/dev/full", 100000, flush, 0),
+				 1); /* more than the buffer holds */
+		assert_int_equal(exit_code_after_printing("/dev/full", 1, flush, 75), 75);
+		assert_int_equal(exit_code_after_printing("/dev/full", 0, flush, 0), 0);
+		assert_int_equal(exit_code_after_printing("/dev/null", 100000, flush, 0), 0);
+		assert_int_equal(exit_code_after_printing("/dev/null", 1, flush, 6), 6);
 	}
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(a_full_disk_is_noticed)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(full_disk_behind_stdout_is_an_error)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-static const char *nearest(const char *wanted)
+static const char *nearest_name(const char *wanted)
 {
 	static const char *const names[] = {"roughdielectric", "dielectric", "diffuse", "conductor", "roughconductor"};
 	static struct spelling s;
@@ -18,19 +18,19 @@ static const char *nearest(const char *wanted)
 	return s.best ? s.best : "";
 }
 
-static void test_nearest(void **state)
+static void test_misspelled_names_are_corrected(void **state)
 {
 	(void)state;
-	assert_string_equal(nearest("difuse"), "diffuse");
-	assert_string_equal(nearest("dielectirc"), "dielectric");
-	assert_string_equal(nearest("roughConductor"), "roughconductor");
-	assert_string_equal(nearest("rough_dielectric"), "roughdielectric");
-	assert_string_equal(nearest("subsurface"), "");
-	assert_string_equal(nearest(""), "");
+	assert_string_equal(nearest_name("difuse"), "diffuse");
+	assert_string_equal(nearest_name("dielectirc"), "dielectric");
+	assert_string_equal(nearest_name("roughConductor"), "roughconductor");
+	assert_string_equal(nearest_name("rough_dielectric"), "roughdielectric");
+	assert_string_equal(nearest_name("subsurface"), "");
+	assert_string_equal(nearest_name(""), "");
 }
 
 /* An offered name need not stay valid after the call: names in a folder listing do not. */
-static void test_copy(void **state)
+static void test_offered_names_are_copied(void **state)
 {
 	(void)state;
 	char name[] = "room.xml";
@@ -41,24 +41,24 @@ static void test_copy(void **state)
 	assert_string_equal(s.best, "room.xml");
 }
 
-static void test_list(void **state)
+static void test_full_list_ends_in_an_ellipsis(void **state)
 {
 	(void)state;
 	char list[24] = "";
-	spelling_list(list, sizeof list, "path");
-	spelling_list(list, sizeof list, "bdpt");
+	spelling_append_to_list(list, sizeof list, "path");
+	spelling_append_to_list(list, sizeof list, "bdpt");
 	assert_string_equal(list, "path, bdpt");
-	spelling_list(list, sizeof list, "a longer name");
-	spelling_list(list, sizeof list, "x");
+	spelling_append_to_list(list, sizeof list, "a longer name");
+	spelling_append_to_list(list, sizeof list, "x");
 	assert_string_equal(list, "path, bdpt, ...");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_nearest),
-		cmocka_unit_test(test_copy),
-		cmocka_unit_test(test_list),
+		cmocka_unit_test(test_misspelled_names_are_corrected),
+		cmocka_unit_test(test_offered_names_are_copied),
+		cmocka_unit_test(test_full_list_ends_in_an_ellipsis),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,7 +35,7 @@ static int leave_folder(void **state)
 	return chdir("/") || system(command);
 }
 
-static void expect_written(const char *path, const char *text)
+static void expect_write_succeeds(const char *path, const char *text)
 {
 	struct error e;
 	assert_int_equal(image_file_probe(path, &e), 0);
@@ -54,7 +54,7 @@ static void expect_content(const char *path, const char *text)
 	close(fd);
 }
 
-static mode_t kind_of(const char *path)
+static mode_t file_type(const char *path)
 {
 	struct stat st;
 	assert_int_equal(lstat(path, &st), 0);
@@ -64,9 +64,9 @@ static mode_t kind_of(const char *path)
 static void files_are_replaced(void **state)
 {
 	(void)state;
-	expect_written("a/file", "one");
+	expect_write_succeeds("a/file", "one");
 	int before = open("a/file", O_RDONLY);
-	expect_written("a/file", "two");
+	expect_write_succeeds("a/file", "two");
 	char got[8] = "";
 	assert_int_equal(read(before, got, 7), 3); /* a process that has the file open still sees the whole old file */
 	assert_string_equal(got, "one");
@@ -74,21 +74,21 @@ static void files_are_replaced(void **state)
 	expect_content("a/file", "two");
 }
 
-static void of_links_what_they_lead_to(void **state)
+static void links_are_followed_and_kept(void **state)
 {
 	(void)state;
 	struct error e;
-	expect_written("b/real", "old");
+	expect_write_succeeds("b/real", "old");
 	assert_int_equal(symlink("../b/real", "a/link"), 0);
 	assert_int_equal(symlink("link", "a/second"), 0);
-	expect_written("a/second", "new");
-	assert_int_equal(kind_of("a/second"), S_IFLNK);
-	assert_int_equal(kind_of("a/link"), S_IFLNK);
-	assert_int_equal(kind_of("b/real"), S_IFREG);
+	expect_write_succeeds("a/second", "new");
+	assert_int_equal(file_type("a/second"), S_IFLNK);
+	assert_int_equal(file_type("a/link"), S_IFLNK);
+	assert_int_equal(file_type("b/real"), S_IFREG);
 	expect_content("b/real", "new");
 	assert_int_equal(symlink("../b/none", "a/dangling"), 0);
-	expect_written("a/dangling", "made");
-	assert_int_equal(kind_of("a/dangling"), S_IFLNK);
+	expect_write_succeeds("a/dangling", "made");
+	assert_int_equal(file_type("a/dangling"), S_IFLNK);
 	expect_content("b/none", "made");
 	assert_int_equal(symlink("round", "a/round"), 0);
 	assert_int_equal(image_file_write("a/round", (const unsigned char *)"x", 1, &e), -ELOOP);
@@ -101,28 +101,28 @@ static void pipes_and_devices_stay(void **state)
 	char got[8] = "", name[32];
 	assert_int_equal(mkfifo("a/pipe", 0600), 0);
 	int reader = open("a/pipe", O_RDONLY | O_NONBLOCK);
-	expect_written("a/pipe", "said");
+	expect_write_succeeds("a/pipe", "said");
 	assert_int_equal(read(reader, got, 7), 4);
 	assert_string_equal(got, "said");
-	assert_int_equal(kind_of("a/pipe"), S_IFIFO);
+	assert_int_equal(file_type("a/pipe"), S_IFIFO);
 	close(reader);
 	/* A device made by this test, and a link to it, like /dev/stdout. */
 	if (mknod("a/null", S_IFCHR | 0600, makedev(1, 3)) == 0) {
 		int fd = open("a/null", O_WRONLY);
 		if (fd >= 0) { /* skipped where devices do not work */
-			expect_written("a/null", "gone");
+			expect_write_succeeds("a/null", "gone");
 			assert_int_equal(symlink("null", "a/to-null"), 0);
-			expect_written("a/to-null", "gone");
-			assert_int_equal(kind_of("a/to-null"), S_IFLNK);
+			expect_write_succeeds("a/to-null", "gone");
+			assert_int_equal(file_type("a/to-null"), S_IFLNK);
 			close(fd);
 		}
-		assert_int_equal(kind_of("a/null"), S_IFCHR);
+		assert_int_equal(file_type("a/null"), S_IFCHR);
 	}
 	/* A descriptor: output is appended to what was written there before. */
 	int fd = open("a/log", O_RDWR | O_CREAT, 0600);
 	assert_int_equal(write(fd, "1,", 2), 2);
 	snprintf(name, sizeof name, "/dev/fd/%d", fd);
-	expect_written(name, "2");
+	expect_write_succeeds(name, "2");
 	expect_content("a/log", "1,2");
 	close(fd);
 }
@@ -131,7 +131,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(files_are_replaced, enter_folder, leave_folder),
-		cmocka_unit_test_setup_teardown(of_links_what_they_lead_to, enter_folder, leave_folder),
+		cmocka_unit_test_setup_teardown(links_are_followed_and_kept, enter_folder, leave_folder),
 		cmocka_unit_test_setup_teardown(pipes_and_devices_stay, enter_folder, leave_folder),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -46,25 +46,25 @@ static void buffers_keep_their_limit(void **state)
 	buf_fini(&b);
 }
 
-static void texts_become_lines(void **state)
+static void lines_that_do_not_fit_are_counted(void **state)
 {
 	(void)state;
 	char out[64], longest[64];
 	const char *const three[] = {"one", "two", "three"};
-	text_lines(out, sizeof out, NULL, 0);
+	text_join_lines(out, sizeof out, NULL, 0);
 	assert_string_equal(out, "");
-	text_lines(out, sizeof out, three, 1);
+	text_join_lines(out, sizeof out, three, 1);
 	assert_string_equal(out, "one");
-	text_lines(out, sizeof out, three, 3);
+	text_join_lines(out, sizeof out, three, 3);
 	assert_string_equal(out, "one\ntwo\nthree");
 	memset(longest, 'x', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
 	const char *const full[] = {longest}, *const cut[] = {"one", longest, "three"};
-	text_lines(out, sizeof out, full, 1);
+	text_join_lines(out, sizeof out, full, 1);
 	assert_string_equal(out, longest);
-	text_lines(out, sizeof out, cut, 3);
+	text_join_lines(out, sizeof out, cut, 3);
 	assert_string_equal(out, "one\nand 2 more");
-	text_lines(out, 8, cut + 1, 2);
+	text_join_lines(out, 8, cut + 1, 2);
 	assert_string_equal(out, "and 2 m"); /* never writes beyond the end of the buffer */
 }
 
@@ -87,15 +87,15 @@ static void texts_are_cut_between_characters(void **state)
 	text_print(out, sizeof out, "%d%s", 1, "234\xe2\x82\xac");
 	assert_string_equal(out, "1234\xe2\x82\xac");
 	struct text t = {out, sizeof out};
-	text_put(&t, "123%s", "\xc3\xa4\xc3\xa4\xc3\xa4");
+	text_appendf(&t, "123%s", "\xc3\xa4\xc3\xa4\xc3\xa4");
 	assert_string_equal(out, "123\xc3\xa4\xc3\xa4");
 	t = (struct text){out, sizeof out};
-	text_put(&t, "1234%s", "\xc3\xa4\xc3\xa4");
-	text_put(&t, "x"); /* nothing is appended to a text that was cut */
+	text_appendf(&t, "1234%s", "\xc3\xa4\xc3\xa4");
+	text_appendf(&t, "x"); /* nothing is appended to a text that was cut */
 	assert_string_equal(out, "1234\xc3\xa4");
 }
 
-static void texts_are_made_clean(void **state)
+static void control_characters_are_replaced(void **state)
 {
 	(void)state;
 	char text[] = "a\xc3\xa4\xe2\x82\"\n\x7f\xed\xa0\x80\xf0\x9f\x98\x80\xff";
@@ -117,7 +117,7 @@ static void texts_are_made_clean(void **state)
 	assert_string_equal(e.text, "x?: <abc?>: caf?");
 }
 
-static void values_cannot_forge_a_line(void **state)
+static void values_cannot_forge_a_log_line(void **state)
 {
 	(void)state;
 	assert_string_equal(log_quote("a \"b\"\nlevel=error \\ \x01").text, "\"a \\\"b\\\" level=error \\\\  \"");
@@ -136,7 +136,7 @@ static void values_cannot_forge_a_line(void **state)
 	assert_non_null(strstr(whole, "Z level=info event=job_done job=j1"));
 }
 
-static void figures_read_well(void **state)
+static void numbers_and_times_are_printed_for_people(void **state)
 {
 	(void)state;
 	static const struct {
@@ -150,20 +150,20 @@ static void figures_read_well(void **state)
 		     {1e8, "3.2 years"}, {1e15, "for ever"}, {HUGE_VAL, "for ever"}};
 	char text[32];
 	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
-		progress_number(numbers[i].x, text, sizeof text);
+		progress_format_number(numbers[i].x, text, sizeof text);
 		assert_string_equal(text, numbers[i].text);
 	}
 	for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
-		progress_time(times[i].x, text, sizeof text);
+		progress_format_time(times[i].x, text, sizeof text);
 		assert_string_equal(text, times[i].text);
 	}
 	for (size_t i = 0; i < sizeof spans / sizeof *spans; i++) {
-		progress_duration(spans[i].x, text, sizeof text);
+		progress_format_duration(spans[i].x, text, sizeof text);
 		assert_string_equal(text, spans[i].text);
 	}
 }
 
-static void test_counts_with_units(void **state)
+static void counts_with_units_are_parsed(void **state)
 {
 	(void)state;
 	static const struct {
@@ -186,14 +186,14 @@ static void test_counts_with_units(void **state)
 		"1e30G"};
 	uint64_t n;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
-		if (!text_count(good[i].text, &n) || n != good[i].count)
+		if (!text_parse_count(good[i].text, &n) || n != good[i].count)
 			fail_msg("'%s' is read as %llu", good[i].text, (unsigned long long)n);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		if (text_count(bad[i], &n))
+		if (text_parse_count(bad[i], &n))
 			fail_msg("'%s' is taken for %llu", bad[i], (unsigned long long)n);
 }
 
-static void test_times_with_units(void **state)
+static void times_with_units_are_parsed(void **state)
 {
 	(void)state;
 	static const struct {
@@ -203,17 +203,17 @@ static void test_times_with_units(void **state)
 	static const char *const bad[] = {"", "m", "5 m", "5min", "-5", "5M", "1e999", "nan", "inf", "5mm"};
 	double x;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
-		if (!text_time(good[i].text, 1, &x) || x != good[i].seconds)
+		if (!text_parse_time(good[i].text, 1, &x) || x != good[i].seconds)
 			fail_msg("'%s' is read as %g", good[i].text, x);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		if (text_time(bad[i], 1, &x))
+		if (text_parse_time(bad[i], 1, &x))
 			fail_msg("'%s' is taken for %g s", bad[i], x);
-	assert_true(text_time("1.5", 86400, &x) && x == 129600);
-	assert_true(text_time("2h", 86400, &x) && x == 7200);
-	assert_false(text_time("1e308", 86400, &x));
+	assert_true(text_parse_time("1.5", 86400, &x) && x == 129600);
+	assert_true(text_parse_time("2h", 86400, &x) && x == 7200);
+	assert_false(text_parse_time("1e308", 86400, &x));
 }
 
-static void test_sizes_with_units(void **state)
+static void sizes_with_units_are_parsed(void **state)
 {
 	(void)state;
 	static const struct {
@@ -224,41 +224,41 @@ static void test_sizes_with_units(void **state)
 	static const char *const bad[] = {"", "M", "5 M", "5GiB", "-5", "5B", "5MBB", "1e307T", "nan", "0x5M"};
 	double x;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
-		if (!text_bytes(good[i].text, 1e6, &x) || x != good[i].bytes)
+		if (!text_parse_bytes(good[i].text, 1e6, &x) || x != good[i].bytes)
 			fail_msg("'%s' is read as %g", good[i].text, x);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		if (text_bytes(bad[i], 1e6, &x))
+		if (text_parse_bytes(bad[i], 1e6, &x))
 			fail_msg("'%s' is taken for %g bytes", bad[i], x);
 }
 
-static void test_lists_of_counts(void **state)
+static void lists_of_counts_are_parsed(void **state)
 {
 	(void)state;
 	uint32_t n[4];
 	static const char *const bad[] = {"",	   "1k",   "1kx",  "x1k",  "1.0001kx2",
 					  "1x2x3", "1x2 ", "-1x2", "5Gx1", "00000000000000000000000000000000001x2"};
-	assert_true(text_counts("1k", "x", n, 1) && n[0] == 1000);
-	assert_true(text_counts("1.5kx720", "x", n, 2) && n[0] == 1500 && n[1] == 720);
-	assert_true(text_counts("0,1k,320,.5k", ",,,", n, 4) && n[0] == 0 && n[1] == 1000 && n[2] == 320 &&
+	assert_true(text_parse_counts("1k", "x", n, 1) && n[0] == 1000);
+	assert_true(text_parse_counts("1.5kx720", "x", n, 2) && n[0] == 1500 && n[1] == 720);
+	assert_true(text_parse_counts("0,1k,320,.5k", ",,,", n, 4) && n[0] == 0 && n[1] == 1000 && n[2] == 320 &&
 		    n[3] == 500);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		if (text_counts(bad[i], "x", n, 2))
+		if (text_parse_counts(bad[i], "x", n, 2))
 			fail_msg("'%s' is taken for %u and %u", bad[i], n[0], n[1]);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_counts_with_units),
-		cmocka_unit_test(test_times_with_units),
-		cmocka_unit_test(test_sizes_with_units),
-		cmocka_unit_test(test_lists_of_counts),
+		cmocka_unit_test(counts_with_units_are_parsed),
+		cmocka_unit_test(times_with_units_are_parsed),
+		cmocka_unit_test(sizes_with_units_are_parsed),
+		cmocka_unit_test(lists_of_counts_are_parsed),
 		cmocka_unit_test(buffers_keep_their_limit),
-		cmocka_unit_test(texts_become_lines),
+		cmocka_unit_test(lines_that_do_not_fit_are_counted),
 		cmocka_unit_test(texts_are_cut_between_characters),
-		cmocka_unit_test(texts_are_made_clean),
-		cmocka_unit_test(values_cannot_forge_a_line),
-		cmocka_unit_test(figures_read_well),
+		cmocka_unit_test(control_characters_are_replaced),
+		cmocka_unit_test(values_cannot_forge_a_log_line),
+		cmocka_unit_test(numbers_and_times_are_printed_for_people),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

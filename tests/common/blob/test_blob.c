@@ -9,7 +9,7 @@
 #include "common/blob/blob_check.h"
 #include "common/blob/blob_state.h"
 #include "tests/support/blob_text.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,29 +27,29 @@
 #include <unistd.h>
 
 /* Test vector of FIPS 180-2, appendix B.1. */
-static void knows_sha_256(void **state)
+static void sha_256_matches_its_test_vector(void **state)
 {
 	(void)state;
 	struct blob_hash h;
 	struct error e;
 	char hex[BLOB_HEX_SIZE];
 	assert_int_equal(blob_hash_bytes("abc", 3, &h, &e), 0);
-	blob_hex(&h, hex);
+	blob_hash_to_hex(&h, hex);
 	assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
-static void keeps_and_reads_back(void **state)
+static void stored_file_is_read_back_after_reopening(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct error e;
 	uint64_t size;
 	char text[16] = "";
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0);
 	struct blob_hash h = blob_text_store(s, "hello, farm");
 	blob_store_close(s);
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* opened again */
-	assert_true(blob_has(s, &h, &size));
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0); /* opened again */
+	assert_true(blob_is_stored(s, &h, &size));
 	assert_int_equal(size, 11);
 	int fd = blob_open(s, &h, &size, &e);
 	assert_true(fd >= 0);
@@ -60,40 +60,40 @@ static void keeps_and_reads_back(void **state)
 	other.bytes[0] ^= 1;
 	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
 	blob_text_store(s, "hello, farm"); /* storing a file twice has the effect of storing it once */
-	assert_int_equal(blob_text_bytes(folder), 11);
+	assert_int_equal(blob_text_folder_bytes(temporary_folder), 11);
 	blob_store_close(s);
 }
 
-static void refuses_false_bytes(void **state)
+static void bytes_with_the_wrong_hash_are_refused(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w;
 	struct blob_hash h;
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0);
 	assert_int_equal(blob_hash_bytes("true", 4, &h, &e), 0);
 	assert_int_equal(blob_write_begin(&w, s, &h, 5, &e), 0);
-	assert_int_equal(blob_write_add(w, "false", 5, &e), 0);
-	assert_int_equal(blob_write_add(w, "!", 1, &e), -EMSGSIZE);
+	assert_int_equal(blob_write_append(w, "false", 5, &e), 0);
+	assert_int_equal(blob_write_append(w, "!", 1, &e), -EMSGSIZE);
 	assert_int_equal(blob_write_commit(w, &e), -EBADMSG);
 	assert_int_equal(blob_write_begin(&w, s, &h, 4, &e), 0);
-	assert_int_equal(blob_write_add(w, "tru", 3, &e), 0);
+	assert_int_equal(blob_write_append(w, "tru", 3, &e), 0);
 	assert_int_equal(blob_write_commit(w, &e), -EBADMSG); /* too short */
-	assert_false(blob_has(s, &h, NULL));
+	assert_false(blob_is_stored(s, &h, NULL));
 	blob_store_close(s);
 	char command[128];
-	snprintf(command, sizeof command, "test -z \"$(ls -A '%s')\"", folder);
+	snprintf(command, sizeof command, "test -z \"$(ls -A '%s')\"", temporary_folder);
 	assert_int_equal(system(command), 0); /* no temporary file is left */
 }
 
-static void forgets_the_oldest_that_nobody_holds(void **state)
+static void oldest_unheld_file_is_evicted(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w;
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 30, &e), 0);
 	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij"),
 			 c = blob_text_store(s, "ABCDEFGHIJ");
 	blob_release(s, &a);
@@ -101,9 +101,9 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	assert_true(blob_hold(s, &a)); /* a is now younger than b */
 	blob_release(s, &a);
 	struct blob_hash d = blob_text_store(s, "!@#$%^&*()");
-	assert_false(blob_has(s, &b, NULL));
-	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
-	assert_int_equal(blob_text_bytes(folder), 30);
+	assert_false(blob_is_stored(s, &b, NULL));
+	assert_true(blob_is_stored(s, &a, NULL) && blob_is_stored(s, &c, NULL) && blob_is_stored(s, &d, NULL));
+	assert_int_equal(blob_text_folder_bytes(temporary_folder), 30);
 	assert_true(blob_hold(s, &a));
 	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all bytes are in use */
 	assert_int_equal(blob_write_begin(&w, s, &b, 31, &e), -EMSGSIZE);
@@ -111,14 +111,14 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 }
 
 /* The last twenty of a hundred files fit; whenever the store is opened, these are there and no others. */
-static void knows_many(void **state)
+static void reopened_store_has_the_files_that_fit(void **state)
 {
 	(void)state;
 	enum { MANY = 100, FIT = 20 };
 	struct blob_hash h[MANY];
 	struct blob_store *s;
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 4 * FIT, &e), 0);
 	for (int i = 0; i < MANY; i++) {
 		char text[8];
 		snprintf(text, sizeof text, "%04d", i);
@@ -127,96 +127,96 @@ static void knows_many(void **state)
 	}
 	for (int start = 0; start < 2; start++) {
 		for (int i = 0; i < MANY; i++)
-			assert_true(blob_has(s, &h[i], NULL) == (i >= MANY - FIT));
-		assert_int_equal(blob_text_bytes(folder), 4 * FIT);
+			assert_true(blob_is_stored(s, &h[i], NULL) == (i >= MANY - FIT));
+		assert_int_equal(blob_text_folder_bytes(temporary_folder), 4 * FIT);
 		blob_store_close(s);
-		assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
+		assert_int_equal(blob_store_open(&s, temporary_folder, 4 * FIT, &e), 0);
 	}
 	blob_store_close(s);
 }
 
 /* The bytes that two writers have sent must fit below the limit together; bytes that were only announced take no room.
  */
-static void room_is_taken_by_what_arrives(void **state)
+static void only_received_bytes_count_against_the_limit(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w[3];
 	struct blob_hash a = blob_text_hash("0123456789"), b = blob_text_hash("abcdefghij");
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 25, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 25, &e), 0);
 	assert_int_equal(blob_write_begin(&w[0], s, &a, 26, &e), -EMSGSIZE);
 	assert_int_equal(blob_write_begin(&w[0], s, &a, 10, &e), 0);
 	assert_int_equal(blob_write_begin(&w[1], s, &b, 25, &e), 0);
 	assert_int_equal(blob_write_begin(&w[2], s, &a, 10, &e), 0);
-	assert_int_equal(blob_write_add(w[1], "0123456789abcdef", 16, &e), 0);
-	assert_int_equal(blob_write_add(w[0], "0123456789", 10, &e), -EFBIG);
+	assert_int_equal(blob_write_append(w[1], "0123456789abcdef", 16, &e), 0);
+	assert_int_equal(blob_write_append(w[0], "0123456789", 10, &e), -EFBIG);
 	blob_write_abort(w[1]);
 	for (int i = 0; i < 3; i += 2) { /* the second writer finds the file stored */
-		assert_int_equal(blob_write_add(w[i], "0123456789", 10, &e), 0);
+		assert_int_equal(blob_write_append(w[i], "0123456789", 10, &e), 0);
 		assert_int_equal(blob_write_commit(w[i], &e), 0);
 	}
-	assert_int_equal(blob_text_bytes(folder), 10);
+	assert_int_equal(blob_text_folder_bytes(temporary_folder), 10);
 	assert_int_equal(blob_write_begin(&w[1], s, &b, 15, &e), 0); /* all that had arrived was given back */
 	blob_write_abort(w[1]);
 	blob_store_close(s);
 }
 
 /* A writer that announces a large file and sends little of it takes only as much room as it sent. */
-static void evicts_as_bytes_arrive(void **state)
+static void files_are_evicted_as_bytes_arrive(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct blob_writer *w, *other;
 	struct blob_hash large = blob_text_hash("a large file"), small = blob_text_hash("small");
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 30, &e), 0);
 	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij");
 	blob_release(s, &a);
 	blob_release(s, &b);
 	assert_int_equal(blob_write_begin(&w, s, &large, 28, &e), 0);
-	assert_true(blob_has(s, &a, NULL) && blob_has(s, &b, NULL));
+	assert_true(blob_is_stored(s, &a, NULL) && blob_is_stored(s, &b, NULL));
 	assert_int_equal(blob_write_begin(&other, s, &small, 5, &e), 0);
 	blob_write_abort(other);
-	assert_int_equal(blob_write_add(w, "0123456789", 10, &e), 0);
-	assert_true(blob_has(s, &a, NULL) && blob_has(s, &b, NULL));
-	assert_int_equal(blob_write_add(w, "0", 1, &e), 0);
-	assert_false(blob_has(s, &a, NULL));
-	assert_true(blob_has(s, &b, NULL));
+	assert_int_equal(blob_write_append(w, "0123456789", 10, &e), 0);
+	assert_true(blob_is_stored(s, &a, NULL) && blob_is_stored(s, &b, NULL));
+	assert_int_equal(blob_write_append(w, "0", 1, &e), 0);
+	assert_false(blob_is_stored(s, &a, NULL));
+	assert_true(blob_is_stored(s, &b, NULL));
 	assert_true(blob_hold(s, &b)); /* b is the only file left to evict */
-	assert_int_equal(blob_write_add(w, "123456789", 9, &e), 0);
-	assert_int_equal(blob_write_add(w, "0", 1, &e), -EFBIG);
-	assert_int_equal(blob_text_bytes(folder), 30);
+	assert_int_equal(blob_write_append(w, "123456789", 9, &e), 0);
+	assert_int_equal(blob_write_append(w, "0", 1, &e), -EFBIG);
+	assert_int_equal(blob_text_folder_bytes(temporary_folder), 30);
 	blob_write_abort(w);
 	assert_int_equal(blob_write_begin(&w, s, &large, 20, &e), 0);
 	blob_write_abort(w);
-	assert_true(blob_has(s, &b, NULL));
+	assert_true(blob_is_stored(s, &b, NULL));
 	blob_store_close(s);
 }
 
 /* After a restart with a smaller limit, files that are held before the store is trimmed stay, even the oldest. */
-static void held_before_it_is_trimmed(void **state)
+static void files_held_before_a_trim_survive_it(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0);
 	struct blob_hash a = blob_text_store(s, "0123456789"), b = blob_text_store(s, "abcdefghij");
 	blob_store_close(s);
-	assert_int_equal(blob_store_open(&s, folder, 5, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 5, &e), 0);
 	assert_true(blob_hold(s, &a));
 	blob_store_trim(s);
-	assert_true(blob_has(s, &a, NULL));
-	assert_false(blob_has(s, &b, NULL));
+	assert_true(blob_is_stored(s, &a, NULL));
+	assert_false(blob_is_stored(s, &b, NULL));
 	blob_release(s, &a);
 	blob_store_trim(s);
-	assert_int_equal(blob_text_bytes(folder), 0);
+	assert_int_equal(blob_text_folder_bytes(temporary_folder), 0);
 	blob_store_close(s);
 }
 
 /* Any byte is damaged: a check detects it, the file is moved aside and no longer given out; writing the file again
  * restores it, and its holders still hold it. */
-static void damaged_at_rest(void **state)
+static void damaged_file_is_moved_aside_until_rewritten(void **state)
 {
 	(void)state;
 	static const char text[] = "bytes that are to stay as they are";
@@ -224,31 +224,32 @@ static void damaged_at_rest(void **state)
 	struct error e;
 	char path[4096], damaged[300], hex[BLOB_HEX_SIZE];
 	uint64_t size;
-	assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 1000, &e), 0);
 	struct blob_hash h = blob_text_store(s, text), other;
 	assert_int_equal(blob_hash_bytes("x", 1, &other, &e), 0);
 	blob_path(s, &h, path, sizeof path);
-	blob_hex(&h, hex);
-	snprintf(damaged, sizeof damaged, "%s/damaged.%s", folder, hex);
-	for (size_t at = 0; at < strlen(text); at++) {
+	blob_hash_to_hex(&h, hex);
+	snprintf(damaged, sizeof damaged, "%s/damaged.%s", temporary_folder, hex);
+	for (size_t offset = 0; offset < strlen(text); offset++) {
 		int fd = open(path, O_WRONLY);
-		char wrong = (char)(text[at] ^ 1);
-		assert_int_equal(pwrite(fd, &wrong, 1, (off_t)at), 1);
+		char wrong = (char)(text[offset] ^ 1);
+		assert_int_equal(pwrite(fd, &wrong, 1, (off_t)offset), 1);
 		close(fd);
 		assert_int_equal(blob_check(s, &h, 1000, &e), 0); /* the file was just written, and is not read again */
-		assert_int_equal(blob_check(s, &h, BLOB_SINCE_GIVEN, &e), 0);
-		if (at % 2) { /* whoever was given the file may have wrong bytes */
+		assert_int_equal(blob_check(s, &h, BLOB_SINCE_OPENED, &e), 0);
+		if (offset % 2) { /* whoever was given the file may have wrong bytes */
 			close(blob_open(s, &h, &size, &e));
 			assert_int_equal(blob_check(s, &h, 1000, &e), 0);
 		}
-		assert_int_equal(blob_check(s, &h, at % 2 ? BLOB_SINCE_GIVEN : 0, &e), -EBADMSG);
+		assert_int_equal(blob_check(s, &h, offset % 2 ? BLOB_SINCE_OPENED : 0, &e), -EBADMSG);
 		assert_non_null(strstr(e.text, "damaged"));
 		assert_true(access(path, F_OK) != 0 && access(damaged, F_OK) == 0);
-		assert_true(!blob_has(s, &h, NULL) && !blob_hold(s, &h) && blob_open(s, &h, &size, &e) == -ENOENT);
+		assert_true(!blob_is_stored(s, &h, NULL) && !blob_hold(s, &h) &&
+			    blob_open(s, &h, &size, &e) == -ENOENT);
 		assert_int_equal(blob_check(s, &h, 0, &e), -ENOENT);
 		blob_text_store(s, text);
 		assert_int_equal(blob_check(s, &h, 0, &e), 0);
-		assert_true(blob_has(s, &h, &size) && size == strlen(text));
+		assert_true(blob_is_stored(s, &h, &size) && size == strlen(text));
 	}
 	for (int seconds = 0; seconds <= 1000; seconds += 1000) { /* however recently the file was read */
 		unlink(path);
@@ -258,10 +259,10 @@ static void damaged_at_rest(void **state)
 		blob_release(s, &h);
 	}
 	unlink(path);
-	assert_int_equal(blob_check(s, &h, BLOB_SINCE_GIVEN, &e), -EBADMSG);
-	assert_int_equal(blob_expect(s, &h, &e), 0);
-	assert_int_equal(blob_expect(s, &other, &e), 0); /* a file that was never there */
-	assert_false(blob_has(s, &other, NULL));
+	assert_int_equal(blob_check(s, &h, BLOB_SINCE_OPENED, &e), -EBADMSG);
+	assert_int_equal(blob_hold_expected(s, &h, &e), 0);
+	assert_int_equal(blob_hold_expected(s, &other, &e), 0); /* a file that was never there */
+	assert_false(blob_is_stored(s, &other, NULL));
 	blob_text_store(s, "x");
 	blob_release(s, &other);
 	blob_text_store(s, text);
@@ -271,26 +272,26 @@ static void damaged_at_rest(void **state)
 		struct blob_hash m = blob_text_store(s, more);
 		blob_release(s, &m);
 	}
-	assert_true(blob_has(s, &h, NULL) && blob_has(s, &other, NULL));
+	assert_true(blob_is_stored(s, &h, NULL) && blob_is_stored(s, &other, NULL));
 	blob_store_close(s);
 }
 
 /* The removed folder is made again; the files that were in it are found missing when they are used. */
-static void a_folder_that_is_removed(void **state)
+static void removed_folder_is_recreated(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct error e;
 	char inside[300], path[4096];
 	uint64_t size;
-	snprintf(inside, sizeof inside, "%s/inside", folder);
+	snprintf(inside, sizeof inside, "%s/inside", temporary_folder);
 	assert_int_equal(blob_store_open(&s, inside, 1000, &e), 0);
 	struct blob_hash h = blob_text_store(s, "lost");
 	blob_path(s, &h, path, sizeof path);
 	assert_int_equal(unlink(path), 0);
 	assert_int_equal(rmdir(inside), 0);
 	struct blob_hash other = blob_text_store(s, "stored after that");
-	assert_true(blob_has(s, &other, &size) && size == 17);
+	assert_true(blob_is_stored(s, &other, &size) && size == 17);
 	assert_int_equal(blob_check(s, &h, 1000, &e), -EBADMSG);
 	blob_text_store(s, "lost");
 	assert_int_equal(blob_check(s, &h, 0, &e), 0);
@@ -298,7 +299,7 @@ static void a_folder_that_is_removed(void **state)
 }
 
 /* A check in parts, and what happens to the file between these parts. */
-static void checked_in_parts(void **state)
+static void file_may_change_between_the_parts_of_a_check(void **state)
 {
 	(void)state;
 	struct blob_store *s;
@@ -306,7 +307,7 @@ static void checked_in_parts(void **state)
 	struct error e;
 	char path[4096];
 	uint64_t size;
-	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 30, &e), 0);
 	struct blob_hash h = blob_text_store(s, "bytes that are checked");
 	blob_release(s, &h);
 	blob_path(s, &h, path, sizeof path);
@@ -314,10 +315,10 @@ static void checked_in_parts(void **state)
 	assert_int_equal(blob_check_begin(&c, s, &h, 0, &e), 1);
 	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
 	close(blob_open(s, &h, &size, &e));
-	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_OPENED, &e), 1);
 	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
 	/* the file is held, and given out again before its check has ended */
-	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_OPENED, &e), 1);
 	assert_true(blob_is_being_checked(s, &h));
 	struct blob_hash more = blob_text_hash("other bytes, too many of them");
 	struct blob_writer *w;
@@ -327,7 +328,7 @@ static void checked_in_parts(void **state)
 		continue;
 	assert_int_equal(blob_check_end(c, &e), 0);
 	assert_false(blob_is_being_checked(s, &h));
-	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_OPENED, &e), 1);
 	/* two checks find the damage at once, and the file is written again before the second one reports it */
 	assert_int_equal(truncate(path, 3), 0);
 	assert_int_equal(blob_check_begin(&other, s, &h, 0, &e), 1);
@@ -336,24 +337,34 @@ static void checked_in_parts(void **state)
 	assert_int_equal(blob_check_end(c, &e), -EBADMSG);
 	blob_text_store(s, "bytes that are checked");
 	assert_int_equal(blob_check_end(other, &e), 0);
-	assert_true(blob_has(s, &h, &size) && size == 22);
+	assert_true(blob_is_stored(s, &h, &size) && size == 22);
 	blob_store_close(s);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(knows_sha_256),
-		cmocka_unit_test_setup_teardown(keeps_and_reads_back, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(refuses_false_bytes, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(room_is_taken_by_what_arrives, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(evicts_as_bytes_arrive, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
+		cmocka_unit_test(sha_256_matches_its_test_vector),
+		cmocka_unit_test_setup_teardown(stored_file_is_read_back_after_reopening, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(bytes_with_the_wrong_hash_are_refused, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(oldest_unheld_file_is_evicted, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(only_received_bytes_count_against_the_limit, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(files_are_evicted_as_bytes_arrive, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(files_held_before_a_trim_survive_it, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(damaged_file_is_moved_aside_until_rewritten, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(removed_folder_is_recreated, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(file_may_change_between_the_parts_of_a_check, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(reopened_store_has_the_files_that_fit, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

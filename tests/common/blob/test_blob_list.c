@@ -4,7 +4,7 @@
 #include "common/blob/blob.h"
 #include "tests/support/failing_list.h"
 #include "tests/support/blob_text.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <errno.h>
 #include <setjmp.h>
@@ -15,28 +15,29 @@
 
 #include <cmocka.h>
 
-static void a_folder_that_cannot_be_listed(void **state)
+static void store_that_cannot_be_listed_is_not_opened(void **state)
 {
 	(void)state;
 	struct blob_store *s;
 	struct error e;
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0);
 	struct blob_hash one = blob_text_store(s, "one"), two = blob_text_store(s, "two");
 	blob_store_close(s);
-	failing_list_begin(folder, 1, EIO);
-	int rc = blob_store_open(&s, folder, 0, &e);
+	failing_list_begin(temporary_folder, 1, EIO);
+	int rc = blob_store_open(&s, temporary_folder, 0, &e);
 	failing_list_end();
 	assert_int_equal(rc, -EIO);
-	assert_non_null(strstr(e.text, folder));
-	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	assert_true(blob_has(s, &one, NULL) && blob_has(s, &two, NULL));
+	assert_non_null(strstr(e.text, temporary_folder));
+	assert_int_equal(blob_store_open(&s, temporary_folder, 0, &e), 0);
+	assert_true(blob_is_stored(s, &one, NULL) && blob_is_stored(s, &two, NULL));
 	blob_store_close(s);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(a_folder_that_cannot_be_listed, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(store_that_cannot_be_listed_is_not_opened, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

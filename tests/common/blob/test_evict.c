@@ -7,7 +7,7 @@
 #include "common/base/disk.h"
 #include "common/blob/blob.h"
 #include "common/blob/blob_state.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -40,75 +40,75 @@ static struct blob_hash hash_of_number(unsigned i)
 }
 
 /* A store whose files' contents do not match their names; nobody compares these. */
-static struct blob_store *store_of(unsigned count, uint64_t limit)
+static struct blob_store *make_store(unsigned count, uint64_t limit)
 {
 	struct blob_store *s;
 	struct error e;
 	for (unsigned i = 0; i < count; i++) {
 		char hex[BLOB_HEX_SIZE], path[4096];
 		struct blob_hash h = hash_of_number(i);
-		blob_hex(&h, hex);
-		snprintf(path, sizeof path, "%s/%s", folder, hex);
+		blob_hash_to_hex(&h, hex);
+		snprintf(path, sizeof path, "%s/%s", temporary_folder, hex);
 		int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
 		assert_true(fd >= 0);
 		assert_int_equal(write(fd, "0123456789", SIZE), SIZE);
 		close(fd);
 	}
-	assert_int_equal(blob_store_open(&s, folder, limit, &e), 0);
+	assert_int_equal(blob_store_open(&s, temporary_folder, limit, &e), 0);
 	return s;
 }
 
 /* The files exist only in the store's table: there is nothing to remove. */
-static int no_unlink(const char *path)
+static int skip_unlink(const char *path)
 {
 	(void)path;
 	return 0;
 }
 
 /* User time of FEW evictions from a store of `count` files. */
-static double time_of_evictions(unsigned count)
+static double eviction_seconds(unsigned count)
 {
 	struct disk none = disk_system;
-	struct blob_store *s = store_of(count, 0);
-	none.unlink = no_unlink;
-	disk_use(&none);
+	struct blob_store *s = make_store(count, 0);
+	none.unlink = skip_unlink;
+	disk_set_calls(&none);
 	double begun = user_seconds();
 	for (unsigned i = 0; i < FEW; i++)
 		assert_true(blob_store_evict(s));
 	double took = user_seconds() - begun;
-	disk_use(NULL);
+	disk_set_calls(NULL);
 	blob_store_close(s);
 	return took;
 }
 
-static void each_without_a_look_at_others(void **state)
+static void eviction_time_does_not_grow_with_file_count(void **state)
 {
 	(void)state;
-	double few = time_of_evictions(FEW);
-	double many = time_of_evictions(MANY);
+	double few = eviction_seconds(FEW);
+	double many = eviction_seconds(MANY);
 	if (many > 8 * few + 0.05)
 		fail_msg("%d evictions of %d files took %g s, of %d files %g s", FEW, FEW, few, MANY, many);
 }
 
 /* A megabyte has 256 blocks. */
-static void as_many_as_blocks(void **state)
+static void write_evicts_as_many_files_as_it_has_blocks(void **state)
 {
 	(void)state;
 	static char chunk[CHUNK];
 	const uint64_t limit = FEW * SIZE + CHUNK;
-	struct blob_store *s = store_of(FEW, limit);
+	struct blob_store *s = make_store(FEW, limit);
 	struct blob_writer *w;
 	struct blob_hash large = hash_of_number(FEW);
 	struct error e;
-	uint64_t left = FEW;
+	uint64_t remaining_count = FEW;
 	assert_int_equal(blob_write_begin(&w, s, &large, limit, &e), 0);
-	assert_int_equal(blob_write_add(w, chunk, CHUNK, &e), 0);
-	assert_int_equal(s->bytes, left * SIZE);
-	while (blob_write_at(w) < limit) {
-		uint64_t size = limit - blob_write_at(w), before = left;
-		assert_int_equal(blob_write_add(w, chunk, size > 8192 ? 8192 : size, &e), 0);
-		left = s->bytes / SIZE;
-		assert_in_range(before - left, 1, 2 + 8);
+	assert_int_equal(blob_write_append(w, chunk, CHUNK, &e), 0);
+	assert_int_equal(s->bytes, remaining_count * SIZE);
+	while (blob_write_offset(w) < limit) {
+		uint64_t size = limit - blob_write_offset(w), previous_count = remaining_count;
+		assert_int_equal(blob_write_append(w, chunk, size > 8192 ? 8192 : size, &e), 0);
+		remaining_count = s->bytes / SIZE;
+		assert_in_range(previous_count - remaining_count, 1, 2 + 8);
 	}
 	blob_write_abort(w);
 	assert_false(blob_store_trim(s));
@@ -117,10 +117,10 @@ static void as_many_as_blocks(void **state)
 }
 
 /* All files are evicted in the end, except held ones; the store's bytes and entries agree. */
-static void all_but_those_that_are_held(void **state)
+static void all_files_but_held_ones_are_evicted(void **state)
 {
 	(void)state;
-	struct blob_store *s = store_of(FEW, 0);
+	struct blob_store *s = make_store(FEW, 0);
 	struct blob_hash first = hash_of_number(0), used = hash_of_number(1), held = hash_of_number(2);
 	struct error e;
 	uint64_t size;
@@ -133,13 +133,13 @@ static void all_but_those_that_are_held(void **state)
 	blob_release(s, &first);
 	for (unsigned i = 0; i < FEW - 3; i++)
 		assert_true(blob_store_evict(s));
-	assert_true(blob_has(s, &used, NULL) && blob_has(s, &first, NULL));
+	assert_true(blob_is_stored(s, &used, NULL) && blob_is_stored(s, &first, NULL));
 	assert_true(blob_store_evict(s));
-	assert_false(blob_has(s, &used, NULL));
+	assert_false(blob_is_stored(s, &used, NULL));
 	assert_true(blob_store_evict(s));
-	assert_false(blob_has(s, &first, NULL));
+	assert_false(blob_is_stored(s, &first, NULL));
 	assert_false(blob_store_evict(s));
-	assert_true(blob_has(s, &held, NULL));
+	assert_true(blob_is_stored(s, &held, NULL));
 	assert_int_equal(s->bytes, SIZE);
 	assert_int_equal(s->idle_bytes, 0);
 	assert_in_range(s->count, 1, 2);
@@ -151,9 +151,12 @@ static void all_but_those_that_are_held(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(each_without_a_look_at_others, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(as_many_as_blocks, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(all_but_those_that_are_held, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(eviction_time_does_not_grow_with_file_count, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(write_evicts_as_many_files_as_it_has_blocks, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(all_files_but_held_ones_are_evicted, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,9 +18,9 @@
 static double group_offset; /* offset shared by all pixels of a group: the effect of an error of b */
 static double pixel_noise;
 
-static float noisy(void)
+static float noisy_value(void)
 {
-	return (float)(4 * (1 + group_offset + pixel_noise * canvas_normal()));
+	return (float)(4 * (1 + group_offset + pixel_noise * canvas_random_normal()));
 }
 
 /* 400 images with known true relMSE, 16 groups: the upper end must be above the truth in 95 % of the runs, and the
@@ -31,26 +31,26 @@ static float noisy(void)
 static void estimated_error_covers_the_truth(void **unused)
 {
 	(void)unused;
-	struct plan p = canvas_plan(PLAN_SAMPLES, 6, 6, 16, 1);
+	struct plan p = canvas_test_plan(PLAN_SAMPLES, 6, 6, 16, 1);
 	for (int correlated = 0; correlated < 2; correlated++) {
-		double each = 0.08, truth = 0, mean_estimate = 0;
-		int covered = 0;
+		double deviation = 0.08, truth = 0, mean_estimate = 0;
+		int covered_count = 0;
 		enum { RUNS = 400 };
 		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, equal in X, Y and Z
 		 * when correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
 		for (int run = 0; run < RUNS; run++) {
 			struct canvas *c;
 			struct canvas_image img;
-			canvas_state = (uint64_t)(run * 2 + correlated + 1) * UINT64_C(0x9e3779b97f4a7c15);
+			canvas_random_state = (uint64_t)(run * 2 + correlated + 1) * UINT64_C(0x9e3779b97f4a7c15);
 			assert_int_equal(canvas_new(&c, &p, -28, NULL, NULL), 0);
 			for (uint32_t g = 0; g < 16; g++) {
-				group_offset = correlated ? each * canvas_normal() : 0;
-				pixel_noise = correlated ? 0 : each;
-				struct batch b = canvas_batch(&p, 0, g, 0, 1, noisy);
+				group_offset = correlated ? deviation * canvas_random_normal() : 0;
+				pixel_noise = correlated ? 0 : deviation;
+				struct batch b = canvas_test_batch(&p, 0, g, 0, 1, noisy_value);
 				assert_int_equal(canvas_add(c, &b, NULL), 0);
 				batch_fini(&b);
 			}
-			assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+			assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 			double exact[3] = {3.2404541621141054 - 1.5371385127977166 - 0.4985314095560162,
 					   -0.9692660305051868 + 1.8760108454466942 + 0.0415560175303498,
 					   0.0556434309591147 - 0.2040259135167538 + 1.0572251882231791};
@@ -61,17 +61,17 @@ static void estimated_error_covers_the_truth(void **unused)
 			for (int k = 0; k < 3; k++) {
 				double square = correlated ? exact[k] * exact[k]
 							   : m[k][0] * m[k][0] + m[k][1] * m[k][1] + m[k][2] * m[k][2];
-				variance += each * each / 16 * square / (exact[k] * exact[k]) / 3;
+				variance += deviation * deviation / 16 * square / (exact[k] * exact[k]) / 3;
 			}
 			truth = variance;
-			covered += img.rel_mse_upper >= truth;
+			covered_count += img.rel_mse_upper >= truth;
 			mean_estimate += img.rel_mse / RUNS;
 			canvas_image_fini(&img);
 			canvas_free(c);
 		}
-		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated, covered,
-			      RUNS, mean_estimate / truth);
-		assert_true(covered >= 340);
+		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated,
+			      covered_count, RUNS, mean_estimate / truth);
+		assert_true(covered_count >= 340);
 		assert_true(fabs(mean_estimate / truth - 1) < 0.1);
 	}
 }
@@ -79,34 +79,34 @@ static void estimated_error_covers_the_truth(void **unused)
 static void black_canvas_has_no_error(void **unused)
 {
 	(void)unused;
-	struct plan p = canvas_plan(PLAN_CHAINS, 4, 4, 2, 1);
+	struct plan p = canvas_test_plan(PLAN_CHAINS, 4, 4, 2, 1);
 	struct canvas *c;
 	struct canvas_image img;
 	assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
 	for (uint32_t g = 0; g < 2; g++) {
-		struct batch b = canvas_batch(&p, 0, g, 0, 0, canvas_one);
+		struct batch b = canvas_test_batch(&p, 0, g, 0, 0, canvas_test_one);
 		b.independent_sum = 0;
 		b.counters[COUNT_SAMPLES] = 0;
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 	}
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-	assert_true(img.black && img.b == 0 && isnan(img.rel_mse) && img.rounds == 1);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
+	assert_true(img.is_black && img.b == 0 && isnan(img.rel_mse) && img.rounds == 1);
 	struct plan with_target = p;
 	with_target.target_error = 0.1;
-	assert_int_equal(merge_end_of(&with_target, 1, 0, &img), MERGE_GOES_ON);
+	assert_int_equal(merge_find_end(&with_target, 1, 0, &img), MERGE_CONTINUES);
 	canvas_image_fini(&img);
 	canvas_free(c);
 }
 
-static float nearly_one(void)
+static float value_near_one(void)
 {
-	return (float)(1 + 0.02 * canvas_uniform());
+	return (float)(1 + 0.02 * canvas_random_uniform());
 }
 
 /* A group's distance under any weights, computed here from the values that were put into its film only; the sum over
  * groups is that of the squared errors. */
-static void distances_of_groups_are_the_errors(void **unused)
+static void group_distances_sum_to_the_squared_errors(void **unused)
 {
 	(void)unused;
 	enum { GROUPS = 4, VALUES = 100 * 70 * 3 };
@@ -114,15 +114,15 @@ static void distances_of_groups_are_the_errors(void **unused)
 						{-0.9692660305051868, 1.8760108454466942, 0.0415560175303498},
 						{0.0556434309591147, -0.2040259135167538, 1.0572251882231791}};
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
-		struct plan p = canvas_plan((enum plan_kind)kind, 100, 70, GROUPS, 1);
+		struct plan p = canvas_test_plan((enum plan_kind)kind, 100, 70, GROUPS, 1);
 		struct canvas *c;
 		struct canvas_image img;
 		double(*rgb)[VALUES] = mem_alloc(GROUPS, sizeof *rgb), *weight = mem_alloc(VALUES, sizeof *weight);
-		double distance[GROUPS], want[GROUPS] = {0}, all = 0, squares = 0;
-		canvas_state = 78;
+		double distance[GROUPS], expected[GROUPS] = {0}, total = 0, squares = 0;
+		canvas_random_state = 78;
 		assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
 		for (uint32_t g = 0; g < GROUPS; g++) {
-			struct batch b = canvas_batch(&p, 0, g, 0, 4, nearly_one);
+			struct batch b = canvas_test_batch(&p, 0, g, 0, 4, value_near_one);
 			b.independent_sum = (1 + 0.01 * g) * (double)p.epoch;
 			double scale = 1 / (double)p.epoch;
 			if (kind == PLAN_CHAINS) {
@@ -144,20 +144,20 @@ static void distances_of_groups_are_the_errors(void **unused)
 			assert_int_equal(canvas_add(c, &b, NULL), 0);
 			batch_fini(&b);
 		}
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		for (size_t i = 0; i < VALUES; i++) {
 			double mean = (rgb[0][i] + rgb[1][i] + rgb[2][i] + rgb[3][i]) / GROUPS;
-			weight[i] = canvas_uniform();
+			weight[i] = canvas_random_uniform();
 			squares += weight[i] * (double)img.error[i] * (double)img.error[i];
 			for (int g = 0; g < GROUPS; g++)
-				want[g] += weight[i] * (rgb[g][i] - mean) * (rgb[g][i] - mean);
+				expected[g] += weight[i] * (rgb[g][i] - mean) * (rgb[g][i] - mean);
 		}
 		canvas_group_distances(c, weight, distance);
 		for (int g = 0; g < GROUPS; g++) {
-			all += distance[g];
-			assert_true(fabs(distance[g] / want[g] - 1) < 1e-6);
+			total += distance[g];
+			assert_true(fabs(distance[g] / expected[g] - 1) < 1e-6);
 		}
-		assert_true(fabs(all / (GROUPS * (GROUPS - 1) * squares) - 1) < 1e-6);
+		assert_true(fabs(total / (GROUPS * (GROUPS - 1) * squares) - 1) < 1e-6);
 		mem_free(rgb);
 		mem_free(weight);
 		canvas_image_fini(&img);
@@ -170,7 +170,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(estimated_error_covers_the_truth),
 		cmocka_unit_test(black_canvas_has_no_error),
-		cmocka_unit_test(distances_of_groups_are_the_errors),
+		cmocka_unit_test(group_distances_sum_to_the_squared_errors),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

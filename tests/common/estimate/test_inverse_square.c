@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-static struct inverse_square by_midpoints(double brightness, double error, double floor)
+static struct inverse_square moments_by_midpoint_rule(double brightness, double error, double floor)
 {
 	const int points = 2000000;
 	double one = 0, two = 0, width = 16.0 / points;
@@ -25,7 +25,7 @@ static struct inverse_square by_midpoints(double brightness, double error, doubl
 	return (struct inverse_square){one, two - one * one};
 }
 
-static void moments_are_those_of_the_normal_law(void **state)
+static void moments_match_the_midpoint_rule(void **state)
 {
 	(void)state;
 	static const double floors[] = {0.001, 0.03, 0.4, 1, 7, 100}, brightnesses[] = {-4.5, -0.7, 0, 0.2, 2, 5};
@@ -33,7 +33,8 @@ static void moments_are_those_of_the_normal_law(void **state)
 	for (size_t i = 0; i < 6; i++)
 		for (size_t k = 0; k < 6; k++) {
 			double f = floors[i] * error, b = brightnesses[k] * error;
-			struct inverse_square got = inverse_square_expect(b, error, f), is = by_midpoints(b, error, f);
+			struct inverse_square got = inverse_square_moments(b, error, f),
+					      is = moments_by_midpoint_rule(b, error, f);
 			assert_true(fabs(got.mean / is.mean - 1) < 1e-3);
 			assert_true(fabs(got.variance - is.variance) < 1e-3 * (is.variance + is.mean * is.mean));
 		}
@@ -41,6 +42,6 @@ static void moments_are_those_of_the_normal_law(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(moments_are_those_of_the_normal_law)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(moments_match_the_midpoint_rule)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,7 +5,7 @@
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
 #include "tests/support/group_image.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -15,7 +15,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static struct plan plan_of(uint32_t width, uint32_t height, uint64_t epoch)
+static struct plan make_plan(uint32_t width, uint32_t height, uint64_t epoch)
 {
 	struct plan p = group_image_plan(PLAN_SAMPLES, width, height);
 	p.epoch = epoch;
@@ -24,95 +24,95 @@ static struct plan plan_of(uint32_t width, uint32_t height, uint64_t epoch)
 	return p;
 }
 
-static void looks_are_geometric(void **state)
+static void estimates_are_due_at_a_geometric_ladder_of_rounds(void **state)
 {
 	(void)state;
 	static const uint64_t ladder[] = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 27, 33, 41};
-	struct plan p = plan_of(30, 20, 4); /* 64 samples per pixel and round */
+	struct plan p = make_plan(30, 20, 4); /* 64 samples per pixel and round */
 	uint64_t r = 0;
 	for (size_t i = 0; i < sizeof ladder / sizeof *ladder; i++) {
-		r = merge_error_next(&p, r);
+		r = merge_next_error_rounds(&p, r);
 		assert_int_equal(r, ladder[i]);
 	}
 	for (uint64_t k = 1; k <= 40; k++) {
 		bool on = false;
 		for (size_t i = 0; i < sizeof ladder / sizeof *ladder; i++)
 			on |= ladder[i] == k;
-		assert_int_equal(merge_error_due(&p, k), on);
+		assert_int_equal(merge_error_is_due(&p, k), on);
 	}
-	assert_false(merge_error_due(&p, 0));
+	assert_false(merge_error_is_due(&p, 0));
 	p.target_error = 0;
-	assert_false(merge_error_due(&p, 1));
+	assert_false(merge_error_is_due(&p, 1));
 }
 
 /* A black image ends, after a million samples at least, if only an error bounds it. */
-static void black_ends(void **state)
+static void black_image_ends_after_a_million_samples(void **state)
 {
 	(void)state;
-	struct plan p = plan_of(30, 20, 4), q; /* 38,400 samples a round, of a film without a border */
-	struct canvas_image img = {.black = true, .rel_mse = NAN, .rel_mse_upper = NAN};
+	struct plan p = make_plan(30, 20, 4), q; /* 38,400 samples a round, of a film without a border */
+	struct canvas_image img = {.is_black = true, .rel_mse = NAN, .rel_mse_upper = NAN};
 	p.rounds = UINT64_MAX;
 	p.border = 0;
-	assert_int_equal(merge_end_of(&p, 26, 0, &img), MERGE_GOES_ON);
-	assert_int_equal(merge_end_of(&p, 27, 0, NULL), MERGE_GOES_ON);
-	assert_int_equal(merge_end_of(&p, 27, 0, &img), MERGE_BLACK);
+	assert_int_equal(merge_find_end(&p, 26, 0, &img), MERGE_CONTINUES);
+	assert_int_equal(merge_find_end(&p, 27, 0, NULL), MERGE_CONTINUES);
+	assert_int_equal(merge_find_end(&p, 27, 0, &img), MERGE_BLACK);
 	assert_string_equal(merge_end_name(MERGE_BLACK, false), "black");
 	q = p;
 	q.seconds = 10;
-	assert_int_equal(merge_end_of(&q, 27, 5, &img), MERGE_GOES_ON);
+	assert_int_equal(merge_find_end(&q, 27, 5, &img), MERGE_CONTINUES);
 	q = p;
 	q.rounds = 100;
-	assert_int_equal(merge_end_of(&q, 27, 0, &img), MERGE_GOES_ON);
+	assert_int_equal(merge_find_end(&q, 27, 0, &img), MERGE_CONTINUES);
 	q = p;
 	q.kind = PLAN_CHAINS;
 	q.chains = 100;
-	assert_int_equal(merge_end_of(&q, 1000000, 0, &img), MERGE_GOES_ON);
-	img.black = false;
-	assert_int_equal(merge_end_of(&p, 27, 0, &img), MERGE_GOES_ON);
+	assert_int_equal(merge_find_end(&q, 1000000, 0, &img), MERGE_CONTINUES);
+	img.is_black = false;
+	assert_int_equal(merge_find_end(&p, 27, 0, &img), MERGE_CONTINUES);
 }
 
 /* At least 0.9 mutations per pixel and group between two estimates, however long the plan's rounds are; and, from four
  * rounds on, steps of a quarter or less. */
-static void looks_are_worth_their_cost(void **state)
+static void estimates_are_a_minimum_of_work_apart(void **state)
 {
 	(void)state;
 	for (uint32_t groups = 2; groups <= 64; groups *= 2)
 		for (uint64_t epoch = 1; epoch < 1000; epoch = epoch * 5 / 2 + 1) {
-			struct plan p = plan_of(100, 50, 1);
+			struct plan p = make_plan(100, 50, 1);
 			p.kind = PLAN_CHAINS;
 			p.groups = groups;
 			p.chains = groups * 8;
 			p.epoch = epoch;
-			uint64_t before = 0, round = plan_round_mutations(&p);
+			uint64_t previous = 0, round = plan_round_mutations(&p);
 			for (int i = 0; i < 60; i++) {
-				uint64_t r = merge_error_next(&p, before);
-				assert_true(r > before && (double)((r - before) * round) >= 0.9 * groups * 5000);
-				assert_true(i < 4 || (double)r <= 1.25 * (double)before);
-				assert_true(r - before <= (groups * 4500 + round - 1) / round ||
-					    (double)(r - before) >= 0.15 * (double)before);
-				before = r;
+				uint64_t r = merge_next_error_rounds(&p, previous);
+				assert_true(r > previous && (double)((r - previous) * round) >= 0.9 * groups * 5000);
+				assert_true(i < 4 || (double)r <= 1.25 * (double)previous);
+				assert_true(r - previous <= (groups * 4500 + round - 1) / round ||
+					    (double)(r - previous) >= 0.15 * (double)previous);
+				previous = r;
 			}
 		}
-	struct plan p = plan_of(100, 50, 1);
-	assert_true(merge_error_next(&p, UINT64_MAX - 1) == UINT64_MAX &&
-		    merge_error_next(&p, UINT64_MAX / 4) > UINT64_MAX / 4);
+	struct plan p = make_plan(100, 50, 1);
+	assert_true(merge_next_error_rounds(&p, UINT64_MAX - 1) == UINT64_MAX &&
+		    merge_next_error_rounds(&p, UINT64_MAX / 4) > UINT64_MAX / 4);
 }
 
 /* A render whose pixels have errors of their own and one in common: sums of a group and round of `epoch` samples. */
-struct render {
-	double each, common;
+struct noisy_render {
+	double pixel_deviation, common_deviation;
 	struct dice dice;
 };
 
-static struct batch round_of(struct render *r, const struct plan *p, uint64_t round, uint32_t group)
+static struct batch make_batch(struct noisy_render *r, const struct plan *p, uint64_t round, uint32_t group)
 {
 	struct batch b = {
 		.key = {1, LEASE_RENDER, group, 0, round}, .tile_count = 1, .tiles = mem_alloc(1, sizeof *b.tiles)};
-	double n = (double)p->epoch, together = r->common * dice_normal(&r->dice);
+	double n = (double)p->epoch, together = r->common_deviation * dice_normal(&r->dice);
 	b.tiles[0] =
 		(struct tile){0, 0, p->width, p->height, mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
 	for (size_t i = 0; i < (size_t)p->width * p->height; i++) {
-		float v = (float)(n + sqrt(n) * (together + r->each * dice_normal(&r->dice)));
+		float v = (float)(n + sqrt(n) * (together + r->pixel_deviation * dice_normal(&r->dice)));
 		for (size_t k = 0; k < 3; k++)
 			b.tiles[0].xyz[3 * i + k] = v;
 	}
@@ -137,22 +137,22 @@ struct stop {
 	double error;
 };
 
-static struct stop stop_of(const struct plan *p, struct render *r)
+static struct stop render_until_stop(const struct plan *p, struct noisy_render *r)
 {
 	struct canvas *c;
 	struct stop s = {0};
 	assert_int_equal(canvas_new(&c, p, -20, NULL, NULL), 0);
 	for (uint64_t round = 0; !s.rounds; round++) {
 		for (uint32_t g = 0; g < p->groups; g++) {
-			struct batch b = round_of(r, p, round, g);
+			struct batch b = make_batch(r, p, round, g);
 			assert_int_equal(canvas_add(c, &b, NULL), 0);
 			batch_fini(&b);
 		}
-		if (!merge_error_due(p, round + 1))
+		if (!merge_error_is_due(p, round + 1))
 			continue;
 		struct canvas_image img;
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-		if (merge_end_of(p, round + 1, 0, &img) == MERGE_ERROR)
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
+		if (merge_find_end(p, round + 1, 0, &img) == MERGE_ERROR)
 			s = (struct stop){round + 1, sqrt(realised_error(&img)) / p->target_error};
 		canvas_image_fini(&img);
 	}
@@ -160,7 +160,7 @@ static struct stop stop_of(const struct plan *p, struct render *r)
 	return s;
 }
 
-static int by_size(const void *a, const void *b)
+static int compare_ascending(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x > y) - (x < y);
@@ -175,11 +175,11 @@ static int by_size(const void *a, const void *b)
  * nothing. Level: binomial; a share of 20 % exceeds the limit of 33 % of 300 with a probability of 1e-7. Power: without
  * the interval (the estimate against the target) the share is above 40 % in all cases, found with more than 99 %.
  */
-static void stops_are_not_lucky_dips(void **state)
+static void stops_are_seldom_above_the_target(void **state)
 {
 	(void)state;
 	enum { RUNS = 300 };
-	const int runs = test_scaled() ? RUNS / 5 : RUNS;
+	const int runs = test_is_scaled() ? RUNS / 5 : RUNS;
 	static const struct {
 		const char *name;
 		uint32_t side;
@@ -188,43 +188,44 @@ static void stops_are_not_lucky_dips(void **state)
 		     {"a few of them", 3, 1, 0, 0.03},
 		     {"half in common", 8, 0.7, 0.7, 0.03},
 		     {"all in common", 2, 0, 1, 0.03}};
-	struct render r = {.dice = dice_of("stops_are_not_lucky_dips")};
+	struct noisy_render r = {.dice = dice_for_test("stops_are_not_lucky_dips")};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct plan p = plan_of(cases[i].side, cases[i].side, 10);
+		struct plan p = make_plan(cases[i].side, cases[i].side, 10);
 		p.target_error = cases[i].target;
-		r.each = cases[i].each;
-		r.common = cases[i].common;
+		r.pixel_deviation = cases[i].each;
+		r.common_deviation = cases[i].common;
 		double error[RUNS], above = 0, rounds = 0;
 		for (int k = 0; k < runs; k++) {
-			struct stop s = stop_of(&p, &r);
+			struct stop s = render_until_stop(&p, &r);
 			error[k] = s.error;
 			above += s.error > 1;
 			rounds += (double)s.rounds / runs;
 		}
-		qsort(error, (size_t)runs, sizeof *error, by_size);
+		qsort(error, (size_t)runs, sizeof *error, compare_ascending);
 		print_message(
 			"%s: %.1f %% above the target, error over target: median %.3f, 95 %% below %.3f; %.1f rounds\n",
 			cases[i].name, 100 * above / runs, error[runs / 2], error[runs - runs / 20], rounds);
 		assert_true(error[runs / 2] < 1.0);
-		assert_true(test_scaled() || above <= 0.33 * runs);
+		assert_true(test_is_scaled() || above <= 0.33 * runs);
 	}
 }
 
 /* Against a clock that completes rounds one by one: the render ends at the first round that completes after its time
  * limit. */
-static void time_ends_with_a_round(void **state)
+static void time_limit_ends_a_render_with_a_full_round(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("time left");
+	struct dice d = dice_for_test("time left");
 	for (int i = 0; i < 20000; i++) {
-		struct plan p = {.seconds = 100 * dice_throw(&d)};
-		double round = exp(8 * dice_throw(&d) - 4), bootstrap = 20 * dice_throw(&d), now = 150 * dice_throw(&d);
+		struct plan p = {.seconds = 100 * dice_uniform(&d)};
+		double round = exp(8 * dice_uniform(&d) - 4), bootstrap = 20 * dice_uniform(&d),
+		       now = 150 * dice_uniform(&d);
 		double end = bootstrap + round;
 		while (end < p.seconds || end < now)
 			end += round;
-		double left = merge_seconds_left(&p, now, (now - bootstrap) / round, 1 / round);
+		double remaining = merge_seconds_remaining(&p, now, (now - bootstrap) / round, 1 / round);
 		/* the clock adds up rounding errors: at its beats, one round more or less is equally correct */
-		double wrong = fabs(left - (end - now)) / round;
+		double wrong = fabs(remaining - (end - now)) / round;
 		assert_true(wrong < 1e-6 || fabs(wrong - 1) < 1e-6);
 		if (wrong > 0.5)
 			assert_true(fabs(end - p.seconds) < 1e-6 * round ||
@@ -232,17 +233,19 @@ static void time_ends_with_a_round(void **state)
 				    fabs(end - round - now) < 1e-6 * round);
 	}
 	struct plan p = {.seconds = 10};
-	assert_true(merge_seconds_left(&p, 4, 0.5, 0) == 6);
-	assert_true(isnan(merge_seconds_left(&p, 11, 0.5, 0)));
-	assert_true(merge_seconds_left(&p, 11, 0.5, 0.25) == 2);
+	assert_true(merge_seconds_remaining(&p, 4, 0.5, 0) == 6);
+	assert_true(isnan(merge_seconds_remaining(&p, 11, 0.5, 0)));
+	assert_true(merge_seconds_remaining(&p, 11, 0.5, 0.25) == 2);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(looks_are_geometric),	      cmocka_unit_test(black_ends),
-		cmocka_unit_test(looks_are_worth_their_cost), cmocka_unit_test(stops_are_not_lucky_dips),
-		cmocka_unit_test(time_ends_with_a_round),
+		cmocka_unit_test(estimates_are_due_at_a_geometric_ladder_of_rounds),
+		cmocka_unit_test(black_image_ends_after_a_million_samples),
+		cmocka_unit_test(estimates_are_a_minimum_of_work_apart),
+		cmocka_unit_test(stops_are_seldom_above_the_target),
+		cmocka_unit_test(time_limit_ends_a_render_with_a_full_round),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

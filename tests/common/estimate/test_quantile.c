@@ -16,7 +16,7 @@ static void assert_near(double a, double b, double relative)
 }
 
 /* Upper 2.5 % points as printed in tables of F, three or four digits. */
-static void quantiles_are_those_of_the_tables(void **state)
+static void quantiles_match_printed_tables(void **state)
 {
 	(void)state;
 	static const struct {
@@ -33,7 +33,7 @@ static void quantiles_are_those_of_the_tables(void **state)
 	}
 }
 
-static void closed_forms_hold(void **state)
+static void quantiles_match_closed_forms(void **state)
 {
 	(void)state;
 	/* Two degrees in the numerator: P(F < x) = 1 - (1 + 2 x / b)^(-b / 2). */
@@ -42,28 +42,28 @@ static void closed_forms_hold(void **state)
 			assert_near(f_quantile(p, 2, b), b / 2 * expm1(-2 / b * log1p(-p)), 1e-7);
 	/* One degree each: (2 / pi) atan(sqrt(x)). */
 	for (double x = 1e-6; x < 1e6; x *= 7)
-		assert_near(f_below(x, 1, 1), 2 / 3.14159265358979323846 * atan(sqrt(x)), 1e-12);
-	assert_true(f_below(0, 3, 4) == 0);
+		assert_near(f_cdf(x, 1, 1), 2 / 3.14159265358979323846 * atan(sqrt(x)), 1e-12);
+	assert_true(f_cdf(0, 3, 4) == 0);
 	/* Many degrees: F is near 1, with quantiles of a normal distribution. */
 	double narrow = sqrt(2 / 1e6 * (1 + 1.0 / 15));
 	assert_near((f_quantile(0.975, 1e6, 15e6) - 1) / narrow, 1.96, 3e-3);
 	assert_near((1 - f_quantile(0.025, 1e6, 15e6)) / narrow, 1.96, 3e-3);
 }
 
-static void quantiles_invert(void **state)
+static void quantile_inverts_the_distribution(void **state)
 {
 	(void)state;
 	for (double a = 1; a < 1e6; a *= 5.3)
 		for (double p = 0.001; p < 1; p += 0.0713)
-			assert_near(f_below(f_quantile(p, a, 15 * a), a, 15 * a), p, 1e-4);
+			assert_near(f_cdf(f_quantile(p, a, 15 * a), a, 15 * a), p, 1e-4);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(quantiles_are_those_of_the_tables),
-		cmocka_unit_test(closed_forms_hold),
-		cmocka_unit_test(quantiles_invert),
+		cmocka_unit_test(quantiles_match_printed_tables),
+		cmocka_unit_test(quantiles_match_closed_forms),
+		cmocka_unit_test(quantile_inverts_the_distribution),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,14 +18,14 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-static double pareto(uint64_t seed, uint64_t i, double index)
+static double pareto_deviate(uint64_t seed, uint64_t i, double index)
 {
 	double u[4];
 	rng_uniform4(seed, RNG_TEST, i, 0, 0, u);
 	return pow(1 - u[0], -1 / index);
 }
 
-static void the_index_of_a_pareto_law_is_found(void **state)
+static void index_of_a_pareto_law_is_estimated(void **state)
 {
 	(void)state;
 	enum { TIMES = 64, SAMPLES = 2048, K = 128 };
@@ -36,8 +36,8 @@ static void the_index_of_a_pareto_law_is_found(void **state)
 			struct tail t;
 			assert_int_equal(tail_init(&t, K + 1), 0);
 			for (uint64_t i = 0; i < SAMPLES; i++)
-				tail_add(&t, pareto(7000 + k, i, indices[n]));
-			tail_settle(&t);
+				tail_add(&t, pareto_deviate(7000 + k, i, indices[n]));
+			tail_select_largest(&t);
 			mean += tail_index(&t, K) / TIMES;
 			tail_fini(&t);
 		}
@@ -59,7 +59,7 @@ static double evi_variance(double g)
 /* The extreme value index of Pareto laws is the inverse of their power, of the exponential law 0, and of the uniform
  * law -1. The bound is 4.5 standard errors plus 0.02 for bias, which is of the order of 1 / k and k / n, 0.008 each:
  * level 7e-6 or less each. 0.5 is told from 0.4 with a power of more than 95 %. */
-static void the_extreme_value_index_is_found(void **state)
+static void extreme_value_index_is_estimated(void **state)
 {
 	(void)state;
 	enum { TIMES = 64, SAMPLES = 16384, K = 128 };
@@ -70,11 +70,11 @@ static void the_extreme_value_index_is_found(void **state)
 			struct tail t;
 			assert_int_equal(tail_init(&t, K + 1), 0);
 			for (uint64_t i = 0; i < SAMPLES; i++) {
-				double x = pareto(9000 + k, i, 1); /* 1 / x is uniformly distributed */
+				double x = pareto_deviate(9000 + k, i, 1); /* 1 / x is uniformly distributed */
 				tail_add(&t, g > 0 ? pow(x, g) : g < 0 ? 1 - 1 / x : log(x));
 			}
-			tail_settle(&t);
-			mean += tail_evi(&t, K) / TIMES;
+			tail_select_largest(&t);
+			mean += tail_extreme_value_index(&t, K) / TIMES;
 			tail_fini(&t);
 		}
 		double error = sqrt(evi_variance(g) / (K * TIMES));
@@ -83,7 +83,7 @@ static void the_extreme_value_index_is_found(void **state)
 	}
 }
 
-static void the_largest_are_kept(void **state)
+static void largest_values_are_kept(void **state)
 {
 	(void)state;
 	struct tail t;
@@ -92,10 +92,10 @@ static void the_largest_are_kept(void **state)
 		tail_clear(&t);
 		for (int i = 0; i < 1000; i++)
 			tail_add(&t, order == 0 ? i : order == 1 ? 999 - i : i * 373 % 1000);
-		tail_settle(&t);
-		assert_int_equal(t.held, 5);
+		tail_select_largest(&t);
+		assert_int_equal(t.count, 5);
 		for (int i = 0; i < 5; i++)
-			assert_true(t.y[i] == 999 - i);
+			assert_true(t.values[i] == 999 - i);
 	}
 	tail_fini(&t);
 }
@@ -105,23 +105,23 @@ static void too_few_or_equal_numbers_have_a_defined_index(void **state)
 	(void)state;
 	struct tail t;
 	assert_int_equal(tail_init(&t, 4), 0);
-	tail_settle(&t);
+	tail_select_largest(&t);
 	assert_true(tail_index(&t, 0) == 1 && tail_index(&t, 3) == 1);
-	assert_true(tail_evi(&t, 0) == 1 && tail_evi(&t, 3) == 1);
+	assert_true(tail_extreme_value_index(&t, 0) == 1 && tail_extreme_value_index(&t, 3) == 1);
 	for (int i = 0; i < 3; i++)
 		tail_add(&t, 2);
-	tail_settle(&t);
+	tail_select_largest(&t);
 	assert_true(tail_index(&t, 3) == 1);
 	assert_true(tail_index(&t, 2) == INFINITY);
-	assert_true(tail_evi(&t, 2) == -INFINITY);
+	assert_true(tail_extreme_value_index(&t, 2) == -INFINITY);
 	tail_add(&t, 1);
-	tail_settle(&t);
+	tail_select_largest(&t);
 	assert_true(fabs(tail_index(&t, 3) * log(2) - 1) < 1e-15);
 	tail_fini(&t);
 }
 
 /* P(X < x) for X ~ Gamma(k), by Simpson's rule over the density. */
-static double gamma_below(double k, double x)
+static double gamma_cdf(double k, double x)
 {
 	enum { STEPS = 20000 };
 	double sum = 0, h = x / STEPS;
@@ -132,43 +132,44 @@ static double gamma_below(double k, double x)
 	return sum * h / 3;
 }
 
-static void an_index_is_ruled_out_by_one_in_twenty(void **state)
+static void true_index_is_ruled_out_in_one_of_twenty(void **state)
 {
 	(void)state;
 	enum { TIMES = 4000 };
-	static const size_t most[] = {8, 32, 400};
-	for (size_t n = 0; n < sizeof most / sizeof *most; n++) {
-		size_t k = most[n];
-		double least = tail_index_least(2, k), above = 0;
+	static const size_t value_counts[] = {8, 32, 400};
+	for (size_t n = 0; n < sizeof value_counts / sizeof *value_counts; n++) {
+		size_t k = value_counts[n];
+		double threshold = tail_index_critical(2, k), above = 0;
 		for (uint64_t time = 0; time < TIMES; time++) {
 			struct tail t;
 			assert_int_equal(tail_init(&t, k + 1), 0);
 			for (uint64_t i = 0; i <= k; i++) /* the estimate of k + 1 samples has the law of a larger
 							   * sample */
-				tail_add(&t, pareto(9000 + time, i, 2));
-			tail_settle(&t);
-			above += tail_index(&t, k) > least;
+				tail_add(&t, pareto_deviate(9000 + time, i, 2));
+			tail_select_largest(&t);
+			above += tail_index(&t, k) > threshold;
 			tail_fini(&t);
 		}
-		double share = above / TIMES, expected = gamma_below((double)k, 2 * (double)k / least);
-		print_message("k = %zu: %.4f of the estimates are above %.3f, expected %.4f\n", k, share, least,
+		double share = above / TIMES, expected = gamma_cdf((double)k, 2 * (double)k / threshold);
+		print_message("k = %zu: %.4f of the estimates are above %.3f, expected %.4f\n", k, share, threshold,
 			      expected);
 		assert_true(fabs(share - expected) < 4.5 * sqrt(expected * (1 - expected) / TIMES));
 		assert_true(k < 400 || fabs(expected - 0.05) < 0.015);
 	}
 	/* 32 of the errors of 16 x 16 pixels by 16 groups, 38,400 of 640 x 480 */
-	assert_true(fabs(tail_index_least(2, 32) - 2.58) < 0.005 && fabs(tail_index_least(2, 38400) - 2.017) < 0.0005);
-	assert_true(tail_index_least(2, 0) == INFINITY);
+	assert_true(fabs(tail_index_critical(2, 32) - 2.58) < 0.005 &&
+		    fabs(tail_index_critical(2, 38400) - 2.017) < 0.0005);
+	assert_true(tail_index_critical(2, 0) == INFINITY);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_index_of_a_pareto_law_is_found),
-		cmocka_unit_test(the_extreme_value_index_is_found),
-		cmocka_unit_test(the_largest_are_kept),
+		cmocka_unit_test(index_of_a_pareto_law_is_estimated),
+		cmocka_unit_test(extreme_value_index_is_estimated),
+		cmocka_unit_test(largest_values_are_kept),
 		cmocka_unit_test(too_few_or_equal_numbers_have_a_defined_index),
-		cmocka_unit_test(an_index_is_ruled_out_by_one_in_twenty),
+		cmocka_unit_test(true_index_is_ruled_out_in_one_of_twenty),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

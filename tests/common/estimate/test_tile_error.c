@@ -21,14 +21,14 @@
 enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT };
 
 /* A wall known to 2 %, plus as much light again that comes with one sample of a group in `hits_per_group`. */
-struct rare {
+struct rare_light_model {
 	struct dice d;
 	double hits_per_group;
 };
 
 static double rare_light(void *user, uint32_t group, uint32_t pixel)
 {
-	struct rare *r = user;
+	struct rare_light_model *r = user;
 	(void)group;
 	(void)pixel;
 	return 1 + 0.02 * dice_normal(&r->d) + dice_poisson(&r->d, r->hits_per_group) / r->hits_per_group;
@@ -36,32 +36,32 @@ static double rare_light(void *user, uint32_t group, uint32_t pixel)
 
 /* Over 50 pictures, from column `first` on: *beyond is the share of values more than three errors from the truth,
  * *ratio the mean squared error over the mean squared deviation. */
-static void compare_with_truth(group_image_value *of, struct rare *r, double truth, uint32_t first, double *beyond,
-			       double *ratio)
+static void compare_with_truth(group_image_value *value, struct rare_light_model *r, double truth, uint32_t first,
+			       double *outlier_share, double *ratio)
 {
 	struct plan p = group_image_plan(PLAN_SAMPLES, WIDTH, HEIGHT);
 	double stated = 0, realised = 0, values = 3. * (WIDTH - first) * HEIGHT * 50;
-	*beyond = 0;
+	*outlier_share = 0;
 	for (int picture = 0; picture < 50; picture++) {
 		struct canvas_image img;
-		group_image(&p, of, r, &img);
+		group_image_make(&p, value, r, &img);
 		for (uint32_t i = 0; i < 3 * PIXELS; i++) {
-			double off = (double)img.rgb[i] - truth, error = (double)img.error[i];
+			double deviation = (double)img.rgb[i] - truth, error = (double)img.error[i];
 			if (i / 3 % WIDTH < first)
 				continue;
-			*beyond += (fabs(off) > 3 * error) / values;
+			*outlier_share += (fabs(deviation) > 3 * error) / values;
 			stated += error * error;
-			realised += off * off;
+			realised += deviation * deviation;
 		}
 		canvas_image_fini(&img);
 	}
 	*ratio = stated / realised;
 }
 
-static void rare_light_of(double hits_per_group, double *beyond, double *ratio)
+static void compare_rare_light(double hits_per_group, double *outlier_share, double *ratio)
 {
-	struct rare r = {.d = dice_of("rare light"), .hits_per_group = hits_per_group};
-	compare_with_truth(rare_light, &r, 2, 0, beyond, ratio);
+	struct rare_light_model r = {.d = dice_for_test("rare light"), .hits_per_group = hits_per_group};
+	compare_with_truth(rare_light, &r, 2, 0, outlier_share, ratio);
 }
 
 /*
@@ -71,16 +71,18 @@ static void rare_light_of(double hits_per_group, double *beyond, double *ratio)
  * independent ones, because colours are correlated) determine the ratio of the squares to 1.8 %, so 6 % is three
  * standard errors.
  */
-static void rare_light_is_in_the_errors_of_pixels(void **state)
+static void pixel_errors_include_rare_light(void **state)
 {
-	double beyond, ratio;
+	double outlier_share, ratio;
 	(void)state;
-	rare_light_of(1. / 64, &beyond, &ratio);
-	print_message("rare light: %.2f %% beyond three errors, squares %.2f of the truth\n", 100 * beyond, ratio);
-	assert_true(beyond < 0.02 && ratio > 0.9 && ratio < 1.2);
-	rare_light_of(40, &beyond, &ratio);
-	print_message("frequent light: %.2f %% beyond three errors, squares %.3f of the truth\n", 100 * beyond, ratio);
-	assert_true(beyond < 0.02 && fabs(ratio - 1) < 0.06);
+	compare_rare_light(1. / 64, &outlier_share, &ratio);
+	print_message("rare light: %.2f %% beyond three errors, squares %.2f of the truth\n", 100 * outlier_share,
+		      ratio);
+	assert_true(outlier_share < 0.02 && ratio > 0.9 && ratio < 1.2);
+	compare_rare_light(40, &outlier_share, &ratio);
+	print_message("frequent light: %.2f %% beyond three errors, squares %.3f of the truth\n", 100 * outlier_share,
+		      ratio);
+	assert_true(outlier_share < 0.02 && fabs(ratio - 1) < 0.06);
 }
 
 /*
@@ -89,26 +91,26 @@ static void rare_light_is_in_the_errors_of_pixels(void **state)
  * squares to 3 %, including the spread of the errors (15 degrees of freedom); if the highlight's rare light counted for
  * the wall, the ratio would be above 100.
  */
-static double beside_a_highlight(void *user, uint32_t group, uint32_t pixel)
+static double value_beside_highlight(void *user, uint32_t group, uint32_t pixel)
 {
-	struct rare *r = user;
+	struct rare_light_model *r = user;
 	return pixel % WIDTH < 2 ? 100 * rare_light(user, group, pixel) : 1 + 0.02 * dice_normal(&r->d);
 }
 
-static void a_highlight_says_nothing_about_the_wall(void **state)
+static void highlight_does_not_raise_errors_beside_it(void **state)
 {
-	struct rare r = {.d = dice_of("highlight"), .hits_per_group = 1. / 64};
-	double beyond, ratio;
+	struct rare_light_model r = {.d = dice_for_test("highlight"), .hits_per_group = 1. / 64};
+	double outlier_share, ratio;
 	(void)state;
 	/* from column 3 on: neighbours of unreliable pixels share some of their variance */
-	compare_with_truth(beside_a_highlight, &r, 1, 3, &beyond, &ratio);
+	compare_with_truth(value_beside_highlight, &r, 1, 3, &outlier_share, &ratio);
 	print_message("beside a highlight: squares %.3f of the truth\n", ratio);
 	assert_true(fabs(ratio - 1) < 0.15);
 }
 
 /* ---- tiles that no chain visited ---- */
 
-static double half_visited(void *user, uint32_t group, uint32_t pixel)
+static double half_visited_value(void *user, uint32_t group, uint32_t pixel)
 {
 	(void)user;
 	return pixel % WIDTH < 9 ? 1 + 0.1 * (group % 4) : 0;
@@ -119,12 +121,12 @@ static void unvisited_pixels_are_counted(void **state)
 	(void)state;
 	struct plan p = group_image_plan(PLAN_CHAINS, WIDTH, HEIGHT);
 	struct canvas_image img;
-	char text[STATED_ERROR_TEXT];
-	group_image(&p, half_visited, NULL, &img);
-	assert_int_equal(img.unvisited, 7 * HEIGHT);
+	char text[STATED_ERROR_TEXT_MAX];
+	group_image_make(&p, half_visited_value, NULL, &img);
+	assert_int_equal(img.unvisited_count, 7 * HEIGHT);
 	for (uint32_t i = 0; i < 3 * PIXELS; i++)
 		assert_true(img.error[i] > 0);
-	stated_error(&img, text, sizeof text);
+	stated_error_print(&img, text, sizeof text);
 	assert_non_null(strstr(text, "no chain reached 56 of 128 pixels"));
 	static struct header h;
 	header_fill(&h, &img, &p, &(struct header_extra){.scene = "test.xml", .date = ""});
@@ -141,8 +143,8 @@ static void unvisited_pixels_are_counted(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rare_light_is_in_the_errors_of_pixels),
-		cmocka_unit_test(a_highlight_says_nothing_about_the_wall),
+		cmocka_unit_test(pixel_errors_include_rare_light),
+		cmocka_unit_test(highlight_does_not_raise_errors_beside_it),
 		cmocka_unit_test(unvisited_pixels_are_counted),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -35,7 +35,7 @@ static struct tile make_tile(uint32_t x, uint32_t y, uint32_t w, uint32_t h)
 	return t;
 }
 
-static void tiles_come_back_bit_for_bit(void **unused)
+static void tiles_are_read_back_bit_for_bit(void **unused)
 {
 	(void)unused;
 	const uint32_t shapes[][4] = {
@@ -67,7 +67,7 @@ static void a_tile_is_an_image_that_any_reader_opens(void **unused)
 	assert_int_equal(exr_tile_write(&t, FULL_W, FULL_H, &bytes, &size, NULL), 0);
 	assert_int_equal(exr_read(bytes, size, &img, NULL), 0);
 	assert_int_equal(img.channel_count, 3);
-	assert_string_equal(img.names[1], "Y");
+	assert_string_equal(img.channel_names[1], "Y");
 	assert_true(img.x == 64 && img.y == 128 && img.full_width == FULL_W && img.full_height == FULL_H);
 	for (size_t i = 0; i < 64 * 22; i++)
 		for (size_t c = 0; c < 3; c++)
@@ -145,7 +145,7 @@ static struct exr_image make_image(uint32_t w, uint32_t h)
 				.attributes = attributes};
 	const char *const names[] = {"R", "G", "B", "error.R", "error.G", "error.B"};
 	for (size_t c = 0; c < 6; c++) {
-		snprintf(img.names[c], sizeof img.names[c], "%s", names[c]);
+		snprintf(img.channel_names[c], sizeof img.channel_names[c], "%s", names[c]);
 		img.planes[c] = mem_alloc((size_t)w * h, sizeof(float));
 		for (size_t i = 0; i < (size_t)w * h; i++)
 			img.planes[c][i] = value_at(i * 6 + c);
@@ -159,7 +159,7 @@ static void free_planes(struct exr_image *img)
 		mem_free(img->planes[c]);
 }
 
-static void images_and_their_headers_come_back(void **unused)
+static void images_and_their_headers_are_read_back(void **unused)
 {
 	(void)unused;
 	struct exr_image img = make_image(101, 37), back;
@@ -172,9 +172,9 @@ static void images_and_their_headers_come_back(void **unused)
 	assert_int_equal(back.channel_count, 6);
 	for (size_t c = 0; c < 6; c++)
 		for (size_t k = 0; k < 6; k++)
-			if (strcmp(img.names[c], back.names[k]) == 0)
+			if (strcmp(img.channel_names[c], back.channel_names[k]) == 0)
 				assert_memory_equal(img.planes[c], back.planes[k], 101 * 37 * sizeof(float));
-	assert_string_equal(back.names[0], "B");
+	assert_string_equal(back.channel_names[0], "B");
 	assert_int_equal(back.attribute_count, 3);
 	assert_string_equal(back.attributes[0].name, "hslt:b");
 	assert_true(back.attributes[0].number == 0.1);
@@ -186,7 +186,7 @@ static void images_and_their_headers_come_back(void **unused)
 	mem_free(bytes);
 }
 
-static bool comes_back(const struct exr_image *img)
+static bool is_read_back(const struct exr_image *img)
 {
 	unsigned char *bytes;
 	size_t size;
@@ -201,16 +201,16 @@ static bool comes_back(const struct exr_image *img)
 
 /* Readers recognise an uncompressed chunk by its size: so a chunk that deflate leaves at the same size must be written
  * uncompressed. */
-static void chunks_that_deflate_to_their_own_size_come_back(void **unused)
+static void chunks_that_deflate_to_their_own_size_are_read_back(void **unused)
 {
 	(void)unused;
 	float plane[64 * 3];
 	struct exr_image img = {
-		.width = 4, .height = 2, .channel_count = 1, .full_width = 4, .full_height = 2, .names = {"R"}};
+		.width = 4, .height = 2, .channel_count = 1, .full_width = 4, .full_height = 2, .channel_names = {"R"}};
 	img.planes[0] = plane;
 	for (size_t i = 0; i < 8; i++)
 		plane[i] = (float)(i + 1);
-	assert_true(comes_back(&img));
+	assert_true(is_read_back(&img));
 	/* Two dozen of these sizes and contents deflate to exactly their own size. */
 	for (uint32_t w = 1; w <= 64; w++)
 		for (size_t k = 1; k < 40; k++) {
@@ -218,7 +218,7 @@ static void chunks_that_deflate_to_their_own_size_come_back(void **unused)
 			img.height = img.full_height = 3;
 			for (size_t i = 0; i < w * 3u; i++)
 				plane[i] = i % k ? (float)(i % k) : value_at(i + k);
-			if (!comes_back(&img))
+			if (!is_read_back(&img))
 				fail_msg("%u pixels wide, period %zu", w, k);
 		}
 }
@@ -278,12 +278,12 @@ static void foreign_images_are_read(void **unused)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(tiles_come_back_bit_for_bit),
+		cmocka_unit_test(tiles_are_read_back_bit_for_bit),
 		cmocka_unit_test(a_tile_is_an_image_that_any_reader_opens),
 		cmocka_unit_test(tiles_of_another_film_are_refused),
 		cmocka_unit_test(broken_tiles_never_crash),
-		cmocka_unit_test(images_and_their_headers_come_back),
-		cmocka_unit_test(chunks_that_deflate_to_their_own_size_come_back),
+		cmocka_unit_test(images_and_their_headers_are_read_back),
+		cmocka_unit_test(chunks_that_deflate_to_their_own_size_are_read_back),
 		cmocka_unit_test(failing_allocations_leak_nothing),
 		cmocka_unit_test(foreign_images_are_read),
 	};

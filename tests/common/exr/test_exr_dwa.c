@@ -31,7 +31,7 @@ static double value_at(int channel, int x, int y)
 }
 
 /* Makes a file of W x H pixels, in tiles of 32 x 16 if `tiled`. */
-static unsigned char *dwa_file(int compression, int channels, bool tiled, size_t *size)
+static unsigned char *make_dwa_file(int compression, int channels, bool tiled, size_t *size)
 {
 	static ImfRgba pixels[W * H];
 	char path[32];
@@ -70,7 +70,7 @@ static unsigned char *dwa_file(int compression, int channels, bool tiled, size_t
 	return bytes;
 }
 
-static void test_pixels(void **state)
+static void test_pixels_survive_dwa_compression(void **state)
 {
 	(void)state;
 	static const struct {
@@ -85,16 +85,16 @@ static void test_pixels(void **state)
 		struct exr_image img;
 		struct error e = {""};
 		size_t size;
-		unsigned char *bytes = dwa_file(cases[i].compression, cases[i].channels, cases[i].tiled, &size);
+		unsigned char *bytes = make_dwa_file(cases[i].compression, cases[i].channels, cases[i].tiled, &size);
 		bool grey = cases[i].channels == IMF_WRITE_Y;
-		assert_int_equal(exr_read_within(bytes, size, INT64_MAX, &img, &e), -ENOTSUP);
+		assert_int_equal(exr_read_limited(bytes, size, INT64_MAX, &img, &e), -ENOTSUP);
 		assert_non_null(strstr(e.text, "DWA"));
 		if (exr_read_dwa(bytes, size, INT64_MAX, &img, &e))
 			fail_msg("%zu: %s", i, e.text);
 		assert_int_equal(img.width, W);
 		assert_int_equal(img.height, H);
 		assert_int_equal(img.channel_count, grey ? 1 : 3);
-		assert_string_equal(img.names[0], grey ? "Y" : "R");
+		assert_string_equal(img.channel_names[0], grey ? "Y" : "R");
 		double worst = 0;
 		for (uint32_t c = 0; c < img.channel_count; c++)
 			for (int k = 0; k < W * H; k++)
@@ -108,13 +108,14 @@ static void test_pixels(void **state)
 }
 
 /* Larger than allowed; not DWA; truncated; with changed bits. */
-static void test_damage(void **state)
+static void test_damaged_or_oversized_files_are_refused(void **state)
 {
 	(void)state;
 	struct exr_image img;
 	struct error e = {""};
 	size_t size, refused = 0, count = 0;
-	unsigned char *bytes = dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_RGB, false, &size), *copy = mem_alloc(size, 1);
+	unsigned char *bytes = make_dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_RGB, false, &size),
+		      *copy = mem_alloc(size, 1);
 	assert_int_equal(exr_read_dwa(bytes, size, (int64_t)W * H * 3 * 4 - 1, &img, &e), -EFBIG);
 	assert_int_equal(exr_read_dwa(bytes, 3, INT64_MAX, &img, &e), -EBADMSG);
 	for (size_t n = 0; n < size; n += 61, count++) {
@@ -134,15 +135,15 @@ static void test_damage(void **state)
 	/* The image is so wide that the library's buffer for 256 rows would take 300 MB. */
 	static const char window[] = "dataWindow\0box2i\0\x10\0\0";
 	const int32_t right = LEFT + 140000 - 1;
-	size_t at = 0;
-	while (memcmp(bytes + at, window, sizeof window) != 0)
-		at++;
-	memcpy(bytes + at + sizeof window + 8, &right, sizeof right);
+	size_t offset = 0;
+	while (memcmp(bytes + offset, window, sizeof window) != 0)
+		offset++;
+	memcpy(bytes + offset + sizeof window + 8, &right, sizeof right);
 	assert_int_equal(exr_read_dwa(bytes, size, INT64_MAX, &img, &e), -EFBIG);
 	assert_non_null(strstr(e.text, "chunks of 140000 x 256 pixels"));
 	mem_free(copy);
 	mem_free(bytes);
-	bytes = dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_A, false, &size);
+	bytes = make_dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_A, false, &size);
 	assert_int_equal(exr_read_dwa(bytes, size, INT64_MAX, &img, &e), -ENOTSUP);
 	assert_non_null(strstr(e.text, "without channels R, G and B, or Y"));
 	mem_free(bytes);
@@ -150,6 +151,7 @@ static void test_damage(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_pixels), cmocka_unit_test(test_damage)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_pixels_survive_dwa_compression),
+					   cmocka_unit_test(test_damaged_or_oversized_files_are_refused)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

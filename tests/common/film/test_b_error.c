@@ -45,25 +45,25 @@ static const struct plan plan = {.integrator = "hslt",
 				 .seconds = 1,
 				 .max_depth = 8};
 
-typedef double law(struct dice *d, double index);
+typedef double sample_function(struct dice *d, double index);
 
-static double pareto(struct dice *d, double index)
+static double pareto_deviate(struct dice *d, double index)
 {
-	return pow(1 - dice_throw(d), -1 / index);
+	return pow(1 - dice_uniform(d), -1 / index);
 }
 
-static double exponential(struct dice *d, double unused)
+static double exponential_deviate(struct dice *d, double unused)
 {
 	(void)unused;
-	return -log(1 - dice_throw(d));
+	return -log(1 - dice_uniform(d));
 }
 
-static double seldom(struct dice *d, double share)
+static double rare_hit(struct dice *d, double share)
 {
-	return dice_throw(d) < share ? 1 : 0;
+	return dice_uniform(d) < share ? 1 : 0;
 }
 
-static struct canvas *film_of(struct dice *d, law *of, double index)
+static struct canvas *make_bootstrap_film(struct dice *d, sample_function *sample, double index)
 {
 	struct bootstrap *s;
 	struct canvas *c;
@@ -74,15 +74,15 @@ static struct canvas *film_of(struct dice *d, law *of, double index)
 	for (uint32_t g = 0; g < GROUPS; g++) {
 		struct batch b = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .weights = weights, .weight_count = SAMPLES};
 		for (int i = 0; i < SAMPLES; i++) {
-			weights[i] = (float)of(d, index);
+			weights[i] = (float)sample(d, index);
 			b.independent_sum += (double)weights[i];
 		}
 		b.counters[COUNT_SAMPLES] = b.counters[COUNT_INDEPENDENT] = SAMPLES;
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
 	}
-	bootstrap_merge(s, &lit);
+	bootstrap_compute_b(s, &lit);
 	assert_int_equal(canvas_new(&c, &plan, canvas_grid_exponent(&plan, lit.b_pooled, 1), NULL, NULL), 0);
-	bootstrap_to_canvas(s, c);
+	bootstrap_add_to_canvas(s, c);
 	bootstrap_free(s);
 	mem_free(weights);
 	return c;
@@ -91,51 +91,52 @@ static struct canvas *film_of(struct dice *d, law *of, double index)
 static void take_image(const struct canvas *c, struct canvas_image *img)
 {
 	struct error e;
-	if (canvas_image(c, false, img, &e))
+	if (canvas_image_init(c, false, img, &e))
 		fail_msg("%s", e.text);
 }
 
-struct found {
-	int stated, held; /* held: of all bootstraps, whether stated or not */
+struct trial_counts {
+	int stated_count, held_count; /* held_count: of all bootstraps, whether stated or not */
 };
 
-static struct found try_law(const char *name, law *of, double index, double mean)
+static struct trial_counts try_law(const char *name, sample_function *sample, double index, double mean)
 {
-	struct dice d = dice_of(name);
-	struct found f = {0, 0};
+	struct dice d = dice_for_test(name);
+	struct trial_counts f = {0, 0};
 	for (int k = 0; k < TIMES; k++) {
 		struct canvas_image img;
-		char why[STATED_ERROR_TEXT];
-		struct canvas *c = film_of(&d, of, index);
+		char why[STATED_ERROR_TEXT_MAX];
+		struct canvas *c = make_bootstrap_film(&d, sample, index);
 		take_image(c, &img);
-		stated_b_doubt(&img, why, sizeof why);
-		f.stated += *why == 0;
-		f.held += fabs(img.b - mean) <= 2.131 * img.b_error;
+		stated_error_print_b_doubt(&img, why, sizeof why);
+		f.stated_count += *why == 0;
+		f.held_count += fabs(img.b - mean) <= 2.131 * img.b_error;
 		canvas_image_fini(&img);
 		canvas_free(c);
 	}
-	print_message("%s: stated in %d of %d, b within 2.131 errors in %d\n", name, f.stated, TIMES, f.held);
+	print_message("%s: stated in %d of %d, b within 2.131 errors in %d\n", name, f.stated_count, TIMES,
+		      f.held_count);
 	return f;
 }
 
-static void a_finite_variance_has_an_error_that_holds(void **state)
+static void finite_variance_has_an_error_that_holds(void **state)
 {
 	(void)state;
-	struct found f[] = {try_law("b error, pareto 3", pareto, 3, 1.5),
-			    try_law("b error, exponential", exponential, 0, 1)};
+	struct trial_counts f[] = {try_law("b error, pareto 3", pareto_deviate, 3, 1.5),
+				   try_law("b error, exponential", exponential_deviate, 0, 1)};
 	for (int i = 0; i < 2; i++) {
-		assert_in_range(f[i].stated, 95, TIMES);
-		assert_in_range(f[i].held, 85, TIMES);
+		assert_in_range(f[i].stated_count, 95, TIMES);
+		assert_in_range(f[i].held_count, 85, TIMES);
 	}
 }
 
-static void an_infinite_one_has_none(void **state)
+static void infinite_variance_has_no_stated_error(void **state)
 {
 	(void)state;
-	struct found f[] = {try_law("b error, pareto 1.5", pareto, 1.5, 3),
-			    try_law("b error, pareto 1.1", pareto, 1.1, 11)};
+	struct trial_counts f[] = {try_law("b error, pareto 1.5", pareto_deviate, 1.5, 3),
+				   try_law("b error, pareto 1.1", pareto_deviate, 1.1, 11)};
 	for (int i = 0; i < 2; i++)
-		assert_in_range(f[i].stated, 0, TIMES - 95);
+		assert_in_range(f[i].stated_count, 0, TIMES - 95);
 }
 
 static bool header_has(const struct canvas_image *img, const char *name)
@@ -148,34 +149,37 @@ static bool header_has(const struct canvas_image *img, const char *name)
 	return false;
 }
 
-static void the_header_says_which(void **state)
+static void header_states_the_error_or_the_doubt(void **state)
 {
 	(void)state;
 	static const struct {
-		law *of;
+		sample_function *sample;
 		double index;
-		bool known;
-	} cases[] = {{exponential, 0, true}, {pareto, 1.1, false}, {seldom, 0.5, true}, {seldom, 0.001, false}};
+		bool is_stated;
+	} cases[] = {{exponential_deviate, 0, true},
+		     {pareto_deviate, 1.1, false},
+		     {rare_hit, 0.5, true},
+		     {rare_hit, 0.001, false}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct dice d = dice_of("b error in the header");
+		struct dice d = dice_for_test("b error in the header");
 		struct canvas_image img;
-		char why[STATED_ERROR_TEXT];
-		struct canvas *c = film_of(&d, cases[i].of, cases[i].index);
+		char why[STATED_ERROR_TEXT_MAX];
+		struct canvas *c = make_bootstrap_film(&d, cases[i].sample, cases[i].index);
 		take_image(c, &img);
-		assert_int_equal(header_has(&img, "hslt:bError"), cases[i].known);
-		assert_int_equal(header_has(&img, "hslt:bErrorDoubt"), !cases[i].known);
-		stated_b_doubt(&img, why, sizeof why);
-		assert_int_equal(strstr(why, "variance is infinite") != NULL, !cases[i].known);
+		assert_int_equal(header_has(&img, "hslt:bError"), cases[i].is_stated);
+		assert_int_equal(header_has(&img, "hslt:bErrorDoubt"), !cases[i].is_stated);
+		stated_error_print_b_doubt(&img, why, sizeof why);
+		assert_int_equal(strstr(why, "variance is infinite") != NULL, !cases[i].is_stated);
 		canvas_image_fini(&img);
 		canvas_free(c);
 	}
 }
 
-static void it_outlives_the_coordinator(void **state)
+static void tail_index_of_b_survives_save_and_load(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("b error, saved");
-	struct canvas *c = film_of(&d, pareto, 1.3), *again;
+	struct dice d = dice_for_test("b error, saved");
+	struct canvas *c = make_bootstrap_film(&d, pareto_deviate, 1.3), *loaded;
 	struct canvas_image img[2];
 	struct checked_file out, in;
 	struct error e;
@@ -186,27 +190,27 @@ static void it_outlives_the_coordinator(void **state)
 	assert_int_equal(checked_file_create(&out, path, &e), 0);
 	assert_int_equal(canvas_save(c, &out, &e), 0);
 	assert_int_equal(checked_file_finish(&out, &e), 0);
-	assert_int_equal(canvas_new(&again, &plan, canvas_grid_exponent(&plan, 1, 1), NULL, NULL), 0);
+	assert_int_equal(canvas_new(&loaded, &plan, canvas_grid_exponent(&plan, 1, 1), NULL, NULL), 0);
 	assert_int_equal(checked_file_open(&in, path, &e), 0);
-	assert_int_equal(canvas_load(again, &in, &e), 0);
+	assert_int_equal(canvas_load(loaded, &in, &e), 0);
 	checked_file_close(&in);
 	unlink(path);
 	take_image(c, &img[0]);
-	take_image(again, &img[1]);
-	assert_true(img[0].b_tail > 0.5 && img[0].b_tail == img[1].b_tail);
+	take_image(loaded, &img[1]);
+	assert_true(img[0].b_tail_index > 0.5 && img[0].b_tail_index == img[1].b_tail_index);
 	for (int i = 0; i < 2; i++)
 		canvas_image_fini(&img[i]);
 	canvas_free(c);
-	canvas_free(again);
+	canvas_free(loaded);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_finite_variance_has_an_error_that_holds),
-		cmocka_unit_test(an_infinite_one_has_none),
-		cmocka_unit_test(the_header_says_which),
-		cmocka_unit_test(it_outlives_the_coordinator),
+		cmocka_unit_test(finite_variance_has_an_error_that_holds),
+		cmocka_unit_test(infinite_variance_has_no_stated_error),
+		cmocka_unit_test(header_states_the_error_or_the_doubt),
+		cmocka_unit_test(tail_index_of_b_survives_save_and_load),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,7 +7,7 @@
 
 #include "common/base/mem.h"
 #include "tests/support/canvas_batches.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -26,12 +26,12 @@ enum { WIDTH = 150, HEIGHT = 70, GROUPS = 4, PARTS = 3, ROUNDS = 5, EXPONENT = -
 
 static struct plan make_plan(enum plan_kind kind)
 {
-	return canvas_plan(kind, WIDTH, HEIGHT, GROUPS, PARTS);
+	return canvas_test_plan(kind, WIDTH, HEIGHT, GROUPS, PARTS);
 }
 
 static float random_float(void)
 {
-	return (float)(canvas_uniform() * pow(10, -6 * canvas_uniform()));
+	return (float)(canvas_random_uniform() * pow(10, -6 * canvas_random_uniform()));
 }
 
 /* Every field that a canvas reads, with some of the tiles of the film. */
@@ -40,29 +40,30 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 {
 	struct batch b = {.key = {1, kind, group, part, epoch}};
 	uint32_t across = (WIDTH + TILE_SIZE - 1) / TILE_SIZE, down = (HEIGHT + TILE_SIZE - 1) / TILE_SIZE;
-	canvas_state = 1000003u * (uint64_t)(1 + part + PARTS * (group + GROUPS * (epoch + 100 * (uint64_t)kind)));
+	canvas_random_state =
+		1000003u * (uint64_t)(1 + part + PARTS * (group + GROUPS * (epoch + 100 * (uint64_t)kind)));
 	b.tiles = mem_alloc((size_t)across * down, sizeof *b.tiles);
 	for (uint32_t i = 0; kind == LEASE_RENDER && i < across * down; i++) {
-		if (canvas_next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
+		if (canvas_random_next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
 			continue;
-		b.tiles[b.tile_count++] = canvas_tile(p, i, random_float);
+		b.tiles[b.tile_count++] = canvas_test_tile(p, i, random_float);
 	}
 	b.counters[COUNT_SAMPLES] = 2 * p->epoch;
-	b.counters[COUNT_INDEPENDENT] = p->epoch + canvas_next() % 4;
-	b.counters[COUNT_LONGEST_STUCK] = canvas_next() % 100;
-	b.independent_sum = canvas_uniform() * (double)p->epoch;
-	b.beyond_sum = canvas_uniform();
+	b.counters[COUNT_INDEPENDENT] = p->epoch + canvas_random_next() % 4;
+	b.counters[COUNT_LONGEST_STUCK] = canvas_random_next() % 100;
+	b.independent_sum = canvas_random_uniform() * (double)p->epoch;
+	b.beyond_sum = canvas_random_uniform();
 	for (int k = 0; k < PATH_CLASSES; k++)
-		b.classes[k] = canvas_uniform();
+		b.classes[k] = canvas_random_uniform();
 	b.moment_count = batch_moment_count(p, kind);
 	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	for (uint64_t k = 0; k < b.moment_count; k++)
-		b.moments[k] = (float)canvas_uniform();
+		b.moments[k] = (float)canvas_random_uniform();
 	return b;
 }
 
-static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group,
-		uint32_t part)
+static void add_batch(struct canvas *c, const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group,
+		      uint32_t part)
 {
 	struct batch b = make_batch(p, kind, epoch, group, part);
 	struct error e;
@@ -72,16 +73,16 @@ static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, ui
 }
 
 /* Adds the n-th batch of a run in which the next round begins before the previous one is complete. */
-static void add_nth(struct canvas *c, const struct plan *p, unsigned n)
+static void add_nth_batch(struct canvas *c, const struct plan *p, unsigned n)
 {
 	enum { LEASES = GROUPS * PARTS };
 	if (n < LEASES) {
-		add(c, p, LEASE_BOOTSTRAP, 0, n / PARTS, n % PARTS);
+		add_batch(c, p, LEASE_BOOTSTRAP, 0, n / PARTS, n % PARTS);
 		return;
 	}
 	n -= LEASES;
 	unsigned pair = n / (2 * LEASES), lease = n % (2 * LEASES) / 2;
-	add(c, p, LEASE_RENDER, 2 * pair + n % 2, lease / PARTS, lease % PARTS);
+	add_batch(c, p, LEASE_RENDER, 2 * pair + n % 2, lease / PARTS, lease % PARTS);
 }
 
 static struct canvas *make_canvas(const struct plan *p, const char *films)
@@ -91,18 +92,18 @@ static struct canvas *make_canvas(const struct plan *p, const char *films)
 	return c;
 }
 
-static void path_of(char path[128])
+static void canvas_path(char path[128])
 {
-	snprintf(path, 128, "%s/canvas", folder);
+	snprintf(path, 128, "%s/canvas", temporary_folder);
 }
 
 /* Saves the canvas, frees it, and returns the loaded one. */
-static struct canvas *through_file(struct canvas *c, const struct plan *p, const char *films)
+static struct canvas *save_and_load(struct canvas *c, const struct plan *p, const char *films)
 {
 	char path[128];
 	struct checked_file s;
 	struct error e;
-	path_of(path);
+	canvas_path(path);
 	assert_int_equal(checked_file_create(&s, path, &e), 0);
 	assert_int_equal(canvas_save(c, &s, &e), 0);
 	assert_int_equal(checked_file_finish(&s, &e), 0);
@@ -111,19 +112,19 @@ static struct canvas *through_file(struct canvas *c, const struct plan *p, const
 	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	if (canvas_load(c, &s, &e))
 		fail_msg("%s", e.text);
-	assert_int_equal(s.left, 0);
+	assert_int_equal(s.remaining, 0);
 	checked_file_close(&s);
 	return c;
 }
 
-static void assert_same(const struct canvas *a, const struct canvas *b, const struct plan *p)
+static void assert_same_canvas(const struct canvas *a, const struct canvas *b, const struct plan *p)
 {
 	for (int open = 0; open < 2; open++) {
 		struct canvas_image x, y;
-		assert_int_equal(canvas_rounds(a), canvas_rounds(b));
-		assert_int_equal(canvas_merged(a), canvas_merged(b));
-		assert_int_equal(canvas_image(a, open, &x, NULL), 0);
-		assert_int_equal(canvas_image(b, open, &y, NULL), 0);
+		assert_int_equal(canvas_complete_rounds(a), canvas_complete_rounds(b));
+		assert_int_equal(canvas_merged_leases(a), canvas_merged_leases(b));
+		assert_int_equal(canvas_image_init(a, open, &x, NULL), 0);
+		assert_int_equal(canvas_image_init(b, open, &y, NULL), 0);
 		assert_memory_equal(x.rgb, y.rgb, WIDTH * HEIGHT * 3 * sizeof(float));
 		assert_int_equal(x.error != NULL, y.error != NULL);
 		if (x.error)
@@ -144,13 +145,13 @@ static void assert_same(const struct canvas *a, const struct canvas *b, const st
 	}
 	for (uint32_t i = 0; i < GROUPS * PARTS * 3; i++) {
 		struct lease_key k = {1, i % 3 ? LEASE_RENDER : LEASE_BOOTSTRAP, i / 3 / PARTS, i / 3 % PARTS, 0};
-		k.epoch = i % 3 ? canvas_rounds(a) + i % 3 - 1 : 0;
-		assert_int_equal(canvas_has(a, &k), canvas_has(b, &k));
+		k.epoch = i % 3 ? canvas_complete_rounds(a) + i % 3 - 1 : 0;
+		assert_int_equal(canvas_has_lease(a, &k), canvas_has_lease(b, &k));
 	}
 	(void)p;
 }
 
-static void goes_on_with_the_same_bits(void **unused)
+static void loaded_canvas_continues_with_the_same_bits(void **unused)
 {
 	(void)unused;
 	for (int kind = 0; kind < 2; kind++) {
@@ -158,40 +159,40 @@ static void goes_on_with_the_same_bits(void **unused)
 		struct plan p = make_plan(kind ? PLAN_CHAINS : PLAN_SAMPLES);
 		for (unsigned stop = 0; stop <= BATCHES; stop += 7) {
 			struct canvas *plain = make_canvas(&p, NULL),
-				      *broken = make_canvas(&p, stop % 2 ? folder : NULL);
+				      *reloaded = make_canvas(&p, stop % 2 ? temporary_folder : NULL);
 			for (unsigned n = 0; n < BATCHES; n++) {
 				if (n == stop)
-					broken = through_file(broken, &p, stop % 2 ? NULL : folder);
-				add_nth(plain, &p, n);
-				add_nth(broken, &p, n);
+					reloaded = save_and_load(reloaded, &p, stop % 2 ? NULL : temporary_folder);
+				add_nth_batch(plain, &p, n);
+				add_nth_batch(reloaded, &p, n);
 			}
-			assert_int_equal(canvas_rounds(plain), 4);
-			assert_same(plain, broken, &p);
+			assert_int_equal(canvas_complete_rounds(plain), 4);
+			assert_same_canvas(plain, reloaded, &p);
 			canvas_free(plain);
-			canvas_free(broken);
+			canvas_free(reloaded);
 		}
 	}
 }
 
-static void what_is_loaded_is_what_was_saved(void **unused)
+static void loaded_canvas_equals_the_saved_one(void **unused)
 {
 	(void)unused;
 	struct plan p = make_plan(PLAN_CHAINS);
-	struct canvas *plain = make_canvas(&p, NULL), *again = make_canvas(&p, NULL);
+	struct canvas *plain = make_canvas(&p, NULL), *reloaded = make_canvas(&p, NULL);
 	for (unsigned n = 0; n < 50; n++) {
-		add_nth(plain, &p, n);
-		add_nth(again, &p, n);
+		add_nth_batch(plain, &p, n);
+		add_nth_batch(reloaded, &p, n);
 	}
-	again = through_file(again, &p, NULL);
-	assert_same(plain, again, &p);
-	again = through_file(again, &p, NULL);
-	assert_same(plain, again, &p);
+	reloaded = save_and_load(reloaded, &p, NULL);
+	assert_same_canvas(plain, reloaded, &p);
+	reloaded = save_and_load(reloaded, &p, NULL);
+	assert_same_canvas(plain, reloaded, &p);
 	canvas_free(plain);
-	canvas_free(again);
+	canvas_free(reloaded);
 }
 
 /* A fabricated result: another batch's content under this key. */
-static struct batch make_wrong(const struct plan *p, const struct lease_key *k, uint64_t salt)
+static struct batch make_wrong_batch(const struct plan *p, const struct lease_key *k, uint64_t salt)
 {
 	struct batch b = make_batch(p, LEASE_RENDER, 1000 + salt, k->group, k->part);
 	b.key.epoch = k->epoch;
@@ -199,78 +200,81 @@ static struct batch make_wrong(const struct plan *p, const struct lease_key *k, 
 	return b;
 }
 
-static void add_wrong(struct canvas *c, const struct plan *p, const struct lease_key *k, uint64_t salt)
+static void add_wrong_batch(struct canvas *c, const struct plan *p, const struct lease_key *k, uint64_t salt)
 {
-	struct batch b = make_wrong(p, k, salt);
+	struct batch b = make_wrong_batch(p, k, salt);
 	struct error e;
 	if (canvas_add(c, &b, &e))
 		fail_msg("%s", e.text);
 	batch_fini(&b);
 }
 
-static bool all_right(const struct canvas *c, const uint64_t *done, const uint64_t *wrong)
+static bool all_leases_are_right(const struct canvas *c, const uint64_t *done, const uint64_t *wrong)
 {
 	for (unsigned i = 0; i < GROUPS * PARTS; i++)
 		if (done[i] < ROUNDS || wrong[i])
 			return false;
-	return canvas_rounds(c) == ROUNDS && canvas_missing(c) == 0;
+	return canvas_complete_rounds(c) == ROUNDS && canvas_missing_count(c) == 0;
 }
 
 /* Two of three batches are wrong at first; up to two wrong ones arrive for a lease, one after the other, and are
  * detected later, when their rounds may be complete. */
-static void what_is_taken_back_leaves_nothing(void **unused)
+static void batches_taken_back_leave_no_trace(void **unused)
 {
 	(void)unused;
 	enum { LEASES = GROUPS * PARTS };
 	for (uint64_t trial = 0; trial < 8; trial++) {
 		struct plan p = make_plan(trial % 2 ? PLAN_CHAINS : PLAN_SAMPLES);
-		struct canvas *plain = make_canvas(&p, NULL), *mended = make_canvas(&p, trial & 2 ? folder : NULL);
+		struct canvas *plain = make_canvas(&p, NULL),
+			      *mended = make_canvas(&p, trial & 2 ? temporary_folder : NULL);
 		uint64_t done[LEASES] = {0}, wrong[LEASES] = {0}, dice = 4711 + trial, closed = 0;
 		for (unsigned n = 0; n < LEASES; n++) {
-			add_nth(plain, &p, n);
-			add_nth(mended, &p, n);
+			add_nth_batch(plain, &p, n);
+			add_nth_batch(mended, &p, n);
 		}
-		while (!all_right(mended, done, wrong)) {
-			canvas_state = dice = dice * 6364136223846793005u + 1442695040888963407u;
-			unsigned i = (unsigned)(canvas_next() >> 20) % LEASES;
+		while (!all_leases_are_right(mended, done, wrong)) {
+			canvas_random_state = dice = dice * 6364136223846793005u + 1442695040888963407u;
+			unsigned i = (unsigned)(canvas_random_next() >> 20) % LEASES;
 			struct lease_key k = {1, LEASE_RENDER, i / PARTS, i % PARTS, done[i]};
-			bool lie = canvas_next() % 3 && wrong[i] < 2, notice = canvas_next() % 4 == 0;
-			if (wrong[i] && (notice || done[i] >= canvas_rounds(mended) + 2 || done[i] >= ROUNDS)) {
+			bool is_wrong = canvas_random_next() % 3 && wrong[i] < 2,
+			     is_detected = canvas_random_next() % 4 == 0;
+			if (wrong[i] &&
+			    (is_detected || done[i] >= canvas_complete_rounds(mended) + 2 || done[i] >= ROUNDS)) {
 				k.epoch--;
-				closed += k.epoch < canvas_rounds(mended);
-				struct batch b = make_wrong(&p, &k, k.epoch + trial);
-				canvas_take_back(mended, &b);
+				closed += k.epoch < canvas_complete_rounds(mended);
+				struct batch b = make_wrong_batch(&p, &k, k.epoch + trial);
+				canvas_subtract(mended, &b);
 				batch_fini(&b);
 				wrong[i]--;
 				done[i]--;
-				assert_false(canvas_has(mended, &k));
+				assert_false(canvas_has_lease(mended, &k));
 				continue;
 			}
-			if (done[i] >= ROUNDS || done[i] >= canvas_rounds(mended) + 2)
+			if (done[i] >= ROUNDS || done[i] >= canvas_complete_rounds(mended) + 2)
 				continue;
-			if (lie) {
-				add_wrong(mended, &p, &k, k.epoch + trial);
+			if (is_wrong) {
+				add_wrong_batch(mended, &p, &k, k.epoch + trial);
 				wrong[i]++;
 			} else if (wrong[i] == 0) {
-				add(mended, &p, LEASE_RENDER, k.epoch, k.group, k.part);
+				add_batch(mended, &p, LEASE_RENDER, k.epoch, k.group, k.part);
 			} else {
 				continue;
 			}
 			done[i]++;
-			assert_true(canvas_has(mended, &k));
+			assert_true(canvas_has_lease(mended, &k));
 		}
 		for (uint64_t epoch = 0; epoch < ROUNDS; epoch++)
 			for (unsigned i = 0; i < LEASES; i++)
-				add(plain, &p, LEASE_RENDER, epoch, i / PARTS, i % PARTS);
+				add_batch(plain, &p, LEASE_RENDER, epoch, i / PARTS, i % PARTS);
 		assert_true(closed > 0);
-		assert_same(plain, mended, &p);
+		assert_same_canvas(plain, mended, &p);
 		canvas_free(plain);
 		canvas_free(mended);
 	}
 }
 
 /* Films of another plan or grid, truncated ones and ones with a wrong bit are refused, and no part of them is used. */
-static void others_are_refused(void **unused)
+static void other_or_damaged_films_are_refused(void **unused)
 {
 	(void)unused;
 	char path[128];
@@ -278,11 +282,11 @@ static void others_are_refused(void **unused)
 	struct error e;
 	struct stat st;
 	struct plan p = make_plan(PLAN_CHAINS), q = p;
-	path_of(path);
+	canvas_path(path);
 	struct canvas *c = make_canvas(&p, NULL);
 	for (unsigned n = 0; n < 30; n++)
-		add_nth(c, &p, n);
-	c = through_file(c, &p, NULL);
+		add_nth_batch(c, &p, n);
+	c = save_and_load(c, &p, NULL);
 	canvas_free(c);
 	q.groups = 2;
 	q.chains /= 2;
@@ -298,15 +302,15 @@ static void others_are_refused(void **unused)
 	canvas_free(c);
 	assert_int_equal(stat(path, &st), 0);
 	for (int i = 0; i < 40; i++) {
-		off_t at = st.st_size * i / 40;
+		off_t offset = st.st_size * i / 40;
 		unsigned char byte;
 		int fd = open(path, O_RDWR);
-		assert_int_equal(pread(fd, &byte, 1, at), 1);
+		assert_int_equal(pread(fd, &byte, 1, offset), 1);
 		byte ^= 16;
-		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+		assert_int_equal(pwrite(fd, &byte, 1, offset), 1);
 		assert_int_equal(checked_file_open(&s, path, &e), -EBADMSG);
 		byte ^= 16;
-		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+		assert_int_equal(pwrite(fd, &byte, 1, offset), 1);
 		close(fd);
 	}
 	assert_int_equal(checked_file_open(&s, path, &e), 0);
@@ -322,10 +326,14 @@ static void others_are_refused(void **unused)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(goes_on_with_the_same_bits, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(what_is_loaded_is_what_was_saved, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(what_is_taken_back_leaves_nothing, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(others_are_refused, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(loaded_canvas_continues_with_the_same_bits, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(loaded_canvas_equals_the_saved_one, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(batches_taken_back_leave_no_trace, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(other_or_damaged_films_are_refused, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

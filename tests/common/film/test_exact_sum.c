@@ -9,20 +9,20 @@
 #include <string.h>
 #include <cmocka.h>
 
-static uint64_t state = 88172645463325252u;
+static uint64_t random_state = 88172645463325252u;
 
-static uint64_t next(void)
+static uint64_t next_random(void)
 {
-	state ^= state << 13;
-	state ^= state >> 7;
-	return state ^= state << 17;
+	random_state ^= random_state << 13;
+	random_state ^= random_state >> 7;
+	return random_state ^= random_state << 17;
 }
 
 static double random_double(int lowest, int highest)
 {
-	int exponent = lowest + (int)(next() % (uint64_t)(highest - lowest + 1));
-	double m = 1 + (double)(next() >> 12) * 0x1p-52;
-	return ldexp(next() & 1 ? m : -m, exponent);
+	int exponent = lowest + (int)(next_random() % (uint64_t)(highest - lowest + 1));
+	double m = 1 + (double)(next_random() >> 12) * 0x1p-52;
+	return ldexp(next_random() & 1 ? m : -m, exponent);
 }
 
 static void sum_of_one_value_is_the_value(void **unused)
@@ -55,7 +55,7 @@ static void large_values_cancel(void **unused)
 	assert_true(exact_sum_value(&s) == 0);
 }
 
-static void rounds_once_to_nearest_even(void **unused)
+static void sum_is_rounded_once_to_nearest_even(void **unused)
 {
 	(void)unused;
 	/* 1 + 2^-53 is a tie, rounded down to even; adding 2^-1074 puts it above the tie. 1 + 3 x 2^-53 is a tie,
@@ -77,7 +77,7 @@ static void small_sums_agree_with_long_integers(void **unused)
 	struct exact_sum s = {0};
 	__int128 reference = 0;
 	for (int i = 0; i < 100000; i++) {
-		int64_t v = (int64_t)(next() >> 11) * (next() & 1 ? 1 : -1);
+		int64_t v = (int64_t)(next_random() >> 11) * (next_random() & 1 ? 1 : -1);
 		exact_sum_add(&s, (double)v);
 		reference += v;
 		assert_true(exact_sum_value(&s) == (double)reference);
@@ -102,7 +102,7 @@ static void order_and_grouping_do_not_matter(void **unused)
 	assert_memory_equal(&forward, &halves[0], sizeof forward);
 }
 
-static void refuses_what_is_not_finite(void **unused)
+static void infinities_and_nans_are_refused(void **unused)
 {
 	(void)unused;
 	struct exact_sum s = {0}, empty = {0};
@@ -113,12 +113,12 @@ static void refuses_what_is_not_finite(void **unused)
 }
 
 /* A carry propagates through words with all bits set. */
-static void carries_go_all_the_way(void **unused)
+static void carries_cross_all_words(void **unused)
 {
 	(void)unused;
 	struct exact_sum a = {{UINT64_MAX, UINT64_MAX, UINT64_MAX, 4}}, b = {{1, 0, 0, 0}};
 	exact_sum_merge(&a, &b);
-	assert_true(a.word[0] == 0 && a.word[1] == 0 && a.word[2] == 0 && a.word[3] == 5);
+	assert_true(a.words[0] == 0 && a.words[1] == 0 && a.words[2] == 0 && a.words[3] == 5);
 }
 
 int main(void)
@@ -126,11 +126,11 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sum_of_one_value_is_the_value),
 		cmocka_unit_test(large_values_cancel),
-		cmocka_unit_test(carries_go_all_the_way),
-		cmocka_unit_test(rounds_once_to_nearest_even),
+		cmocka_unit_test(carries_cross_all_words),
+		cmocka_unit_test(sum_is_rounded_once_to_nearest_even),
 		cmocka_unit_test(small_sums_agree_with_long_integers),
 		cmocka_unit_test(order_and_grouping_do_not_matter),
-		cmocka_unit_test(refuses_what_is_not_finite),
+		cmocka_unit_test(infinities_and_nans_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

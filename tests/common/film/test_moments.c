@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What canvas_image computes for chains: the potential scale reduction of sequences whose answer is known, the error of
- * a tile, energies of path classes; and that the order of batches changes no bit.
+ * What canvas_image_init computes for chains: the potential scale reduction of sequences whose answer is known, the
+ * error of a tile, energies of path classes; and that the order of batches changes no bit.
  *
  * Level of the statistical test: 1e-6 per tile. Power: V follows chi-square with 1023 degrees of freedom, so that a
  * scale reduction whose V / W is off by 30 % is found with 95 % probability.
@@ -21,7 +21,7 @@
 
 #include <cmocka.h>
 
-#define LEVEL 1e-6
+#define SIGNIFICANCE_LEVEL 1e-6
 enum { TILES = 6 };
 
 /* The film has six tiles. */
@@ -59,7 +59,7 @@ static struct batch make_batch(const struct plan *p, uint64_t epoch, uint32_t le
 	return b;
 }
 
-static struct canvas *canvas_of(const struct plan *p)
+static struct canvas *make_canvas(const struct plan *p)
 {
 	struct canvas *c;
 	assert_int_equal(canvas_new(&c, p, -30, NULL, NULL), 0);
@@ -73,39 +73,39 @@ static void add_batch(struct canvas *c, struct batch *b)
 }
 
 /* Simulates where a chain is: it draws a tile, or none, and stays there for `stay` mutations. */
-static const double chance[TILES] = {0.3, 0.05, 0.1, 0, 0.25, 0.2};
+static const double tile_probability[TILES] = {0.3, 0.05, 0.1, 0, 0.25, 0.2};
 
 static uint32_t draw_tile(struct dice *d)
 {
-	double u = dice_throw(d);
+	double u = dice_uniform(d);
 	for (uint32_t t = 0; t < TILES; t++) {
-		if (u < chance[t])
+		if (u < tile_probability[t])
 			return t;
-		u -= chance[t];
+		u -= tile_probability[t];
 	}
 	return TILES;
 }
 
-static void known_sequences(void **state)
+static void r_hat_of_simulated_chains_is_right(void **state)
 {
 	(void)state;
 	enum { CHAINS = 1024, ROUNDS = 3, EPOCH = 200, N = ROUNDS * EPOCH };
-	static const uint32_t stays[] = {1, 10, 50};
-	struct dice d = dice_of("known sequences");
-	for (size_t k = 0; k < sizeof stays / sizeof *stays; k++) {
+	static const uint32_t dwell_times[] = {1, 10, 50};
+	struct dice d = dice_for_test("known sequences");
+	for (size_t k = 0; k < sizeof dwell_times / sizeof *dwell_times; k++) {
 		struct plan p = make_plan(CHAINS, 16, 4, EPOCH);
-		struct canvas *c = canvas_of(&p);
+		struct canvas *c = make_canvas(&p);
 		struct canvas_image img;
 		for (uint64_t round = 0; round < ROUNDS; round++)
 			for (uint32_t lease = 0; lease < 64; lease++) {
 				struct batch b = make_batch(&p, round, lease);
 				for (uint32_t chain = 0; chain < CHAINS / 64; chain++)
-					for (uint32_t i = 0; i < EPOCH; i += stays[k]) {
+					for (uint32_t i = 0; i < EPOCH; i += dwell_times[k]) {
 						uint32_t t = draw_tile(&d);
 						if (t == TILES)
 							continue;
-						b.moments[chain * TILES + t] += (float)stays[k];
-						b.moments[CHAINS / 64 * TILES + t] += (float)stays[k];
+						b.moments[chain * TILES + t] += (float)dwell_times[k];
+						b.moments[CHAINS / 64 * TILES + t] += (float)dwell_times[k];
 					}
 				struct error e = {""};
 				b.states = mem_alloc(b.state_count, sizeof *b.states);
@@ -114,11 +114,11 @@ static void known_sequences(void **state)
 				assert_int_equal(batch_check(&b, &p, &e), 0);
 				add_batch(c, &b);
 			}
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		assert_true(img.tiles_across == 3 && img.tiles_down == 2);
-		double draws = N / (double)stays[k], sum = 0;
+		double draws = N / (double)dwell_times[k], sum = 0;
 		for (int t = 0; t < TILES; t++) {
-			if (chance[t] == 0) {
+			if (tile_probability[t] == 0) {
 				assert_true(isnan(img.r_hat[t]) && isnan(img.tile_error[t]) && img.tile_share[t] == 0);
 				continue;
 			}
@@ -126,12 +126,12 @@ static void known_sequences(void **state)
 			double w = (1 - v) * N / (N - 1.0), degrees = CHAINS - 1;
 			double x = (r2 - (N - 1.0) / N) * w / v * degrees;
 			double p_high = stats_chi2_p(x, degrees);
-			if (!(p_high > LEVEL && p_high < 1 - LEVEL))
-				fail_msg("staying %u: tile %d has R^2 = %.6f, not %.6f", stays[k], t, r2,
+			if (!(p_high > SIGNIFICANCE_LEVEL && p_high < 1 - SIGNIFICANCE_LEVEL))
+				fail_msg("staying %u: tile %d has R^2 = %.6f, not %.6f", dwell_times[k], t, r2,
 					 (N - 1.0) / N + v / w);
-			double error = sqrt((1 - chance[t]) / chance[t] / draws / CHAINS);
+			double error = sqrt((1 - tile_probability[t]) / tile_probability[t] / draws / CHAINS);
 			assert_true(fabs((double)img.tile_error[t] / error - 1) < 0.2);
-			assert_true(fabs((double)img.tile_share[t] / (chance[t] / 0.9) - 1) < 6 * error);
+			assert_true(fabs((double)img.tile_share[t] / (tile_probability[t] / 0.9) - 1) < 6 * error);
 			sum += (double)img.tile_share[t];
 		}
 		assert_true(fabs(sum - 1) < 1e-6);
@@ -141,11 +141,11 @@ static void known_sequences(void **state)
 }
 
 /* Four chains of four mutations each, 1, 2, 2 and 3 of which are in the tile: V = 1/24, W = 7/24. */
-static void four_by_hand(void **state)
+static void r_hat_of_four_chains_matches_that_by_hand(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(4, 2, 1, 4);
-	struct canvas *c = canvas_of(&p);
+	struct canvas *c = make_canvas(&p);
 	struct canvas_image img;
 	for (uint32_t g = 0; g < 2; g++) {
 		struct batch b = make_batch(&p, 0, g);
@@ -154,7 +154,7 @@ static void four_by_hand(void **state)
 		b.moments[2 * TILES + 5] = g ? 5 : 3;
 		add_batch(c, &b);
 	}
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	assert_true(fabs((double)img.r_hat[5] - sqrt(3.0 / 4 + 1.0 / 7)) < 1e-6);
 	assert_true(fabs((double)img.tile_error[5] - sqrt(1.0 / 24 / 4) / 0.5) < 1e-6);
 	canvas_image_fini(&img);
@@ -162,23 +162,23 @@ static void four_by_hand(void **state)
 }
 
 /* Each chain stays in a tile of its own, or spends half of its time there. */
-static void chains_that_stand_still(void **state)
+static void chains_that_stay_in_their_tiles_have_a_large_r_hat(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(32, 4, 2, 1000);
 	for (int half = 0; half < 2; half++) {
-		struct canvas *c = canvas_of(&p);
+		struct canvas *c = make_canvas(&p);
 		struct canvas_image img;
 		for (uint32_t lease = 0; lease < 8; lease++) {
 			struct batch b = make_batch(&p, 0, lease);
 			for (uint32_t i = 0; i < 4; i++) {
-				uint32_t own = (lease * 4 + i) % 2;
-				b.moments[i * TILES + own] = half ? 500 : 1000;
-				b.moments[4 * TILES + own] += half ? 500 : 1000;
+				uint32_t own_tile = (lease * 4 + i) % 2;
+				b.moments[i * TILES + own_tile] = half ? 500 : 1000;
+				b.moments[4 * TILES + own_tile] += half ? 500 : 1000;
 			}
 			add_batch(c, &b);
 		}
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		for (int t = 0; t < 2; t++)
 			assert_true(half ? img.r_hat[t] > 1.2f && img.r_hat[t] < 2 : isinf(img.r_hat[t]));
 		assert_true(isnan(img.r_hat[2]));
@@ -188,11 +188,11 @@ static void chains_that_stand_still(void **state)
 }
 
 /* Rounding must not look like disagreement: all chains are in one tile all the time, or share their light alike. */
-static void nothing_varies(void **state)
+static void rounding_does_not_raise_r_hat(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(32, 4, 2, 1000);
-	struct canvas *c = canvas_of(&p);
+	struct canvas *c = make_canvas(&p);
 	struct canvas_image img;
 	for (uint32_t lease = 0; lease < 8; lease++) {
 		struct batch b = make_batch(&p, 0, lease);
@@ -204,13 +204,13 @@ static void nothing_varies(void **state)
 		b.moments[4 * TILES + 1] = 4000.0f / 9;
 		add_batch(c, &b);
 	}
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	assert_true(img.r_hat[0] == 1 && img.r_hat[1] == 1);
 	canvas_image_fini(&img);
 	canvas_free(c);
 }
 
-static void fill_wild(struct batch *b, struct dice *d)
+static void fill_with_wide_range(struct batch *b, struct dice *d)
 {
 	for (uint64_t i = 0; i < b->moment_count; i++)
 		b->moments[i] = (float)(pow(10, dice_between(d, -9, 2)));
@@ -218,27 +218,27 @@ static void fill_wild(struct batch *b, struct dice *d)
 		b->classes[k] = pow(10, dice_between(d, -30, 2));
 }
 
-static void order_changes_no_bit(void **state)
+static void order_of_batches_changes_no_bit(void **state)
 {
 	(void)state;
 	enum { LEASES = 16, ROUNDS = 6, ALL = LEASES * ROUNDS, ORDERS = 4 };
 	struct plan p = make_plan(64, 8, 2, 1000);
 	struct canvas_image first = {0};
 	for (int order = 0; order < ORDERS; order++) {
-		struct canvas *c = canvas_of(&p);
-		struct dice values = dice_of("values"), places = dice_of("orders");
+		struct canvas *c = make_canvas(&p);
+		struct dice values = dice_for_test("values"), places = dice_for_test("orders");
 		struct batch b[ALL], boot[LEASES];
 		for (uint32_t i = 0; i < ALL; i++) {
 			b[i] = make_batch(&p, i / LEASES, i % LEASES);
-			fill_wild(&b[i], &values);
+			fill_with_wide_range(&b[i], &values);
 		}
 		for (uint32_t i = 0; i < LEASES; i++) {
 			boot[i] = (struct batch){.key = {1, LEASE_BOOTSTRAP, i / 2, i % 2, 0}, .independent_sum = 7};
 			boot[i].counters[COUNT_INDEPENDENT] = 8;
-			fill_wild(&boot[i], &values);
+			fill_with_wide_range(&boot[i], &values);
 		}
 		for (int skip = 0; skip < order * 1000; skip++)
-			dice_throw(&places);
+			dice_uniform(&places);
 		/* In random order within two rounds that are open at the same time. */
 		for (uint32_t i = 0; i < ALL; i++) {
 			uint32_t from = i / (2 * LEASES) * 2 * LEASES,
@@ -252,8 +252,8 @@ static void order_changes_no_bit(void **state)
 		for (uint32_t i = 0; i < ALL; i++)
 			add_batch(c, &b[i]);
 		struct canvas_image img;
-		assert_int_equal(canvas_rounds(c), ROUNDS);
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_complete_rounds(c), ROUNDS);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		if (order) {
 			assert_memory_equal(img.r_hat, first.r_hat, TILES * sizeof *img.r_hat);
 			assert_memory_equal(img.tile_error, first.tile_error, TILES * sizeof *img.tile_error);
@@ -269,31 +269,31 @@ static void order_changes_no_bit(void **state)
 }
 
 /* Values of one class that give known means and a known t. */
-static void classes_by_hand(void **state)
+static void class_energies_match_those_by_hand(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(8, 4, 1, 100);
-	struct canvas *c = canvas_of(&p);
+	struct canvas *c = make_canvas(&p);
 	struct canvas_image img;
 	const double boot[4] = {8, 16, 24, 32}, time[4] = {20, 40, 60, 60};
-	const unsigned class = path_class(3, PATH_CAUSTIC), lost = path_class(5, PATH_BOTH);
+	const unsigned class = path_class(3, PATH_CAUSTIC), lost_class = path_class(5, PATH_REFLECTED_CAUSTIC);
 	for (uint32_t g = 0; g < 4; g++) {
 		struct batch b = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = 80};
 		b.counters[COUNT_INDEPENDENT] = 8;
 		b.classes[class] = boot[g];
-		b.classes[lost] = 4;
+		b.classes[lost_class] = 4;
 		add_batch(c, &b);
 		b = make_batch(&p, 0, g);
 		b.classes[class] = time[g];
 		add_batch(c, &b);
 	}
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	/* b of each group is 82 / 9: 80 from the 8 samples of the bootstrap, and 2 from one independent proposal. */
-	const double of_group = 82.0 / 9;
+	const double group_b = 82.0 / 9;
 	double d[4], b[4], h[4];
 	for (int g = 0; g < 4; g++) {
 		b[g] = boot[g] / 8;
-		h[g] = of_group * time[g] / 200;
+		h[g] = group_b * time[g] / 200;
 		d[g] = h[g] - b[g];
 	}
 	struct stats_mean mb = stats_mean_test(b, 4, 0), mh = stats_mean_test(h, 4, 0), md = stats_mean_test(d, 4, 0);
@@ -301,29 +301,29 @@ static void classes_by_hand(void **state)
 	assert_true(fabs(k->bootstrap - mb.mean) < 1e-12 && fabs(k->bootstrap_error - mb.error) < 1e-12);
 	assert_true(fabs(k->chains - mh.mean) < 1e-12 && fabs(k->chains_error - mh.error) < 1e-12);
 	assert_true(fabs(k->difference_t - md.mean / md.error) < 1e-9);
-	assert_true(img.classes[lost].bootstrap == 0.5 && img.classes[lost].chains == 0);
-	assert_true(img.classes[lost].difference_t == -INFINITY);
+	assert_true(img.classes[lost_class].bootstrap == 0.5 && img.classes[lost_class].chains == 0);
+	assert_true(img.classes[lost_class].difference_t == -INFINITY);
 	assert_true(isnan(img.classes[0].difference_t) && img.classes[0].bootstrap == 0);
 	canvas_image_fini(&img);
 	canvas_free(c);
 }
 
-static void only_complete_rounds_of_chains(void **state)
+static void r_hat_is_of_complete_rounds_of_chains_only(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(16, 2, 2, 100);
-	struct canvas *c = canvas_of(&p);
+	struct canvas *c = make_canvas(&p);
 	struct canvas_image img;
 	for (uint32_t lease = 0; lease < 4; lease++) {
 		struct batch b = make_batch(&p, 0, lease);
 		b.moments[0] = b.moments[4 * TILES] = 100;
 		b.classes[2] = 50;
 		add_batch(c, &b);
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		assert_true((img.r_hat != NULL) == (lease == 3));
 		assert_true(lease == 3 || img.classes[2].chains == 0);
 		canvas_image_fini(&img);
-		assert_int_equal(canvas_image(c, true, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, true, &img, NULL), 0);
 		assert_null(img.r_hat);
 		assert_true(img.classes[2].chains > 0);
 		canvas_image_fini(&img);
@@ -331,17 +331,17 @@ static void only_complete_rounds_of_chains(void **state)
 	struct batch open = make_batch(&p, 1, 0);
 	open.moments[1] = open.moments[4 * TILES + 1] = 100;
 	add_batch(c, &open);
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	assert_true(isnan(img.r_hat[1]) && img.tile_share[0] == 1);
 	canvas_image_fini(&img);
 	canvas_free(c);
 	p.kind = PLAN_SAMPLES;
 	p.chains = 0;
-	c = canvas_of(&p);
+	c = make_canvas(&p);
 	struct batch boot = {.key = {1, LEASE_BOOTSTRAP, 0, 0, 0}, .independent_sum = 80, .classes = {16}};
 	boot.counters[COUNT_INDEPENDENT] = 8;
 	add_batch(c, &boot);
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	assert_null(img.r_hat);
 	assert_true(img.classes[0].bootstrap == 1 && isnan(img.classes[0].difference_t)); /* one of two groups */
 	canvas_image_fini(&img);
@@ -353,7 +353,7 @@ static void more_chains_than_sequences_and_sums_beyond_the_grid(void **state)
 {
 	(void)state;
 	struct plan p = make_plan(8192, 4, 2, 1000);
-	struct canvas *c = canvas_of(&p);
+	struct canvas *c = make_canvas(&p);
 	struct canvas_image img;
 	struct error e;
 	for (uint32_t lease = 0; lease < 8; lease++) {
@@ -362,13 +362,13 @@ static void more_chains_than_sequences_and_sums_beyond_the_grid(void **state)
 		b.moments[0] = b.moments[TILES] = 1024 * (lease % 2 ? 250 : 150);
 		add_batch(c, &b);
 	}
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	double n = 1024000, w = 0.2 * 0.8 - 0.05 * 0.05, v = 0.05 * 0.05 * 8 / 7;
 	assert_true(fabs((double)img.r_hat[0] - sqrt((n - 1) / n + v / w)) < 1e-5);
 	canvas_image_fini(&img);
 	canvas_free(c);
 	p = make_plan(16, 2, 2, UINT64_C(1) << 40);
-	c = canvas_of(&p);
+	c = make_canvas(&p);
 	for (uint32_t lease = 0; lease < 4; lease++) {
 		struct batch b = make_batch(&p, 0, lease);
 		b.moments[0] = b.moments[4 * TILES] = 0x1p40f;
@@ -392,13 +392,13 @@ static void more_chains_than_sequences_and_sums_beyond_the_grid(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(known_sequences),
-		cmocka_unit_test(four_by_hand),
-		cmocka_unit_test(chains_that_stand_still),
-		cmocka_unit_test(nothing_varies),
-		cmocka_unit_test(order_changes_no_bit),
-		cmocka_unit_test(classes_by_hand),
-		cmocka_unit_test(only_complete_rounds_of_chains),
+		cmocka_unit_test(r_hat_of_simulated_chains_is_right),
+		cmocka_unit_test(r_hat_of_four_chains_matches_that_by_hand),
+		cmocka_unit_test(chains_that_stay_in_their_tiles_have_a_large_r_hat),
+		cmocka_unit_test(rounding_does_not_raise_r_hat),
+		cmocka_unit_test(order_of_batches_changes_no_bit),
+		cmocka_unit_test(class_energies_match_those_by_hand),
+		cmocka_unit_test(r_hat_is_of_complete_rounds_of_chains_only),
 		cmocka_unit_test(more_chains_than_sequences_and_sums_beyond_the_grid),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

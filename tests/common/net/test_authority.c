@@ -8,7 +8,7 @@
 #include "common/net/authority.h"
 #include "tests/support/faulty_disk.h"
 #include "tests/support/failing_list.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,14 +24,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { CALLS_MOST = 1000, SEEDS = 16 };
+enum { CALLS_MAX = 1000, SEEDS = 16 };
 
 /* The commands, in order. */
-enum step { INIT, FARM, NODE, RENEWED, REVOKED, STEPS };
+enum step { INIT, ISSUE_FARM, ISSUE_NODE, RENEW_NODE, REVOKE_NODE, STEP_COUNT };
 
 static struct shared {
 	_Atomic uint64_t counts[FAULTY_DISK_COUNTS];
-	_Atomic int done; /* commands that have ended without an error */
+	_Atomic int done_count; /* commands that have ended without an error */
 } * shared;
 
 static int run_step(const char *ca, enum step s, struct error *e)
@@ -39,12 +39,12 @@ static int run_step(const char *ca, enum step s, struct error *e)
 	unsigned count;
 	switch (s) {
 	case INIT:
-		return authority_init(ca, "test", 100, e);
-	case FARM:
+		return authority_create(ca, "test", 100, e);
+	case ISSUE_FARM:
 		return authority_issue(ca, "farm", TLS_COORDINATOR, 50, false, e);
-	case NODE:
+	case ISSUE_NODE:
 		return authority_issue(ca, "node", TLS_WORKER, 50, false, e);
-	case RENEWED:
+	case RENEW_NODE:
 		return authority_issue(ca, "node", TLS_WORKER, 60, true, e);
 	default:
 		return authority_revoke(ca, "node", &count, e);
@@ -52,17 +52,20 @@ static int run_step(const char *ca, enum step s, struct error *e)
 }
 
 /* Returns the exit code of a process whose disk loses power at that call. */
-static int run_until(const char *ca, const char *root, const char *after, uint64_t lose_at, uint64_t seed)
+static int run_until_power_loss(const char *ca, const char *root, const char *after, uint64_t lose_at, uint64_t seed)
 {
 	int status;
-	*shared = (struct shared){.done = 0};
+	*shared = (struct shared){.done_count = 0};
 	pid_t pid = fork();
 	if (pid == 0) {
-		struct faulty_disk d = {
-			.root = root, .after = after, .seed = seed, .lose_at = lose_at, .counts = shared->counts};
+		struct faulty_disk_options d = {.root = root,
+						.remains = after,
+						.seed = seed,
+						.power_loss_at = lose_at,
+						.counts = shared->counts};
 		struct error e;
 		faulty_disk_begin(&d);
-		for (int s = 0; s < STEPS; s++, shared->done++)
+		for (int s = 0; s < STEP_COUNT; s++, shared->done_count++)
 			if (run_step(ca, (enum step)s, &e))
 				_exit(1);
 		_exit(0);
@@ -82,7 +85,7 @@ static void expect_opens(const char *ca, const char *name)
 	tls_close(t);
 }
 
-static void same_file(const char *ca, const char *one, const char *other)
+static void assert_same_file(const char *ca, const char *one, const char *other)
 {
 	char command[600];
 	snprintf(command, sizeof command, "cmp -s '%s/%s' '%s/%s'", ca, one, ca, other);
@@ -99,111 +102,112 @@ static size_t count_certificates(const char *ca, const char *name, size_t *revok
 	if (authority_list(ca, &list, &n, &e))
 		fail_msg("%s", e.text);
 	for (size_t i = 0; i < n; i++)
-		if (strcmp(list[i].who.name, name) == 0) {
+		if (strcmp(list[i].subject.name, name) == 0) {
 			found++;
-			*revoked += list[i].revoked;
+			*revoked += list[i].is_revoked;
 		}
 	mem_free(list);
 	return found;
 }
 
-static void what_was_reported_is_there(const char *ca, int done)
+static void check_reported_changes(const char *ca, int done)
 {
 	size_t revoked;
 	if (done > INIT)
 		count_certificates(ca, "nobody", &revoked);
-	if (done > FARM)
+	if (done > ISSUE_FARM)
 		expect_opens(ca, "farm");
-	if (done > NODE) { /* also during a renewal */
+	if (done > ISSUE_NODE) { /* also during a renewal */
 		assert_true(count_certificates(ca, "node", &revoked) >= 1);
 		expect_opens(ca, "node");
 	}
-	if (done > RENEWED)
+	if (done > RENEW_NODE)
 		assert_int_equal(count_certificates(ca, "node", &revoked), 2);
-	if (done > REVOKED) {
+	if (done > REVOKE_NODE) {
 		assert_true(count_certificates(ca, "node", &revoked) == 2 && revoked == 2);
-		same_file(ca, "crl.pem", "farm/crl.pem");
+		assert_same_file(ca, "crl.pem", "farm/crl.pem");
 	}
 }
 
-static void the_rest_can_be_done(const char *ca, int done)
+static void finish_commands(const char *ca, int done)
 {
 	struct error e;
 	size_t revoked;
-	for (int s = done; s < STEPS; s++) {
+	for (int s = done; s < STEP_COUNT; s++) {
 		int rc = run_step(ca, (enum step)s, &e);
 		/* The command was interrupted when all of its changes were on the disk. */
-		if (rc && !(s == done && rc == -EEXIST && s < RENEWED))
+		if (rc && !(s == done && rc == -EEXIST && s < RENEW_NODE))
 			fail_msg("command %d: %s", s, e.text);
 	}
 	expect_opens(ca, "farm");
 	expect_opens(ca, "node");
-	size_t all = count_certificates(ca, "node", &revoked);
-	assert_true(all >= 2 && all == revoked);
-	same_file(ca, "crl.pem", "farm/crl.pem");
+	size_t count = count_certificates(ca, "node", &revoked);
+	assert_true(count >= 2 && count == revoked);
+	assert_same_file(ca, "crl.pem", "farm/crl.pem");
 }
 
-static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
+static void power_loss_undoes_nothing_that_was_reported(void **state)
 {
 	(void)state;
 	char root[100], after[100], ca[120], ca_after[120], command[400];
 	int code;
 	uint64_t lost = 0, renewed = 0; /* the last call while the certificate is renewed */
-	snprintf(root, sizeof root, "%s/disk", folder);
-	snprintf(after, sizeof after, "%s/after", folder);
+	snprintf(root, sizeof root, "%s/disk", temporary_folder);
+	snprintf(after, sizeof after, "%s/after", temporary_folder);
 	snprintf(ca, sizeof ca, "%s/ca", root);
 	snprintf(ca_after, sizeof ca_after, "%s/ca", after);
 	snprintf(command, sizeof command, "rm -rf '%s' '%s' && mkdir '%s'", root, after, root);
-	for (uint64_t at = 1;; at++) {
+	for (uint64_t call = 1;; call++) {
 		assert_int_equal(system(command), 0);
-		code = run_until(ca, root, after, at, at);
+		code = run_until_power_loss(ca, root, after, call, call);
 		if (code == 0) /* the commands ended before power was lost */
 			break;
-		assert_int_equal(code, FAULTY_DISK_EXIT);
-		assert_true(at < CALLS_MOST);
+		assert_int_equal(code, FAULTY_DISK_EXIT_CODE);
+		assert_true(call < CALLS_MAX);
 		lost += shared->counts[3];
-		renewed = shared->done == RENEWED ? at : renewed;
-		what_was_reported_is_there(ca_after, shared->done);
-		the_rest_can_be_done(ca_after, shared->done);
+		renewed = shared->done_count == RENEW_NODE ? call : renewed;
+		check_reported_changes(ca_after, shared->done_count);
+		finish_commands(ca_after, shared->done_count);
 	}
 	assert_true(lost > 0);
 	for (uint64_t seed = 0; seed < SEEDS; seed++) { /* either of the last two renames may be lost */
 		assert_int_equal(system(command), 0);
-		assert_int_equal(run_until(ca, root, after, renewed, CALLS_MOST + seed), FAULTY_DISK_EXIT);
+		assert_int_equal(run_until_power_loss(ca, root, after, renewed, CALLS_MAX + seed),
+				 FAULTY_DISK_EXIT_CODE);
 		expect_opens(ca_after, "node");
 	}
 }
 
-static bool fails; /* renames that put a certificate in place fail */
-static int failing_rename(const char *from, const char *to)
+static bool renames_fail; /* renames that put a certificate in place fail */
+static int fail_certificate_rename(const char *from, const char *to)
 {
 	const char *end = strstr(to, "/cert.pem");
-	return fails && end && !end[9] ? (errno = EIO, -1) : disk_system.rename(from, to);
+	return renames_fail && end && !end[9] ? (errno = EIO, -1) : disk_system.rename(from, to);
 }
 
 /* The key was replaced and the certificate could not be: the old certificate is still used, listed and revoked. */
-static void a_failure_between_key_and_certificate(void **state)
+static void failed_renewal_keeps_the_old_certificate(void **state)
 {
 	(void)state;
 	char ca[120];
 	struct error e;
 	size_t revoked;
 	struct disk failing = disk_system;
-	snprintf(ca, sizeof ca, "%s/failing", folder);
-	failing.rename = failing_rename;
-	for (int s = INIT; s < RENEWED; s++)
+	snprintf(ca, sizeof ca, "%s/failing", temporary_folder);
+	failing.rename = fail_certificate_rename;
+	for (int s = INIT; s < RENEW_NODE; s++)
 		assert_int_equal(run_step(ca, (enum step)s, &e), 0);
-	disk_use(&failing);
-	fails = true;
-	assert_int_equal(run_step(ca, RENEWED, &e), -EIO);
-	disk_use(NULL);
+	disk_set_calls(&failing);
+	renames_fail = true;
+	assert_int_equal(run_step(ca, RENEW_NODE, &e), -EIO);
+	disk_set_calls(NULL);
 	expect_opens(ca, "node");
 	assert_int_equal(count_certificates(ca, "node", &revoked), 2);
-	the_rest_can_be_done(ca, RENEWED);
+	finish_commands(ca, RENEW_NODE);
 }
 
 /* An empty record does not hide the others: they are listed and revoked, and the damaged one is named. */
-static void a_damaged_record(void **state)
+static void damaged_record_does_not_hide_the_others(void **state)
 {
 	(void)state;
 	char ca[120], path[160], copy[160];
@@ -211,8 +215,8 @@ static void a_damaged_record(void **state)
 	struct authority_entry *list;
 	size_t n, before, after;
 	unsigned count;
-	snprintf(ca, sizeof ca, "%s/damaged", folder);
-	for (int s = INIT; s < RENEWED; s++)
+	snprintf(ca, sizeof ca, "%s/damaged", temporary_folder);
+	for (int s = INIT; s < RENEW_NODE; s++)
 		assert_int_equal(run_step(ca, (enum step)s, &e), 0);
 	assert_int_equal(authority_list(ca, &list, &before, &e), 0);
 	mem_free(list);
@@ -234,11 +238,11 @@ static void a_damaged_record(void **state)
 	assert_int_equal(rename(path, copy), 0);
 	assert_int_equal(count_certificates(ca, "node", &n), 1);
 	assert_int_equal(n, 1);
-	same_file(ca, "crl.pem", "farm/crl.pem");
+	assert_same_file(ca, "crl.pem", "farm/crl.pem");
 }
 
 /* Certificates that could not be listed are neither revoked nor shown, and that is reported. */
-static void a_record_that_cannot_be_listed(void **state)
+static void failed_listing_of_records_is_reported(void **state)
 {
 	(void)state;
 	char ca[120];
@@ -246,8 +250,8 @@ static void a_record_that_cannot_be_listed(void **state)
 	struct authority_entry *list;
 	size_t n;
 	unsigned count;
-	snprintf(ca, sizeof ca, "%s/unlisted", folder);
-	for (int s = INIT; s < RENEWED; s++)
+	snprintf(ca, sizeof ca, "%s/unlisted", temporary_folder);
+	for (int s = INIT; s < RENEW_NODE; s++)
 		assert_int_equal(run_step(ca, (enum step)s, &e), 0);
 	failing_list_begin("/issued", 0, EIO);
 	int revoked = authority_revoke(ca, "node", &count, &e);
@@ -264,13 +268,13 @@ static void a_record_that_cannot_be_listed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_failure_between_key_and_certificate),
-		cmocka_unit_test(a_damaged_record),
-		cmocka_unit_test(a_loss_of_power_undoes_nothing_that_was_reported),
-		cmocka_unit_test(a_record_that_cannot_be_listed),
+		cmocka_unit_test(failed_renewal_keeps_the_old_certificate),
+		cmocka_unit_test(damaged_record_does_not_hide_the_others),
+		cmocka_unit_test(power_loss_undoes_nothing_that_was_reported),
+		cmocka_unit_test(failed_listing_of_records_is_reported),
 	};
 	shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	if (shared == MAP_FAILED)
 		return 1;
-	return cmocka_run_group_tests(tests, folder_set_up, folder_tear_down);
+	return cmocka_run_group_tests(tests, temporary_folder_set_up, temporary_folder_tear_down);
 }

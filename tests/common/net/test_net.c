@@ -24,8 +24,8 @@
 
 struct end {
 	struct conn *conn;
-	int messages, closed, drained, partial;
-	size_t payload;
+	int message_count, close_count, drain_count, partial_count;
+	size_t payload_bytes;
 	bool garbled, gave_way;
 	int distrust;
 	struct tls_peer peer; /* the peer, as it was when a message arrived */
@@ -34,11 +34,11 @@ struct end {
 
 static uv_loop_t loop;
 static uv_tcp_t listener;
-static struct end here, there;
+static struct end caller_end, listener_end;
 static struct conn_config config;
-static struct send_pool *sending; /* NULL: no limit on all connections together */
+static struct send_pool *shared_send_pool; /* NULL: no limit on all connections together */
 static char folder[64];
-static struct tls *calling, *listening; /* NULL: plaintext */
+static struct tls *caller_tls, *listener_tls; /* NULL: plaintext */
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
@@ -48,27 +48,27 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		assert_int_equal(payload[i], (unsigned char)(i * 7));
 	if (conn_peer(x->conn))
 		x->peer = *conn_peer(x->conn);
-	x->messages++;
-	x->payload += size;
+	x->message_count++;
+	x->payload_bytes += size;
 }
 
 static void on_drained(void *user)
 {
-	((struct end *)user)->drained++;
+	((struct end *)user)->drain_count++;
 }
 
 static void on_partial(void *user)
 {
-	((struct end *)user)->partial++;
+	((struct end *)user)->partial_count++;
 }
 
 static void on_closed(void *user, const char *why)
 {
 	struct end *x = user;
-	x->closed++;
-	x->distrust = conn_distrust(x->conn);
-	x->garbled = conn_garbled(x->conn);
-	x->gave_way = conn_gave_way(x->conn);
+	x->close_count++;
+	x->distrust = conn_certificate_error(x->conn);
+	x->garbled = conn_had_bad_checksum(x->conn);
+	x->gave_way = conn_was_evicted(x->conn);
 	x->conn = NULL;
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
@@ -80,7 +80,7 @@ static void on_connection(uv_stream_t *l, int status)
 {
 	struct error e;
 	assert_int_equal(status, 0);
-	assert_int_equal(conn_accept(&there.conn, l, &config, &events, &there, &e), 0);
+	assert_int_equal(conn_accept(&listener_end.conn, l, &config, &events, &listener_end, &e), 0);
 }
 
 static void send_bye(struct end *x, size_t payload)
@@ -105,34 +105,34 @@ static void connect_ends(void)
 	struct error e;
 	int length = sizeof bound.storage;
 	struct conn_config caller;
-	memset(&here, 0, sizeof here);
-	memset(&there, 0, sizeof there);
+	memset(&caller_end, 0, sizeof caller_end);
+	memset(&listener_end, 0, sizeof listener_end);
 	memset(&bound, 0, sizeof bound);
-	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening, NULL, sending};
+	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listener_tls, NULL, shared_send_pool};
 	caller = config;
-	caller.sending = NULL;
-	caller.tls = calling;
+	caller.send_pool = NULL;
+	caller.tls = caller_tls;
 	assert_int_equal(uv_loop_init(&loop), 0);
 	uv_tcp_init(&loop, &listener);
-	assert_int_equal(first_address(&a, "127.0.0.1:0", &e), 0);
+	assert_int_equal(first_address_resolve(&a, "127.0.0.1:0", &e), 0);
 	assert_int_equal(uv_tcp_bind(&listener, (struct sockaddr *)&a.storage, 0), 0);
 	assert_int_equal(uv_listen((uv_stream_t *)&listener, 8, on_connection), 0);
 	assert_int_equal(uv_tcp_getsockname(&listener, (struct sockaddr *)&bound.storage, &length), 0);
-	assert_int_equal(conn_connect(&here.conn, &loop, &bound, &caller, &events, &here, &e), 0);
-	while (!there.conn)
+	assert_int_equal(conn_connect(&caller_end.conn, &loop, &bound, &caller, &events, &caller_end, &e), 0);
+	while (!listener_end.conn)
 		uv_run(&loop, UV_RUN_ONCE);
 }
 
 static void close_ends(void)
 {
-	if (here.conn)
-		conn_close(here.conn, "test over");
-	if (there.conn)
-		conn_close(there.conn, "test over");
+	if (caller_end.conn)
+		conn_close(caller_end.conn, "test over");
+	if (listener_end.conn)
+		conn_close(listener_end.conn, "test over");
 	uv_close((uv_handle_t *)&listener, NULL);
 	uv_run(&loop, UV_RUN_DEFAULT);
 	assert_int_equal(uv_loop_close(&loop), 0); /* no handle is left open */
-	assert_true(here.closed == 1 && there.closed == 1);
+	assert_true(caller_end.close_count == 1 && listener_end.close_count == 1);
 }
 
 static void frames_go_both_ways(void **state)
@@ -140,110 +140,113 @@ static void frames_go_both_ways(void **state)
 	(void)state;
 	connect_ends();
 	for (int i = 0; i < 3; i++) {
-		send_bye(&here, (size_t)i * 300000);
-		send_bye(&there, 1);
+		send_bye(&caller_end, (size_t)i * 300000);
+		send_bye(&listener_end, 1);
 	}
-	while (there.messages < 3 || here.messages < 3 || !here.drained)
+	while (listener_end.message_count < 3 || caller_end.message_count < 3 || !caller_end.drain_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.payload, 900000);
-	assert_string_equal(there.peer.name, calling ? "node" : "");
-	assert_int_equal(here.peer.role, calling ? TLS_COORDINATOR : TLS_NOBODY);
-	conn_close_when_sent(here.conn, "said all");
-	while (!there.closed)
+	assert_int_equal(listener_end.payload_bytes, 900000);
+	assert_string_equal(listener_end.peer.name, caller_tls ? "node" : "");
+	assert_int_equal(caller_end.peer.role, caller_tls ? TLS_COORDINATOR : TLS_NO_ROLE);
+	conn_close_when_sent(caller_end.conn, "said all");
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_string_equal(there.why, "the peer hung up");
-	assert_string_equal(here.why, "said all");
+	assert_string_equal(listener_end.why, "the peer hung up");
+	assert_string_equal(caller_end.why, "said all");
 	close_ends();
 }
 
-static void the_last_words_arrive(void **state)
+static void data_sent_before_a_close_arrives(void **state)
 {
 	(void)state;
 	connect_ends();
-	send_bye(&here, 1 << 20);
-	conn_close_when_sent(here.conn, "done");
-	send_bye(&here, 1); /* too late: dropped */
-	while (!there.closed)
+	send_bye(&caller_end, 1 << 20);
+	conn_close_when_sent(caller_end.conn, "done");
+	send_bye(&caller_end, 1); /* too late: dropped */
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.messages, 1);
+	assert_int_equal(listener_end.message_count, 1);
 	close_ends();
 }
 
-static void limits_close(void **state)
+static void frame_beyond_the_limits_closes_the_connection(void **state)
 {
 	(void)state;
 	connect_ends();
-	send_bye(&here, (1 << 20) + 1);
-	while (!there.closed)
+	send_bye(&caller_end, (1 << 20) + 1);
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_non_null(strstr(there.why, "payload"));
+	assert_non_null(strstr(listener_end.why, "payload"));
 	close_ends();
 }
 
-static void who_does_not_read_is_cut_off(void **state)
+static void peer_that_does_not_read_is_cut_off(void **state)
 {
 	(void)state;
 	connect_ends();
 	/* The loop does not run in between, so nothing is sent: first the kernel's buffers fill, then the connection's
 	 * queue. */
-	for (int i = 0; i < 1000 && !here.closed; i++)
-		send_bye(&here, 1 << 20);
-	while (!here.closed)
+	for (int i = 0; i < 1000 && !caller_end.close_count; i++)
+		send_bye(&caller_end, 1 << 20);
+	while (!caller_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_non_null(strstr(here.why, "does not read"));
+	assert_non_null(strstr(caller_end.why, "does not read"));
 	close_ends();
 }
 
 /* The limit over all connections: bytes that a reading peer has taken no longer count, and a peer that does not read is
  * cut off. */
-static void all_are_cut_off_together(void **state)
+static void peer_that_does_not_read_is_cut_off_at_the_shared_limit(void **state)
 {
 	(void)state;
-	struct send_pool pool = {.limit = 2 << 20};
-	int unread = 0;
-	sending = &pool;
+	struct send_pool pool = {.max_bytes = 2 << 20};
+	int unread_count = 0;
+	shared_send_pool = &pool;
 	connect_ends();
-	sending = NULL;
+	shared_send_pool = NULL;
 	for (int i = 1; i <= 8; i++) {
-		send_bye(&there, 1 << 20);
-		assert_true(pool.used > 1 << 20);
-		while (here.messages < i)
+		send_bye(&listener_end, 1 << 20);
+		assert_true(pool.used_bytes > 1 << 20);
+		while (caller_end.message_count < i)
 			uv_run(&loop, UV_RUN_ONCE);
-		for (int k = 0; k < 100 && pool.used; k++)
+		for (int k = 0; k < 100 && pool.used_bytes; k++)
 			uv_run(&loop, UV_RUN_NOWAIT);
-		assert_true(pool.used == 0 && there.closed == 0);
+		assert_true(pool.used_bytes == 0 && listener_end.close_count == 0);
 	}
-	for (; !pool.leaving && unread < 32; unread++)
-		send_bye(&there, 1 << 20);
-	const uint64_t copied = calling ? 1 << 20 : 0; /* of a frame whose room was reserved before TLS encrypts it */
-	assert_true(unread > 1 && unread < 32 && pool.used == 0 && pool.leaving > 1 << 20 &&
-		    pool.leaving <= pool.limit + copied);
-	while (!there.closed || !here.closed)
+	for (; !pool.closing_bytes && unread_count < 32; unread_count++)
+		send_bye(&listener_end, 1 << 20);
+	const uint64_t copied =
+		caller_tls ? 1 << 20 : 0; /* of a frame whose room was reserved before TLS encrypts it */
+	assert_true(unread_count > 1 && unread_count < 32 && pool.used_bytes == 0 && pool.closing_bytes > 1 << 20 &&
+		    pool.closing_bytes <= pool.max_bytes + copied);
+	while (!listener_end.close_count || !caller_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_true(there.gave_way && pool.used == 0 && pool.leaving == 0 && LIST_EMPTY(&pool.waiting));
-	assert_string_equal(there.why, "too much waits to be sent to all peers, and this one does not read its part");
+	assert_true(listener_end.gave_way && pool.used_bytes == 0 && pool.closing_bytes == 0 &&
+		    LIST_EMPTY(&pool.waiting));
+	assert_string_equal(listener_end.why,
+			    "too much waits to be sent to all peers, and this one does not read its part");
 	close_ends();
 }
 
-static void half_a_frame_is_not_waited_for(void **state)
+static void incomplete_frame_times_out(void **state)
 {
 	(void)state;
 	connect_ends();
 	unsigned char *half = mem_alloc(11, 1);
 	memcpy(half, "\0\0\0\x20\0\0\0\0abc", 11);
-	conn_send_bytes(here.conn, half, 11);
+	conn_send_bytes(caller_end.conn, half, 11);
 	uint64_t begun = uv_hrtime();
-	while (!there.closed)
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
 	double seconds = (double)(uv_hrtime() - begun) * 1e-9;
 	assert_true(seconds > 0.4 && seconds < 60);
-	assert_non_null(strstr(there.why, "not completed"));
+	assert_non_null(strstr(listener_end.why, "not completed"));
 	close_ends();
 }
 
 /* A bit of the second message changes in transit: the connection closes. The first message (in practice a hello) is not
  * protected. */
-static void changed_bytes_close(void **state)
+static void changed_bytes_close_the_connection(void **state)
 {
 	(void)state;
 	Farm__Bye bye;
@@ -254,32 +257,33 @@ static void changed_bytes_close(void **state)
 	m.bye = &bye;
 	for (int where = 0; where < 4; where++) {
 		size_t size;
-		unsigned char payload[1000] = {0}, *bytes = checksummed_message(&m, payload, sizeof payload, &size);
+		unsigned char payload[1000] = {0},
+			      *bytes = checksummed_frame_from_message(&m, payload, sizeof payload, &size);
 		static const size_t places[] = {1, 9, 17, 700}; /* in a length, a checksum, the header, the payload */
 		bytes[places[where]] ^= 4;
 		connect_ends();
-		send_bye(&here, 10);
+		send_bye(&caller_end, 10);
 		unsigned char *copy = mem_alloc(size, 1);
 		memcpy(copy, bytes, size);
-		conn_send_bytes(here.conn, copy, size);
-		while (!there.closed)
+		conn_send_bytes(caller_end.conn, copy, size);
+		while (!listener_end.close_count)
 			uv_run(&loop, UV_RUN_ONCE);
-		assert_true(there.garbled && !there.distrust);
-		assert_int_equal(there.messages, 1);
-		assert_non_null(strstr(there.why, "changed in transit"));
+		assert_true(listener_end.garbled && !listener_end.distrust);
+		assert_int_equal(listener_end.message_count, 1);
+		assert_non_null(strstr(listener_end.why, "changed in transit"));
 		close_ends();
 		free(bytes);
 	}
 }
 
-static void silence_is_not_waited_for(void **state)
+static void silent_peer_times_out(void **state)
 {
 	(void)state;
 	connect_ends();
-	conn_set_quiet(there.conn, 0.3);
-	while (!there.closed)
+	conn_set_idle_timeout(listener_end.conn, 0.3);
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_non_null(strstr(there.why, "silent for too long"));
+	assert_non_null(strstr(listener_end.why, "silent for too long"));
 	close_ends();
 }
 
@@ -289,42 +293,43 @@ enum { PAYLOAD = 1 << 20, PIECE = PAYLOAD / 16 };
 struct drip {
 	uv_timer_t timer;
 	unsigned char *bytes;
-	size_t size, at;
+	size_t size, offset;
 };
 
 static void on_drip(uv_timer_t *t)
 {
 	struct drip *d = t->data;
-	size_t n = d->size - d->at < PIECE ? d->size - d->at : PIECE;
+	size_t n = d->size - d->offset < PIECE ? d->size - d->offset : PIECE;
 	unsigned char *piece = mem_alloc(n, 1);
-	memcpy(piece, d->bytes + d->at, n);
-	conn_send_bytes(here.conn, piece, n);
-	d->at += n;
-	if (d->at == d->size)
+	memcpy(piece, d->bytes + d->offset, n);
+	conn_send_bytes(caller_end.conn, piece, n);
+	d->offset += n;
+	if (d->offset == d->size)
 		uv_timer_stop(t);
 }
 
 /* However many frames a peer has sent, only a few are handled before other sockets are looked at; the peer may send
  * them all and hang up. */
-static void many_frames_keep_nobody_waiting(void **state)
+static void many_frames_do_not_starve_other_sockets(void **state)
 {
 	(void)state;
-	enum { FRAMES = 8000, BYTES = 100, MOST = 16 };
-	int before = 0, most = 0;
+	enum { FRAMES = 8000, BYTES = 100, FRAMES_PER_TURN_MAX = 16 };
+	int previous = 0, max_frames = 0;
 	connect_ends();
 	for (int i = 0; i < FRAMES; i++)
-		send_bye(&here, BYTES);
-	conn_close_when_sent(here.conn, "said all");
-	while (there.messages < FRAMES && !there.closed) {
+		send_bye(&caller_end, BYTES);
+	conn_close_when_sent(caller_end.conn, "said all");
+	while (listener_end.message_count < FRAMES && !listener_end.close_count) {
 		uv_run(&loop, UV_RUN_ONCE);
-		most = there.messages - before > most ? there.messages - before : most;
-		before = there.messages;
+		max_frames = listener_end.message_count - previous > max_frames ? listener_end.message_count - previous
+										: max_frames;
+		previous = listener_end.message_count;
 	}
-	assert_int_equal(there.messages, FRAMES);
-	assert_in_range(most, 1, MOST);
-	while (!there.closed)
+	assert_int_equal(listener_end.message_count, FRAMES);
+	assert_in_range(max_frames, 1, FRAMES_PER_TURN_MAX);
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_string_equal(there.why, "the peer hung up");
+	assert_string_equal(listener_end.why, "the peer hung up");
 	close_ends();
 }
 
@@ -334,34 +339,34 @@ static void frames_wait_for_memory(void **state)
 {
 	(void)state;
 	enum { FRAMES = 100 };
-	struct send_pool pool = {.limit = 1 << 20};
-	sending = &pool;
+	struct send_pool pool = {.max_bytes = 1 << 20};
+	shared_send_pool = &pool;
 	connect_ends();
-	sending = NULL;
+	shared_send_pool = NULL;
 	for (int i = 0; i < FRAMES; i++)
-		send_bye(&here, 0);
-	while (!there.messages)
+		send_bye(&caller_end, 0);
+	while (!listener_end.message_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	const int before = there.messages;
+	const int before = listener_end.message_count;
 	assert_in_range(before, 1, FRAMES - 1);
-	pool.leaving = 1;
+	pool.closing_bytes = 1;
 	for (int i = 0; i < FRAMES; i++)
 		uv_run(&loop, UV_RUN_NOWAIT);
-	assert_int_equal(there.messages, before);
-	pool.leaving = 0;
-	while (there.messages < FRAMES)
+	assert_int_equal(listener_end.message_count, before);
+	pool.closing_bytes = 0;
+	while (listener_end.message_count < FRAMES)
 		uv_run(&loop, UV_RUN_ONCE);
 	close_ends();
 }
 
 /* The bytes of a slow frame count as signs of life. It is complete after 0.8 s; it may take 16.5 s: half a second plus
  * one for each 64 KB. */
-static void a_slow_frame_is_heard(void **state)
+static void slow_frame_counts_as_a_sign_of_life(void **state)
 {
 	(void)state;
 	Farm__Bye bye;
 	Farm__Envelope m;
-	struct drip d = {.at = 0};
+	struct drip d = {.offset = 0};
 	unsigned char *payload = mem_alloc(PAYLOAD, 1);
 	for (size_t i = 0; i < PAYLOAD; i++)
 		payload[i] = (unsigned char)(i * 7);
@@ -369,20 +374,20 @@ static void a_slow_frame_is_heard(void **state)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_BYE;
 	m.bye = &bye;
-	d.bytes = checksummed_message(&m, payload, PAYLOAD, &d.size);
+	d.bytes = checksummed_frame_from_message(&m, payload, PAYLOAD, &d.size);
 	connect_ends();
-	send_bye(&here, 0);
-	while (!there.messages)
+	send_bye(&caller_end, 0);
+	while (!listener_end.message_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.partial, 0); /* no frame was under way */
-	conn_set_quiet(there.conn, 0.3);
+	assert_int_equal(listener_end.partial_count, 0); /* no frame was under way */
+	conn_set_idle_timeout(listener_end.conn, 0.3);
 	d.timer.data = &d;
 	uv_timer_init(&loop, &d.timer);
 	uv_timer_start(&d.timer, on_drip, 50, 50);
-	while (there.messages < 2 && !there.closed)
+	while (listener_end.message_count < 2 && !listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.messages, 2);
-	assert_true(there.partial >= 15);
+	assert_int_equal(listener_end.message_count, 2);
+	assert_true(listener_end.partial_count >= 15);
 	uv_close((uv_handle_t *)&d.timer, NULL);
 	close_ends();
 	free(d.bytes);
@@ -391,117 +396,118 @@ static void a_slow_frame_is_heard(void **state)
 
 /* A peer is not blamed for what was not read: the timeouts for silence and for incomplete frames stand still with the
  * loop. */
-static void a_late_reader_waits(void **state)
+static void stalled_loop_times_out_no_peer(void **state)
 {
 	(void)state;
 	connect_ends();
-	conn_set_quiet(there.conn, 0.5);
-	send_bye(&here, 1000);
+	conn_set_idle_timeout(listener_end.conn, 0.5);
+	send_bye(&caller_end, 1000);
 	struct timespec stall = {0, 800000000};
 	nanosleep(&stall, NULL);
 	uv_run(&loop, UV_RUN_ONCE);
-	send_bye(&here, 1000);
-	while (there.messages < 2 && !there.closed)
+	send_bye(&caller_end, 1000);
+	while (listener_end.message_count < 2 && !listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.messages, 2);
+	assert_int_equal(listener_end.message_count, 2);
 	close_ends();
 }
 
 /* ---- TLS ---- */
 
-static int without_tls(void **state)
+static int set_up_plaintext(void **state)
 {
 	(void)state;
-	calling = listening = NULL;
+	caller_tls = listener_tls = NULL;
 	return 0;
 }
 
-static int with_tls(void **state)
+static int set_up_tls(void **state)
 {
 	(void)state;
 	char path[128];
 	struct error e;
 	snprintf(folder, sizeof folder, "/tmp/hslt-net.XXXXXX");
-	if (!mkdtemp(folder) || authority_init(folder, "net", 2, &e) ||
+	if (!mkdtemp(folder) || authority_create(folder, "net", 2, &e) ||
 	    authority_issue(folder, "farm", TLS_COORDINATOR, 1, false, &e) ||
 	    authority_issue(folder, "node", TLS_WORKER, 1, false, &e))
 		return -1;
 	snprintf(path, sizeof path, "%s/node", folder);
-	if (tls_open(&calling, path, &e))
+	if (tls_open(&caller_tls, path, &e))
 		return -1;
 	snprintf(path, sizeof path, "%s/farm", folder);
-	return tls_open(&listening, path, &e);
+	return tls_open(&listener_tls, path, &e);
 }
 
-static int end_tls(void **state)
+static int tear_down_tls(void **state)
 {
 	(void)state;
 	char command[128];
-	tls_close(calling);
-	tls_close(listening);
+	tls_close(caller_tls);
+	tls_close(listener_tls);
 	snprintf(command, sizeof command, "rm -rf '%s'", folder);
 	return system(command);
 }
 
 /* Only the last end to connect speaks, or stays silent, as told: both ends hear what is wrong before the handshake
  * times out. */
-static void one_sided(bool caller_speaks)
+static void check_one_sided_tls(bool caller_speaks)
 {
-	struct tls *t = caller_speaks ? listening : calling;
-	*(caller_speaks ? &listening : &calling) = NULL;
+	struct tls *t = caller_speaks ? listener_tls : caller_tls;
+	*(caller_speaks ? &listener_tls : &caller_tls) = NULL;
 	connect_ends();
-	send_bye(&here, 10);
-	while (!here.closed || !there.closed)
+	send_bye(&caller_end, 10);
+	while (!caller_end.close_count || !listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_true(!strstr(here.why, "in time") && !strstr(there.why, "in time"));
-	assert_true(here.distrust == -EACCES && there.distrust == -EACCES && !here.messages && !there.messages);
-	assert_non_null(strstr(here.why, "TLS"));
-	assert_non_null(strstr(there.why, "TLS"));
+	assert_true(!strstr(caller_end.why, "in time") && !strstr(listener_end.why, "in time"));
+	assert_true(caller_end.distrust == -EACCES && listener_end.distrust == -EACCES && !caller_end.message_count &&
+		    !listener_end.message_count);
+	assert_non_null(strstr(caller_end.why, "TLS"));
+	assert_non_null(strstr(listener_end.why, "TLS"));
 	close_ends();
-	*(caller_speaks ? &listening : &calling) = t;
+	*(caller_speaks ? &listener_tls : &caller_tls) = t;
 }
 
-static void only_one_speaks_it(void **state)
+static void one_sided_tls_is_reported_at_both_ends(void **state)
 {
 	(void)state;
-	one_sided(true);
-	one_sided(false);
+	check_one_sided_tls(true);
+	check_one_sided_tls(false);
 }
 
 /* A peer that connects and says nothing, or a byte now and then, has as long as a handshake may take; in this test the
  * clock is the timeout for silence. */
-static void silence_is_no_handshake(void **state)
+static void silent_handshake_times_out(void **state)
 {
 	(void)state;
-	struct tls *t = calling;
-	calling = NULL;
+	struct tls *t = caller_tls;
+	caller_tls = NULL;
 	connect_ends();
-	conn_set_quiet(there.conn, 0.3);
-	while (!there.closed)
+	conn_set_idle_timeout(listener_end.conn, 0.3);
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.messages, 0);
+	assert_int_equal(listener_end.message_count, 0);
 	close_ends();
-	calling = t;
+	caller_tls = t;
 }
 
 /* A connection whose certificate is no longer valid is cut off while it is open. */
-static void a_live_connection_is_checked_again(void **state)
+static void revocation_cuts_off_an_open_connection(void **state)
 {
 	(void)state;
 	char list[128];
 	unsigned count;
 	struct error e;
 	connect_ends();
-	tls_set_recheck(listening, 0.3);
-	send_bye(&here, 1);
-	while (!there.messages)
+	tls_set_recheck(listener_tls, 0.3);
+	send_bye(&caller_end, 1);
+	while (!listener_end.message_count)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_int_equal(authority_revoke(folder, "node", &count, &e), 0);
-	assert_int_equal(tls_refresh(listening, &e), 1);
-	while (!there.closed)
+	assert_int_equal(tls_refresh(listener_tls, &e), 1);
+	while (!listener_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.distrust, -EACCES);
-	assert_non_null(strstr(there.why, "revoked"));
+	assert_int_equal(listener_end.distrust, -EACCES);
+	assert_non_null(strstr(listener_end.why, "revoked"));
 	close_ends();
 	snprintf(list, sizeof list, "%s/farm/crl.pem", folder);
 	assert_int_equal(remove(list), 0);
@@ -509,47 +515,50 @@ static void a_live_connection_is_checked_again(void **state)
 
 /* A peer that is refused because of a date is told apart from one that is refused for good, at the handshake and later.
  */
-static void a_date_is_told_apart(void **state)
+static void expired_certificate_is_told_from_a_refused_one(void **state)
 {
 	(void)state;
 	char path[128];
 	struct error e;
-	struct tls *t = calling;
+	struct tls *t = caller_tls;
 	snprintf(path, sizeof path, "%s/brief", folder);
 	assert_int_equal(authority_issue(folder, "brief", TLS_WORKER, 2.0 / 86400, false, &e), 0);
-	assert_int_equal(tls_open(&calling, path, &e), 0);
-	tls_set_recheck(listening, 0.3);
+	assert_int_equal(tls_open(&caller_tls, path, &e), 0);
+	tls_set_recheck(listener_tls, 0.3);
 	for (int i = 0; i < 2; i++) { /* connected while the certificate expires, unless the machine stands still; then
 				       * connected too late */
 		connect_ends();
-		send_bye(&here, 1);
-		while (!there.closed)
+		send_bye(&caller_end, 1);
+		while (!listener_end.close_count)
 			uv_run(&loop, UV_RUN_ONCE);
-		assert_int_equal(there.distrust, -EKEYEXPIRED);
-		assert_non_null(strstr(there.why, "expired"));
-		while (i && !here.closed)
+		assert_int_equal(listener_end.distrust, -EKEYEXPIRED);
+		assert_non_null(strstr(listener_end.why, "expired"));
+		while (i && !caller_end.close_count)
 			uv_run(&loop, UV_RUN_ONCE);
-		assert_true(!i || here.distrust == -EKEYEXPIRED);
+		assert_true(!i || caller_end.distrust == -EKEYEXPIRED);
 		close_ends();
 	}
-	tls_close(calling);
-	calling = t;
+	tls_close(caller_tls);
+	caller_tls = t;
 }
 
-#define EITHER_WAY                                                                                            \
-	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_wait_for_memory),          \
-		cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive),               \
-		cmocka_unit_test(limits_close), cmocka_unit_test(who_does_not_read_is_cut_off),               \
-		cmocka_unit_test(all_are_cut_off_together), cmocka_unit_test(half_a_frame_is_not_waited_for), \
-		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for),           \
-		cmocka_unit_test(a_slow_frame_is_heard), cmocka_unit_test(a_late_reader_waits)
+#define COMMON_TESTS                                                                                                \
+	cmocka_unit_test(many_frames_do_not_starve_other_sockets), cmocka_unit_test(frames_wait_for_memory),        \
+		cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(data_sent_before_a_close_arrives),          \
+		cmocka_unit_test(frame_beyond_the_limits_closes_the_connection),                                    \
+		cmocka_unit_test(peer_that_does_not_read_is_cut_off),                                               \
+		cmocka_unit_test(peer_that_does_not_read_is_cut_off_at_the_shared_limit),                           \
+		cmocka_unit_test(incomplete_frame_times_out), cmocka_unit_test(changed_bytes_close_the_connection), \
+		cmocka_unit_test(silent_peer_times_out), cmocka_unit_test(slow_frame_counts_as_a_sign_of_life),     \
+		cmocka_unit_test(stalled_loop_times_out_no_peer)
 
 int main(void)
 {
-	const struct CMUnitTest plain[] = {EITHER_WAY};
-	const struct CMUnitTest encrypted[] = {
-		EITHER_WAY, cmocka_unit_test(only_one_speaks_it), cmocka_unit_test(silence_is_no_handshake),
-		cmocka_unit_test(a_live_connection_is_checked_again), cmocka_unit_test(a_date_is_told_apart)};
-	int failed = cmocka_run_group_tests(plain, without_tls, NULL);
-	return failed + cmocka_run_group_tests(encrypted, with_tls, end_tls);
+	const struct CMUnitTest plain[] = {COMMON_TESTS};
+	const struct CMUnitTest encrypted[] = {COMMON_TESTS, cmocka_unit_test(one_sided_tls_is_reported_at_both_ends),
+					       cmocka_unit_test(silent_handshake_times_out),
+					       cmocka_unit_test(revocation_cuts_off_an_open_connection),
+					       cmocka_unit_test(expired_certificate_is_told_from_a_refused_one)};
+	int failed = cmocka_run_group_tests(plain, set_up_plaintext, NULL);
+	return failed + cmocka_run_group_tests(encrypted, set_up_tls, tear_down_tls);
 }

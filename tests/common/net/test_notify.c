@@ -89,10 +89,10 @@ static void expect_watchdog(const char *us, const char *pid, double seconds)
 {
 	us ? setenv("WATCHDOG_USEC", us, 1) : unsetenv("WATCHDOG_USEC");
 	pid ? setenv("WATCHDOG_PID", pid, 1) : unsetenv("WATCHDOG_PID");
-	assert_true(notify_watchdog() >= seconds && notify_watchdog() <= seconds);
+	assert_true(notify_watchdog_seconds() >= seconds && notify_watchdog_seconds() <= seconds);
 }
 
-static void the_watchdogs_period_is_read(void **state)
+static void watchdog_period_is_read_from_the_environment(void **state)
 {
 	(void)state;
 	char me[32];
@@ -109,7 +109,7 @@ static void the_watchdogs_period_is_read(void **state)
 	expect_watchdog(NULL, NULL, 0);
 }
 
-static int code_of(pid_t child)
+static int exit_code_of(pid_t child)
 {
 	int status;
 	assert_int_equal(waitpid(child, &status, 0), child);
@@ -119,28 +119,28 @@ static int code_of(pid_t child)
 
 /* Runs a child whose descriptors from 3 on are these; returns the one that the child takes (3...), 0 for none, or 99 if
  * it would be inherited by programs that the child starts. */
-static int socket_taken(const int *fds, int count, const char *announced, bool other_pid)
+static int inherited_socket(const int *fds, int count, const char *announced, bool other_pid)
 {
 	pid_t child = fork();
 	assert_true(child >= 0);
 	if (child)
-		return code_of(child);
+		return exit_code_of(child);
 	char me[32];
-	int kept[8];
+	int copies[8];
 	for (int i = 0; i < count; i++)
-		kept[i] = fcntl(fds[i], F_DUPFD, 100);
+		copies[i] = fcntl(fds[i], F_DUPFD, 100);
 	for (int i = 0; i < count; i++)
-		dup2(kept[i], 3 + i);
+		dup2(copies[i], 3 + i);
 	snprintf(me, sizeof me, "%ld", (long)(other_pid ? getppid() : getpid()));
 	setenv("LISTEN_PID", me, 1);
 	announced ? setenv("LISTEN_FDS", announced, 1) : unsetenv("LISTEN_FDS");
-	int fd = notify_inherited_unix();
+	int fd = notify_inherited_socket();
 	if (fd >= 0 && !(fcntl(fd, F_GETFD) & FD_CLOEXEC))
 		_exit(99);
 	_exit(fd < 0 ? 0 : fd);
 }
 
-static void the_right_socket_is_taken_over(void **state)
+static void only_a_listening_unix_socket_is_inherited(void **state)
 {
 	(void)state;
 	char name[64];
@@ -152,15 +152,15 @@ static void the_right_socket_is_taken_over(void **state)
 	assert_int_equal(listen(listening, 1), 0);
 	assert_int_equal(listen(tcp, 1), 0); /* an unbound socket gets a free port */
 	const int all[] = {null, datagrams, idle, tcp, listening};
-	assert_int_equal(socket_taken(all, 5, "5", false), 7);
-	assert_int_equal(socket_taken(all + 4, 1, "1", false), 3);
-	assert_int_equal(socket_taken(all, 5, "4", false), 0);
-	assert_int_equal(socket_taken(all + 4, 1, "1", true), 0);
-	assert_int_equal(socket_taken(all + 4, 1, NULL, false), 0);
-	assert_int_equal(socket_taken(all + 4, 1, "0", false), 0);
-	assert_int_equal(socket_taken(all + 4, 1, "-1", false), 0);
-	assert_int_equal(socket_taken(all + 4, 1, "1x", false), 0);
-	assert_int_equal(socket_taken(all, 4, "2000000000", false), 0);
+	assert_int_equal(inherited_socket(all, 5, "5", false), 7);
+	assert_int_equal(inherited_socket(all + 4, 1, "1", false), 3);
+	assert_int_equal(inherited_socket(all, 5, "4", false), 0);
+	assert_int_equal(inherited_socket(all + 4, 1, "1", true), 0);
+	assert_int_equal(inherited_socket(all + 4, 1, NULL, false), 0);
+	assert_int_equal(inherited_socket(all + 4, 1, "0", false), 0);
+	assert_int_equal(inherited_socket(all + 4, 1, "-1", false), 0);
+	assert_int_equal(inherited_socket(all + 4, 1, "1x", false), 0);
+	assert_int_equal(inherited_socket(all, 4, "2000000000", false), 0);
 	for (int i = 0; i < 5; i++)
 		close(all[i]);
 }
@@ -169,8 +169,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(notices_reach_the_service_manager),
-		cmocka_unit_test(the_watchdogs_period_is_read),
-		cmocka_unit_test(the_right_socket_is_taken_over),
+		cmocka_unit_test(watchdog_period_is_read_from_the_environment),
+		cmocka_unit_test(only_a_listening_unix_socket_is_inherited),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,136 +16,137 @@ enum { PEERS = 5 };
 static struct send_pool pool;
 static struct peer {
 	struct send_share share;
-	uint64_t left;
+	uint64_t unsent_bytes;
 } peers[PEERS];
-static char gave_way[16];
+static char giving_way_log[16];
 
-static uint64_t left_of(const struct send_share *s)
+static uint64_t unsent_bytes_of(const struct send_share *s)
 {
-	return ((const struct peer *)s)->left;
+	return ((const struct peer *)s)->unsent_bytes;
 }
 
-static void note_giving_way(struct send_share *s)
+static void record_giving_way(struct send_share *s)
 {
-	size_t n = strlen(gave_way);
-	gave_way[n] = (char)('a' + ((struct peer *)s - peers));
-	gave_way[n + 1] = 0;
+	size_t n = strlen(giving_way_log);
+	giving_way_log[n] = (char)('a' + ((struct peer *)s - peers));
+	giving_way_log[n + 1] = 0;
 }
 
-static int begin(void **state)
+static int set_up(void **state)
 {
 	(void)state;
-	pool = (struct send_pool){.limit = 100};
+	pool = (struct send_pool){.max_bytes = 100};
 	memset(peers, 0, sizeof peers);
-	memset(gave_way, 0, sizeof gave_way);
+	memset(giving_way_log, 0, sizeof giving_way_log);
 	for (int i = 0; i < PEERS; i++)
-		peers[i].share = (struct send_share){.pool = &pool, .left = left_of, .give_way = note_giving_way};
+		peers[i].share =
+			(struct send_share){.pool = &pool, .unsent_bytes = unsent_bytes_of, .evict = record_giving_way};
 	return 0;
 }
 
 /* All memory is given back in the end, whichever peers gave way. */
-static int end(void **state)
+static int tear_down(void **state)
 {
 	(void)state;
 	for (int i = 0; i < PEERS; i++) {
-		send_pool_leave(&peers[i].share);
-		send_pool_sub(&peers[i].share, peers[i].share.bytes, 0);
+		send_pool_close_share(&peers[i].share);
+		send_pool_subtract(&peers[i].share, peers[i].share.bytes, 0);
 	}
-	return pool.used || pool.leaving || !LIST_EMPTY(&pool.waiting);
+	return pool.used_bytes || pool.closing_bytes || !LIST_EMPTY(&pool.waiting);
 }
 
-static bool send(int i, uint64_t bytes, uint64_t now)
+static bool queue_bytes(int i, uint64_t bytes, uint64_t now)
 {
 	bool ok = send_pool_add(&peers[i].share, bytes, now);
-	peers[i].left += ok ? bytes : 0;
-	send_pool_look(&peers[i].share, now);
+	peers[i].unsent_bytes += ok ? bytes : 0;
+	send_pool_note_progress(&peers[i].share, now);
 	return ok;
 }
 
 /* The kernel takes a part of what waits, without reporting it. */
-static void reads_some(int i)
+static void read_one_byte(int i)
 {
-	peers[i].left--;
+	peers[i].unsent_bytes--;
 }
 
-static void whoever_has_read_nothing_for_longest(void **state)
+static void peer_that_read_nothing_for_longest_gives_way(void **state)
 {
 	(void)state;
-	assert_true(send(0, 30, 1) && send(1, 30, 2) && send(2, 30, 3));
-	assert_true(send(3, 30, 4));
-	assert_string_equal(gave_way, "a");
-	assert_true(pool.used == 90 && pool.leaving == 30);
-	reads_some(1);
-	assert_true(send(3, 20, 5)); /* the second peer has just read */
-	assert_string_equal(gave_way, "ac");
-	send_pool_sub(&peers[0].share, 30, 6);
-	assert_int_equal(pool.leaving, 30);
-	assert_int_equal(pool.used, 80);
+	assert_true(queue_bytes(0, 30, 1) && queue_bytes(1, 30, 2) && queue_bytes(2, 30, 3));
+	assert_true(queue_bytes(3, 30, 4));
+	assert_string_equal(giving_way_log, "a");
+	assert_true(pool.used_bytes == 90 && pool.closing_bytes == 30);
+	read_one_byte(1);
+	assert_true(queue_bytes(3, 20, 5)); /* the second peer has just read */
+	assert_string_equal(giving_way_log, "ac");
+	send_pool_subtract(&peers[0].share, 30, 6);
+	assert_int_equal(pool.closing_bytes, 30);
+	assert_int_equal(pool.used_bytes, 80);
 	/* the last peer holds most, and has read nothing since it was first sent something */
-	assert_false(send(3, 40, 6));
-	assert_string_equal(gave_way, "acd");
-	assert_int_equal(pool.used, 30);
+	assert_false(queue_bytes(3, 40, 6));
+	assert_string_equal(giving_way_log, "acd");
+	assert_int_equal(pool.used_bytes, 30);
 }
 
-static void little_is_left_alone(void **state)
+static void peer_that_holds_little_does_not_give_way(void **state)
 {
 	(void)state;
-	assert_true(send(0, 5, 1) && send(1, 60, 2) && send(2, 5, 3) && send(3, 25, 4));
-	assert_true(send(4, 10, 5));
-	assert_string_equal(gave_way, "b");
-	assert_true(send(4, 70, 6)); /* on average the peers hold 11: this one holds less, and the fourth more */
-	assert_string_equal(gave_way, "bd");
+	assert_true(queue_bytes(0, 5, 1) && queue_bytes(1, 60, 2) && queue_bytes(2, 5, 3) && queue_bytes(3, 25, 4));
+	assert_true(queue_bytes(4, 10, 5));
+	assert_string_equal(giving_way_log, "b");
+	assert_true(queue_bytes(4, 70, 6)); /* on average the peers hold 11: this one holds less, and the fourth more */
+	assert_string_equal(giving_way_log, "bd");
 }
 
-static void of_the_same_moment_the_most(void **state)
+static void largest_of_equally_late_peers_gives_way(void **state)
 {
 	(void)state;
-	assert_true(send(0, 30, 1) && send(1, 35, 1) && send(2, 10, 1) && send(3, 30, 2));
-	assert_string_equal(gave_way, "b");
+	assert_true(queue_bytes(0, 30, 1) && queue_bytes(1, 35, 1) && queue_bytes(2, 10, 1) && queue_bytes(3, 30, 2));
+	assert_string_equal(giving_way_log, "b");
 }
 
 /* Each peer has read a part of its bytes and asked for more: the time counts from when it last read. */
-static void what_is_taken_counts(void **state)
+static void waiting_time_counts_from_the_last_read(void **state)
 {
 	(void)state;
-	assert_true(send(0, 40, 1) && send(1, 45, 2));
-	peers[0].left -= 10;
-	send_pool_sub(&peers[0].share, 10, 3);
-	assert_true(send(0, 15, 4));
-	assert_true(send(2, 40, 5));
-	assert_string_equal(gave_way, "b");
-	assert_true(peers[0].share.moved == 3 && pool.used == 85);
+	assert_true(queue_bytes(0, 40, 1) && queue_bytes(1, 45, 2));
+	peers[0].unsent_bytes -= 10;
+	send_pool_subtract(&peers[0].share, 10, 3);
+	assert_true(queue_bytes(0, 15, 4));
+	assert_true(queue_bytes(2, 40, 5));
+	assert_string_equal(giving_way_log, "b");
+	assert_true(peers[0].share.progress_ms == 3 && pool.used_bytes == 85);
 }
 
-static void alone_it_may_be_of_any_size(void **state)
+static void single_peer_may_queue_any_size(void **state)
 {
 	(void)state;
-	assert_true(send(0, 1000, 1));
-	assert_string_equal(gave_way, "");
-	assert_true(send(1, 1, 2)); /* the first peer holds so much that nothing can be sent to others */
-	assert_string_equal(gave_way, "a");
-	assert_true(pool.used == 1 && pool.leaving == 1000);
+	assert_true(queue_bytes(0, 1000, 1));
+	assert_string_equal(giving_way_log, "");
+	assert_true(queue_bytes(1, 1, 2)); /* the first peer holds so much that nothing can be sent to others */
+	assert_string_equal(giving_way_log, "a");
+	assert_true(pool.used_bytes == 1 && pool.closing_bytes == 1000);
 }
 
-static void without_a_pool(void **state)
+static void share_without_a_pool_is_unlimited(void **state)
 {
 	(void)state;
 	struct send_share s = {.pool = NULL};
 	assert_true(send_pool_add(&s, UINT64_MAX, 1));
-	send_pool_look(&s, 1);
-	send_pool_sub(&s, UINT64_MAX, 1);
-	send_pool_leave(&s);
+	send_pool_note_progress(&s, 1);
+	send_pool_subtract(&s, UINT64_MAX, 1);
+	send_pool_close_share(&s);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(whoever_has_read_nothing_for_longest, begin, end),
-		cmocka_unit_test_setup_teardown(little_is_left_alone, begin, end),
-		cmocka_unit_test_setup_teardown(of_the_same_moment_the_most, begin, end),
-		cmocka_unit_test_setup_teardown(what_is_taken_counts, begin, end),
-		cmocka_unit_test_setup_teardown(alone_it_may_be_of_any_size, begin, end),
-		cmocka_unit_test(without_a_pool),
+		cmocka_unit_test_setup_teardown(peer_that_read_nothing_for_longest_gives_way, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(peer_that_holds_little_does_not_give_way, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(largest_of_equally_late_peers_gives_way, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(waiting_time_counts_from_the_last_read, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(single_peer_may_queue_any_size, set_up, tear_down),
+		cmocka_unit_test(share_without_a_pool_is_unlimited),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

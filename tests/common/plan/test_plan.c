@@ -16,7 +16,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static struct plan_request request(enum plan_kind kind, const char *mixture)
+static struct plan_request make_request(enum plan_kind kind, const char *mixture)
 {
 	struct plan_request r = {
 		.integrator = "hslt", .kind = kind, .width = 64, .height = 32, .max_depth = 8, .spp = 16};
@@ -26,7 +26,7 @@ static struct plan_request request(enum plan_kind kind, const char *mixture)
 
 /* A round has 32 mutations per pixel of the crop, but no lease has more than 2^18 or fewer than 2^13; a limit on
  * mutations has its own rule. */
-static void rounds_without_a_bound_follow_the_film(void **state)
+static void unbounded_rounds_follow_the_film_size(void **state)
 {
 	(void)state;
 	static const struct {
@@ -36,7 +36,7 @@ static void rounds_without_a_bound_follow_the_film(void **state)
 		     {512, 512, 1 << 17}, {1024, 512, 1 << 18}, {4096, 4096, 1 << 18}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		for (int by_time = 0; by_time < 2; by_time++) {
-			struct plan_request r = request(PLAN_CHAINS, "");
+			struct plan_request r = make_request(PLAN_CHAINS, "");
 			struct plan p;
 			struct error e;
 			r.width = cases[i].width;
@@ -63,15 +63,15 @@ static struct plan make_plan(const struct plan_request *r)
 	return p;
 }
 
-static bool ends_with_rule(const struct plan_request *r, const char *words)
+static bool epoch_text_has(const struct plan_request *r, const char *words)
 {
 	struct plan p = make_plan(r);
-	char text[PLAN_TEXT];
+	char text[PLAN_TEXT_MAX];
 	plan_describe_epoch(r, &p, text, sizeof text);
 	return *words ? strstr(text, words) != NULL : !*text;
 }
 
-static uint64_t round_of(struct plan p)
+static uint64_t round_mutations(struct plan p)
 {
 	return plan_round_mutations(&p);
 }
@@ -83,16 +83,16 @@ static uint64_t lease_work(const struct plan *p)
 
 /* Limits are checked after rounds: a job with a time limit or a target error only needs rounds short enough for the
  * check to be in time, and the shorter, the less it asks for. */
-static void samples_notice_time_and_error(void **state)
+static void rounds_of_samples_are_short_enough_for_their_limit(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_SAMPLES, "");
+	struct plan_request r = make_request(PLAN_SAMPLES, "");
 	r.width = 32;
 	r.height = 27;
 	r.spp = 0;
 	r.seconds = 1e6;
 	uint64_t longest = make_plan(&r).epoch;
-	assert_true(ends_with_rule(&r, "size of the film"));
+	assert_true(epoch_text_has(&r, "size of the film"));
 	uint64_t before = 0;
 	for (double seconds = 0.1; seconds < 1e5; seconds *= 1.7) {
 		r.seconds = seconds;
@@ -103,7 +103,7 @@ static void samples_notice_time_and_error(void **state)
 	}
 	assert_int_equal(before, longest);
 	r.seconds = 20;
-	assert_true(make_plan(&r).epoch > 1 && ends_with_rule(&r, "for the requested time or error"));
+	assert_true(make_plan(&r).epoch > 1 && epoch_text_has(&r, "for the requested time or error"));
 	r.seconds = 0;
 	r.target_error = 0.5;
 	assert_int_equal(make_plan(&r).epoch, 1);
@@ -114,35 +114,35 @@ static void samples_notice_time_and_error(void **state)
 	r.spp = 1 << 20; /* a number of samples that does not fit into the time changes nothing */
 	assert_int_equal(make_plan(&r).epoch, 1);
 	r.seconds = 1e6; /* a number that does fit has its own rule, whatever error is asked for */
-	assert_true(make_plan(&r).epoch > 400 && ends_with_rule(&r, "in a lease"));
+	assert_true(make_plan(&r).epoch > 400 && epoch_text_has(&r, "in a lease"));
 }
 
 /* With chains: a round is as long as without the number of samples, or as an eighth of the time allows. */
-static void a_time_also_ends_what_is_counted(void **state)
+static void time_limit_also_bounds_rounds_of_counted_samples(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.spp = 0;
 	r.seconds = 2;
-	uint64_t open = round_of(make_plan(&r));
+	uint64_t open = round_mutations(make_plan(&r));
 	r.spp = 1 << 20;
-	assert_int_equal(round_of(make_plan(&r)), open);
-	assert_true(ends_with_rule(&r, "size of the film"));
+	assert_int_equal(round_mutations(make_plan(&r)), open);
+	assert_true(epoch_text_has(&r, "size of the film"));
 	r.seconds = 2000;
-	uint64_t longer = round_of(make_plan(&r));
+	uint64_t longer = round_mutations(make_plan(&r));
 	assert_true(longer > open && (double)longer <= 50000.0 * r.seconds / 8);
-	assert_true(ends_with_rule(&r, "requested time"));
+	assert_true(epoch_text_has(&r, "requested time"));
 	r.seconds = 1e6;
-	assert_true(ends_with_rule(&r, "in a lease"));
+	assert_true(epoch_text_has(&r, "in a lease"));
 	r.spp = 16;
-	assert_true(ends_with_rule(&r, "for 8 rounds"));
+	assert_true(epoch_text_has(&r, "for 8 rounds"));
 }
 
 /* The bootstrap of a short render takes only a part of its time. */
-static void a_bootstrap_follows_the_time(void **state)
+static void bootstrap_shrinks_with_the_time_limit(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.spp = 0;
 	r.seconds = 5;
 	assert_int_equal(make_plan(&r).bootstrap, 31296); /* 5 x 50,000 / 8, rounded to equal leases */
@@ -159,9 +159,9 @@ static void a_bootstrap_follows_the_time(void **state)
 }
 
 /* The plan for a scene whose samples take many rays. */
-static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_rays, double step_rays)
+static struct plan make_slow_plan(enum plan_kind kind, double seconds, double bootstrap_rays, double step_rays)
 {
-	struct plan_request r = request(kind, "");
+	struct plan_request r = make_request(kind, "");
 	r.width = 64;
 	r.height = 64;
 	r.spp = 0;
@@ -173,12 +173,13 @@ static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_ra
 
 /* At two million rays a second: a quarter of the time for the bootstrap and an eighth for the starts of chains, but at
  * least the minimum of both. Plans of usual scenes are unchanged. */
-static void a_slow_bootstrap_is_short(void **state)
+static void slow_bootstrap_has_fewer_samples(void **state)
 {
 	(void)state;
 	for (double rays = 1; rays < 1e6; rays *= 1.9)
 		for (double seconds = 0.25; seconds < 1e5; seconds *= 2.3) {
-			struct plan p = slow(PLAN_CHAINS, seconds, rays, 1), usual = slow(PLAN_CHAINS, seconds, 0, 0);
+			struct plan p = make_slow_plan(PLAN_CHAINS, seconds, rays, 1),
+				    usual = make_slow_plan(PLAN_CHAINS, seconds, 0, 0);
 			double room = 2e6 * seconds / rays;
 			assert_true((double)p.bootstrap <= fmax(256, room / 4 + p.groups * p.parts));
 			assert_true((double)p.chains <= fmax(16, room / 8));
@@ -186,60 +187,60 @@ static void a_slow_bootstrap_is_short(void **state)
 			assert_true(p.bootstrap <= usual.bootstrap && p.chains <= usual.chains);
 			assert_true(room / 4 < (double)usual.bootstrap || p.bootstrap == usual.bootstrap);
 			assert_true(room / 8 < (double)usual.chains || p.chains == usual.chains);
-			struct plan samples = slow(PLAN_SAMPLES, seconds, rays, 1);
+			struct plan samples = make_slow_plan(PLAN_SAMPLES, seconds, rays, 1);
 			assert_true((double)samples.bootstrap <= fmax(256, room / 4 + 64) && samples.bootstrap >= 256);
 		}
-	assert_int_equal(slow(PLAN_CHAINS, 0, 1e4, 1).bootstrap, 64 * 4000); /* 20 s per lease */
-	assert_int_equal(slow(PLAN_CHAINS, 0, 1, 1).bootstrap, 1000000);
-	struct plan_request r = request(PLAN_CHAINS, "");
+	assert_int_equal(make_slow_plan(PLAN_CHAINS, 0, 1e4, 1).bootstrap, 64 * 4000); /* 20 s per lease */
+	assert_int_equal(make_slow_plan(PLAN_CHAINS, 0, 1, 1).bootstrap, 1000000);
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.seconds = 2;
 	r.rays = (struct plan_rays){1e5, 1};
 	r.bootstrap = 64000; /* values that were asked for stay */
 	r.chains = 512;
 	assert_int_equal(make_plan(&r).bootstrap, 64000);
 	assert_int_equal(make_plan(&r).chains, 512);
-	assert_int_equal(plan_bootstrap_room(&r, 100), 2000);
-	assert_int_equal(plan_bootstrap_room(&r, 1), 256);
+	assert_int_equal(plan_affordable_bootstrap(&r, 100), 2000);
+	assert_int_equal(plan_affordable_bootstrap(&r, 1), 256);
 }
 
 /* Rounds of chains shorten in proportion to the rays of a mutation, eight of which are usual; rounds of samples are
  * limited by the time. */
-static void slow_rounds_are_short(void **state)
+static void rounds_shrink_with_the_rays_of_a_mutation(void **state)
 {
 	(void)state;
-	uint64_t usual = round_of(slow(PLAN_CHAINS, 2, 1, 8));
-	assert_int_equal(usual, round_of(slow(PLAN_CHAINS, 2, 0, 0)));
+	uint64_t usual = round_mutations(make_slow_plan(PLAN_CHAINS, 2, 1, 8));
+	assert_int_equal(usual, round_mutations(make_slow_plan(PLAN_CHAINS, 2, 0, 0)));
 	for (double rays = 8; rays < 2000; rays *= 1.7) {
-		struct plan p = slow(PLAN_CHAINS, 2, 1, rays);
+		struct plan p = make_slow_plan(PLAN_CHAINS, 2, 1, rays);
 		double round = (double)plan_round_mutations(&p);
 		assert_true(round * rays <= 8 * (double)usual && (round + p.chains) * rays > 8 * (double)usual);
 	}
-	uint64_t many = slow(PLAN_SAMPLES, 1000, 1, 8).epoch;
+	uint64_t many = make_slow_plan(PLAN_SAMPLES, 1000, 1, 8).epoch;
 	assert_true(many >= 80);
-	assert_int_equal(slow(PLAN_SAMPLES, 1000, 1, 80).epoch, many / 10);
+	assert_int_equal(make_slow_plan(PLAN_SAMPLES, 1000, 1, 80).epoch, many / 10);
 }
 
 /* If two threads cannot compute a round of sixteen samples per pixel within the time limit, the round has fewer groups
  * and as many leases. */
-static void a_round_fits_into_the_time(void **state)
+static void slow_round_has_fewer_groups(void **state)
 {
 	(void)state;
-	struct plan usual = slow(PLAN_SAMPLES, 2, 1, 10), p = slow(PLAN_SAMPLES, 2, 1, 200);
+	struct plan usual = make_slow_plan(PLAN_SAMPLES, 2, 1, 10), p = make_slow_plan(PLAN_SAMPLES, 2, 1, 200);
 	assert_int_equal(usual.groups, 16);
 	assert_int_equal(usual.parts, 4);
 	assert_int_equal(p.groups, 9); /* 40,000 samples, 4,096 pixels */
 	assert_int_equal(p.parts, 7);
-	assert_int_equal(slow(PLAN_SAMPLES, 2, 1, 1e5).groups, 4);
-	assert_int_equal(slow(PLAN_SAMPLES, 2, 1, 1e5).parts, 16);
-	assert_int_equal(slow(PLAN_SAMPLES, 0, 1, 1e5).groups, 16);
-	assert_int_equal(slow(PLAN_CHAINS, 2, 1, 1e5).groups, 16);
-	struct plan_request r = request(PLAN_SAMPLES, "");
-	char text[PLAN_TEXT];
+	assert_int_equal(make_slow_plan(PLAN_SAMPLES, 2, 1, 1e5).groups, 4);
+	assert_int_equal(make_slow_plan(PLAN_SAMPLES, 2, 1, 1e5).parts, 16);
+	assert_int_equal(make_slow_plan(PLAN_SAMPLES, 0, 1, 1e5).groups, 16);
+	assert_int_equal(make_slow_plan(PLAN_CHAINS, 2, 1, 1e5).groups, 16);
+	struct plan_request r = make_request(PLAN_SAMPLES, "");
+	char text[PLAN_TEXT_MAX];
 	r.spp = 0;
 	r.seconds = 2;
 	r.rays = (struct plan_rays){1, 1e5};
 	p = make_plan(&r);
-	plan_options(&p, 1, text, sizeof text);
+	plan_print_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --groups 4 --parts 16 "));
 	r.groups = 12;
 	assert_int_equal(make_plan(&r).groups, 12);
@@ -248,11 +249,11 @@ static void a_round_fits_into_the_time(void **state)
 
 /* Rays are counted only where a time limit or a target error ends the job and the plan leaves something to be decided.
  */
-static void rays_are_counted_where_time_counts(void **state)
+static void rays_are_measured_only_where_the_plan_depends_on_them(void **state)
 {
 	(void)state;
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
-		struct plan_request r = request((enum plan_kind)kind, "");
+		struct plan_request r = make_request((enum plan_kind)kind, "");
 		assert_false(plan_wants_rays(&r));
 		r.seconds = 1;
 		assert_true(plan_wants_rays(&r));
@@ -271,23 +272,23 @@ static void rays_are_counted_where_time_counts(void **state)
 
 /* More leases for more threads: the same chains, divided finer. Numbers of parts that cannot be had are refused;
  * defaults are not mentioned. */
-static void parts_are_asked_for(void **state)
+static void requested_parts_are_used_or_refused(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	struct plan p;
 	struct error e;
-	char text[PLAN_TEXT];
+	char text[PLAN_TEXT_MAX];
 	r.width = r.height = 1024;
 	p = make_plan(&r);
 	assert_int_equal(p.parts, 4);
-	plan_options(&p, 1, text, sizeof text);
+	plan_print_options(&p, 1, text, sizeof text);
 	assert_null(strstr(text, "--parts"));
 	r.parts = 64;
 	p = make_plan(&r);
 	assert_int_equal(p.groups * p.parts, 1024);
 	assert_int_equal(p.chains, 1024);
-	plan_options(&p, 1, text, sizeof text);
+	plan_print_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --groups 16 --parts 64 "));
 	r.chains = 1024;
 	r.parts = 48;
@@ -298,14 +299,14 @@ static void parts_are_asked_for(void **state)
 	r.parts = 65;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	/* A lease with more chains than a message can carry is refused, and the sentence says what to do. */
-	r.chains = PLAN_MAX_CHAINS;
+	r.chains = PLAN_CHAINS_MAX;
 	r.parts = 64;
 	r.groups = 1;
-	assert_int_equal(make_plan(&r).chains, PLAN_MAX_CHAINS);
+	assert_int_equal(make_plan(&r).chains, PLAN_CHAINS_MAX);
 	r.parts = 32;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "32768 per lease, of at most 16384: choose more groups or parts"));
-	r = request(PLAN_SAMPLES, "");
+	r = make_request(PLAN_SAMPLES, "");
 	r.parts = 33;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.parts = 32;
@@ -324,7 +325,7 @@ static void leases_take_twenty_seconds(void **state)
 	(void)state;
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++)
 		for (double speed = 1000; speed < 2e7; speed *= 3.1) {
-			struct plan_request r = request((enum plan_kind)kind, "");
+			struct plan_request r = make_request((enum plan_kind)kind, "");
 			r.width = 1280;
 			r.height = 720;
 			r.spp = 1 << 24;
@@ -334,14 +335,14 @@ static void leases_take_twenty_seconds(void **state)
 			p = make_plan(&r);
 			double seconds = (double)lease_work(&p) / speed;
 			assert_int_equal(plan_lease_mutations(&p), lease_work(&p)); /* 720 rows in 4 parts */
-			bool least = p.epoch == 1; /* a strip cannot be divided further */
-			assert_true(seconds < 20 * 1.4143 || least);
+			bool is_min_epoch = p.epoch == 1; /* a strip cannot be divided further */
+			assert_true(seconds < 20 * 1.4143 || is_min_epoch);
 			assert_true(seconds > 20 / 1.4143 - 1e-9);
 			assert_true((p.epoch & (p.epoch - 1)) == 0);
-			assert_true(ends_with_rule(&r, "20 s for a thread"));
+			assert_true(epoch_text_has(&r, "20 s for a thread"));
 			assert_false(plan_wants_speed(&r, &p));
 		}
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.width = r.height = 1024;
 	r.spp = 1 << 20;
 	uint32_t differ = 0;
@@ -358,15 +359,15 @@ static void leases_take_twenty_seconds(void **state)
 static void short_jobs_ask_for_no_pilot(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.width = 320;
 	r.height = 180;
 	struct plan p = make_plan(&r), q;
 	assert_false(plan_wants_speed(&r, &p));
-	assert_true(ends_with_rule(&r, "for 8 rounds"));
-	struct plan_request one = request(PLAN_SAMPLES, "");
+	assert_true(epoch_text_has(&r, "for 8 rounds"));
+	struct plan_request one = make_request(PLAN_SAMPLES, "");
 	assert_int_equal(make_plan(&one).rounds, 1);
-	assert_true(ends_with_rule(&one, "for at most 8 rounds"));
+	assert_true(epoch_text_has(&one, "for at most 8 rounds"));
 	r.speed = 5000;
 	q = make_plan(&r);
 	assert_memory_equal(&p, &q, sizeof p);
@@ -377,20 +378,20 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	assert_true(make_plan(&r).epoch < p.epoch);
 	r.speed = 1e6;
 	assert_int_equal(make_plan(&r).epoch, p.epoch);
-	assert_true(ends_with_rule(&r, "size of the film"));
+	assert_true(epoch_text_has(&r, "size of the film"));
 	r.epoch = 77;
 	p = make_plan(&r);
 	assert_int_equal(p.epoch, 77);
 	assert_false(plan_wants_speed(&r, &p));
-	assert_true(ends_with_rule(&r, ""));
+	assert_true(epoch_text_has(&r, ""));
 }
 
 /* 11 MB of tiles per lease: at 0.1 MB/s per thread an epoch lasts 110 s or more; at 10 MB/s it stays at 20 s. */
-static void a_bandwidth_makes_epochs_longer(void **state)
+static void low_bandwidth_lengthens_epochs(void **state)
 {
 	(void)state;
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
-		struct plan_request r = request((enum plan_kind)kind, "");
+		struct plan_request r = make_request((enum plan_kind)kind, "");
 		r.width = 1280;
 		r.height = 720;
 		r.spp = 1 << 20;
@@ -402,7 +403,7 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 		struct plan p = make_plan(&r);
 		double seconds = (double)lease_work(&p) / r.speed;
 		assert_true(seconds >= 12 * 1280 * 720 / 1e5 && seconds < 2.2 * 12 * 1280 * 720 / 1e5);
-		assert_true(ends_with_rule(&r, "MB of tiles per lease"));
+		assert_true(epoch_text_has(&r, "MB of tiles per lease"));
 		r.spp = 32; /* not longer than the job */
 		assert_true(make_plan(&r).rounds == 1);
 		r.speed = 0; /* the speed is unknown: a default is assumed */
@@ -414,7 +415,7 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 }
 
 /* Systematic resampling by hand: with 4 seeds and a total of 4, the marks are at u, 1 + u, 2 + u and 3 + u. */
-static void seeds_stand_at_even_marks(void **state)
+static void seeds_are_resampled_systematically(void **state)
 {
 	(void)state;
 	struct plan p = {.groups = 2, .parts = 1, .bootstrap = 8};
@@ -435,10 +436,10 @@ static void seeds_stand_at_even_marks(void **state)
 	assert_true(two[0] == 1 && two[1] == 3);
 }
 
-static void the_least_bound_counts_in_whole_rounds(void **state)
+static void smallest_bound_counts_in_whole_rounds(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	struct plan p;
 	struct error e;
 	r.chains = 16;
@@ -459,10 +460,10 @@ static void the_least_bound_counts_in_whole_rounds(void **state)
 	assert_int_equal(p.rounds, 7);
 }
 
-static void limits_are_held(void **state)
+static void contradictory_plans_are_refused(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_SAMPLES, "");
+	struct plan_request r = make_request(PLAN_SAMPLES, "");
 	struct plan p, q;
 	struct error e;
 	r.border = 3;
@@ -478,21 +479,21 @@ static void limits_are_held(void **state)
 	assert_int_equal(plan_check(&q, &e), -EINVAL);
 }
 
-static void unseen_light_of_a_plan(void **state)
+static void unseen_light_is_interpolated_and_checked(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_SAMPLES, "");
+	struct plan_request r = make_request(PLAN_SAMPLES, "");
 	struct plan p;
 	struct error e;
-	for (int i = 0; i < PLAN_UNSEEN; i++)
-		r.unseen.at[i] = PLAN_UNSEEN - 1 - i;
+	for (int i = 0; i < PLAN_UNSEEN_COUNT; i++)
+		r.unseen.mean_squares[i] = PLAN_UNSEEN_COUNT - 1 - i;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	assert_true(plan_unseen_after(&p, 1) == 11 && plan_unseen_after(&p, 0.25) == 11);
 	assert_true(plan_unseen_after(&p, 64) == 8 && plan_unseen_after(&p, 128) == 7.5);
 	assert_true(plan_unseen_after(&p, 0x1p22) == 0 && plan_unseen_after(&p, 0x1p60) == 0);
 	const double bad[] = {-1e-9, NAN, INFINITY};
 	for (int i = 0; i < 3; i++) {
-		r.unseen.at[5] = bad[i];
+		r.unseen.mean_squares[5] = bad[i];
 		assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	}
 }
@@ -500,22 +501,22 @@ static void unseen_light_of_a_plan(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
-		cmocka_unit_test(samples_notice_time_and_error),
-		cmocka_unit_test(a_time_also_ends_what_is_counted),
-		cmocka_unit_test(a_bootstrap_follows_the_time),
-		cmocka_unit_test(a_slow_bootstrap_is_short),
-		cmocka_unit_test(slow_rounds_are_short),
-		cmocka_unit_test(a_round_fits_into_the_time),
-		cmocka_unit_test(rays_are_counted_where_time_counts),
-		cmocka_unit_test(parts_are_asked_for),
+		cmocka_unit_test(unbounded_rounds_follow_the_film_size),
+		cmocka_unit_test(rounds_of_samples_are_short_enough_for_their_limit),
+		cmocka_unit_test(time_limit_also_bounds_rounds_of_counted_samples),
+		cmocka_unit_test(bootstrap_shrinks_with_the_time_limit),
+		cmocka_unit_test(slow_bootstrap_has_fewer_samples),
+		cmocka_unit_test(rounds_shrink_with_the_rays_of_a_mutation),
+		cmocka_unit_test(slow_round_has_fewer_groups),
+		cmocka_unit_test(rays_are_measured_only_where_the_plan_depends_on_them),
+		cmocka_unit_test(requested_parts_are_used_or_refused),
 		cmocka_unit_test(leases_take_twenty_seconds),
 		cmocka_unit_test(short_jobs_ask_for_no_pilot),
-		cmocka_unit_test(a_bandwidth_makes_epochs_longer),
-		cmocka_unit_test(seeds_stand_at_even_marks),
-		cmocka_unit_test(the_least_bound_counts_in_whole_rounds),
-		cmocka_unit_test(limits_are_held),
-		cmocka_unit_test(unseen_light_of_a_plan),
+		cmocka_unit_test(low_bandwidth_lengthens_epochs),
+		cmocka_unit_test(seeds_are_resampled_systematically),
+		cmocka_unit_test(smallest_bound_counts_in_whole_rounds),
+		cmocka_unit_test(contradictory_plans_are_refused),
+		cmocka_unit_test(unseen_light_is_interpolated_and_checked),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static struct plan_request request(enum plan_kind kind, const char *mixture)
+static struct plan_request make_request(enum plan_kind kind, const char *mixture)
 {
 	struct plan_request r = {
 		.integrator = "hslt", .kind = kind, .width = 64, .height = 32, .max_depth = 8, .spp = 16};
@@ -18,10 +18,10 @@ static struct plan_request request(enum plan_kind kind, const char *mixture)
 	return r;
 }
 
-static void a_mixture_is_kept_and_told(void **state)
+static void mixture_appears_in_texts_of_the_plan(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "independent=0.05,hslt@b2c0=0.95");
+	struct plan_request r = make_request(PLAN_CHAINS, "independent=0.05,hslt@b2c0=0.95");
 	struct plan p;
 	struct error e;
 	char text[1024];
@@ -29,27 +29,27 @@ static void a_mixture_is_kept_and_told(void **state)
 	assert_string_equal(p.mutations, r.mixture);
 	plan_describe(&p, text, sizeof text);
 	assert_non_null(strstr(text, "mutations independent=0.05,hslt@b2c0=0.95;"));
-	plan_options(&p, 1, text, sizeof text);
+	plan_print_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --mutations independent=0.05,hslt@b2c0=0.95 --chains"));
 	*r.mixture = 0;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
-	plan_options(&p, p.rounds, text, sizeof text);
+	plan_print_options(&p, p.rounds, text, sizeof text);
 	assert_true(strstr(text, "--mutations") == strstr(text, "--mutations 32768"));
-	plan_options(&p, 0, text, sizeof text);
+	plan_print_options(&p, 0, text, sizeof text);
 	assert_null(strstr(text, "--mutations 0"));
 }
 
-static void settings_and_effects_are_kept_and_told(void **state)
+static void settings_and_effects_appear_in_options(void **state)
 {
 	(void)state;
-	struct plan_request r = request(PLAN_CHAINS, "hslt=1");
+	struct plan_request r = make_request(PLAN_CHAINS, "hslt=1");
 	struct plan p;
 	struct error e;
-	char text[PLAN_TEXT];
+	char text[PLAN_TEXT_MAX];
 	strcpy(r.accuracy, "tolerance=1e-05");
 	strcpy(r.effects, "-dispersion,+aperture");
 	assert_int_equal(plan_make(&r, &p, &e), 0);
-	plan_options(&p, 1, text, sizeof text);
+	plan_print_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --set tolerance=1e-05 --effects=-dispersion,+aperture --chains"));
 	p.accuracy[40] = 'x'; /* bytes after the end of the text */
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
@@ -60,7 +60,7 @@ static void settings_and_effects_are_kept_and_told(void **state)
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
 }
 
-static void other_texts_are_none(void **state)
+static void malformed_mixtures_are_refused(void **state)
 {
 	(void)state;
 	static const char *const bad[] = {",",
@@ -83,20 +83,20 @@ static void other_texts_are_none(void **state)
 	struct plan p;
 	struct error e;
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-		struct plan_request r = request(PLAN_CHAINS, bad[i]);
+		struct plan_request r = make_request(PLAN_CHAINS, bad[i]);
 		assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 		assert_non_null(strstr(e.text, "mixture"));
 	}
-	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan_request r = make_request(PLAN_CHAINS, "");
 	memset(r.mixture, 'a', sizeof r.mixture); /* no terminating zero */
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.mixture[sizeof r.mixture - 1] = 0;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	memcpy(p.mutations, "a\0b", 4); /* bytes after the end of the text */
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
-	r = request(PLAN_SAMPLES, "a");
+	r = make_request(PLAN_SAMPLES, "a");
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
-	r = request(PLAN_SAMPLES, "");
+	r = make_request(PLAN_SAMPLES, "");
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 }
 
@@ -121,9 +121,9 @@ static void entries_are_counted_and_named(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_mixture_is_kept_and_told),
-		cmocka_unit_test(settings_and_effects_are_kept_and_told),
-		cmocka_unit_test(other_texts_are_none),
+		cmocka_unit_test(mixture_appears_in_texts_of_the_plan),
+		cmocka_unit_test(settings_and_effects_appear_in_options),
+		cmocka_unit_test(malformed_mixtures_are_refused),
 		cmocka_unit_test(entries_are_counted_and_named),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -66,11 +66,11 @@ static struct batch chain_batch(const struct plan *p)
 	b.strategy_count = 2;
 	for (uint64_t i = 0; i < STRATEGY_COUNTERS; i++) {
 		bool fails = i >= STRATEGY_FAIL_FIRST;
-		b.strategy[0][i] = fails ? 1 : 30 - i;
-		b.strategy[1][i] = fails ? 2 : i > STRATEGY_ACCEPTED ? UINT64_C(1) << (50 + i) : 40 - i;
+		b.strategies[0][i] = fails ? 1 : 30 - i;
+		b.strategies[1][i] = fails ? 2 : i > STRATEGY_ACCEPTED ? UINT64_C(1) << (50 + i) : 40 - i;
 	}
-	b.strategy[0][STRATEGY_ACCEPTED] = 5;
-	b.strategy[1][STRATEGY_ACCEPTED] = 6;
+	b.strategies[0][STRATEGY_ACCEPTED] = 5;
+	b.strategies[1][STRATEGY_ACCEPTED] = 6;
 	b.counters[COUNT_ACCEPTED] = 12;
 	b.tile_count = 2;
 	b.tiles = mem_alloc(2, sizeof *b.tiles);
@@ -100,14 +100,14 @@ static void pack_and_read(const struct batch *b, const struct plan *p, struct en
 	struct error e;
 	assert_int_equal(batch_pack(b, p, &frame, &size, &e), 0);
 	frame_reader_init(r, (struct frame_limits){1 << 20, batch_payload_max(p)});
-	assert_int_equal(frame_reader_take(r, frame, size, &used, &e), 1);
+	assert_int_equal(frame_reader_feed(r, frame, size, &used, &e), 1);
 	assert_int_equal(used, size);
 	assert_int_equal(envelope_unpack(env, r->header.bytes, r->header.size, &e), 0);
 	assert_int_equal(env->message->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
 	mem_free(frame);
 }
 
-static void a_batch_travels(void **state)
+static void batch_is_unpacked_as_it_was_packed(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -123,7 +123,7 @@ static void a_batch_travels(void **state)
 	assert_same_key(&back.key, &b.key);
 	assert_memory_equal(back.counters, b.counters, sizeof b.counters);
 	assert_int_equal(back.strategy_count, 2);
-	assert_memory_equal(back.strategy, b.strategy, sizeof b.strategy);
+	assert_memory_equal(back.strategies, b.strategies, sizeof b.strategies);
 	assert_true(back.independent_sum == b.independent_sum && back.independent_square == b.independent_square);
 	assert_int_equal(back.tile_count, 2);
 	for (uint32_t i = 0; i < 2; i++) {
@@ -152,7 +152,7 @@ static void a_batch_travels(void **state)
 	batch_fini(&b);
 }
 
-static void strategies_are_the_plans(void **state)
+static void number_of_strategies_must_match_the_plan(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -188,7 +188,7 @@ static void strategies_are_the_plans(void **state)
 }
 
 /* The film has four tiles: a header with more is refused before any tile is read. */
-static void tiles_are_counted_first(void **state)
+static void number_of_tiles_is_checked_first(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -213,7 +213,7 @@ static void tiles_are_counted_first(void **state)
 	batch_fini(&b);
 }
 
-static void memory_may_end_anywhere(void **state)
+static void any_failed_allocation_is_reported(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -236,7 +236,7 @@ static void memory_may_end_anywhere(void **state)
 }
 
 /* There are as many classes and moments as the plan has, and impossible values are refused. */
-static void moments_are_the_plans(void **state)
+static void moments_must_match_the_plan(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -244,7 +244,7 @@ static void moments_are_the_plans(void **state)
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
-	uint64_t tiles = batch_film_tiles(&p), sequences = batch_sequences(&p), count = b.moment_count;
+	uint64_t tiles = batch_film_tile_count(&p), sequences = batch_sequence_count(&p), count = b.moment_count;
 	assert_int_equal(sequences, b.state_count);
 	assert_int_equal(count, (sequences + 1) * tiles);
 	pack_and_read(&b, &p, &env, &r);
@@ -267,11 +267,11 @@ static void moments_are_the_plans(void **state)
 	frame_reader_fini(&r);
 	const float epoch = (float)p.epoch, bad[] = {-1e-30f, NAN, INFINITY, epoch * 1.001f};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		for (uint64_t at = 0; at < count; at += count - 1) { /* a first moment, a second one */
-			float kept = b.moments[at];
-			b.moments[at] = bad[i];
+		for (uint64_t index = 0; index < count; index += count - 1) { /* a first moment, a second one */
+			float original = b.moments[index];
+			b.moments[index] = bad[i];
 			assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
-			b.moments[at] = kept;
+			b.moments[index] = original;
 		}
 	for (uint64_t t = 0; t < tiles; t++) /* a chain's whole time, and not more */
 		b.moments[t] = epoch / (float)tiles;
@@ -305,18 +305,18 @@ static void moments_are_the_plans(void **state)
 	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
 	batch_fini(&b);
 	p.chains = 8 * (SEQUENCES_MAX / 8 + 1);
-	assert_int_equal(batch_sequences(&p), 1);
+	assert_int_equal(batch_sequence_count(&p), 1);
 	p.kind = PLAN_SAMPLES;
-	assert_int_equal(batch_sequences(&p), 0);
+	assert_int_equal(batch_sequence_count(&p), 0);
 	assert_int_equal(batch_moment_count(&p, LEASE_RENDER), 0);
 }
 
 /* No chain state is longer than that of the longest path, whatever a worker sends. */
-static void states_are_as_long_as_paths(void **state)
+static void size_of_a_chain_state_is_limited_by_path_length(void **state)
 {
 	(void)state;
 	static const struct {
-		uint32_t max_depth, most;
+		uint32_t max_depth, max_size;
 	} plans[] = {{1, 320}, {10, 1472}, {32, 4288}, {41, CHAIN_STATE_MAX}, {128, CHAIN_STATE_MAX}};
 	struct plan p = chain_plan();
 	struct batch b = chain_batch(&p);
@@ -326,16 +326,16 @@ static void states_are_as_long_as_paths(void **state)
 		struct chain_state *s = &b.states[1];
 		p.max_depth = plans[i].max_depth;
 		mem_free(s->bytes);
-		*s = (struct chain_state){mem_alloc(plans[i].most + 1, 1), plans[i].most};
+		*s = (struct chain_state){mem_alloc(plans[i].max_size + 1, 1), plans[i].max_size};
 		assert_int_equal(batch_check(&b, &p, &e), 0);
-		assert_int_equal(chain_states_max(&p), 64 * (uint64_t)(plans[i].most + 48));
+		assert_int_equal(chain_states_max_bytes(&p), 64 * (uint64_t)(plans[i].max_size + 48));
 		s->size++;
 		assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
 	}
 	batch_fini(&b);
 }
 
-static void weights_travel(void **state)
+static void weights_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
@@ -374,8 +374,8 @@ static void weights_travel(void **state)
 	batch_fini(&b);
 }
 
-static struct grant grant_travels(const struct lease_key *k, const uint64_t *seeds, const struct chain_state *states,
-				  uint32_t count)
+static struct grant pack_and_unpack_grant(const struct lease_key *k, const uint64_t *seeds,
+					  const struct chain_state *states, uint32_t count)
 {
 	struct frame_reader r;
 	struct envelope env;
@@ -385,7 +385,7 @@ static struct grant grant_travels(const struct lease_key *k, const uint64_t *see
 	size_t size, used;
 	assert_int_equal(grant_pack(k, seeds, states, count, &frame, &size, &e), 0);
 	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 20});
-	assert_int_equal(frame_reader_take(&r, frame, size, &used, &e), 1);
+	assert_int_equal(frame_reader_feed(&r, frame, size, &used, &e), 1);
 	assert_int_equal(envelope_unpack(&env, r.header.bytes, r.header.size, &e), 0);
 	assert_int_equal(grant_unpack(&g, env.message->lease_grant, r.payload.bytes, r.payload.size, &e), 0);
 	assert_same_key(&g.key, k);
@@ -395,39 +395,39 @@ static struct grant grant_travels(const struct lease_key *k, const uint64_t *see
 	return g;
 }
 
-static void grants_travel(void **state)
+static void grants_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
 	struct lease_key k = {1, LEASE_RENDER, 2, 3, UINT64_MAX};
 	uint64_t seeds[3] = {0, UINT64_MAX, 5};
 	uint8_t bytes[] = "abc";
 	struct chain_state states[2] = {{NULL, 0}, {bytes, 3}};
-	struct grant g = grant_travels(&k, seeds, NULL, 3);
+	struct grant g = pack_and_unpack_grant(&k, seeds, NULL, 3);
 	assert_true(g.chain_count == 3 && g.states == NULL && g.seeds[1] == UINT64_MAX);
 	grant_fini(&g);
-	g = grant_travels(&k, NULL, states, 2);
+	g = pack_and_unpack_grant(&k, NULL, states, 2);
 	assert_true(g.chain_count == 2 && g.seeds == NULL && g.states[0].size == 0 && g.states[1].size == 3);
 	assert_memory_equal(g.states[1].bytes, "abc", 3);
 	grant_fini(&g);
-	g = grant_travels(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}},
-			  2); /* of the first frame on a connection, and of a frame without payload */
+	g = pack_and_unpack_grant(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}},
+				  2); /* of the first frame on a connection, and of a frame without payload */
 	assert_true(g.chain_count == 2 && g.states[0].size == 0 && g.states[1].size == 0);
 	grant_fini(&g);
-	g = grant_travels(&k, NULL, NULL, 0);
+	g = pack_and_unpack_grant(&k, NULL, NULL, 0);
 	assert_true(g.chain_count == 0);
 	grant_fini(&g);
 }
 
-static void plans_travel(void **state)
+static void plans_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan(), back;
 	struct error e;
 	Farm__Plan m;
 	for (int unseen = 0; unseen < 2; unseen++) {
-		p.unseen.at[PLAN_UNSEEN - 1] = 1e-6 * unseen;
+		p.unseen.mean_squares[PLAN_UNSEEN_COUNT - 1] = 1e-6 * unseen;
 		plan_to_wire(&p, &m);
-		assert_int_equal(m.n_unseen, unseen ? PLAN_UNSEEN : 0);
+		assert_int_equal(m.n_unseen, unseen ? PLAN_UNSEEN_COUNT : 0);
 		assert_int_equal(plan_from_wire(&m, &back, &e), 0);
 		assert_memory_equal(&p, &back, sizeof p);
 	}
@@ -455,22 +455,22 @@ static void plans_travel(void **state)
 				       .speed = 31000.5,
 				       .rays = {8123.25, 88.5},
 				       .unseen = {{0.5, 0.25}}},
-			    again;
+			    unpacked_request;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);
-	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
-	assert_memory_equal(&request, &again, sizeof request);
+	assert_int_equal(plan_request_from_wire(&rm, &unpacked_request, &e), 0);
+	assert_memory_equal(&request, &unpacked_request, sizeof request);
 	const double speeds[] = {-1, 2.1e7, NAN};
 	for (int i = 0; i < 3; i++) {
 		rm.speed = speeds[i];
-		assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+		assert_int_equal(plan_request_from_wire(&rm, &unpacked_request, &e), -EBADMSG);
 	}
 	rm.speed = 0;
 	for (int i = 0; i < 2; i++) {
 		const double bad[] = {-1, INFINITY, NAN};
 		for (int k = 0; k < 3; k++) {
 			*(i ? &rm.step_rays : &rm.bootstrap_rays) = bad[k];
-			assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+			assert_int_equal(plan_request_from_wire(&rm, &unpacked_request, &e), -EBADMSG);
 		}
 		*(i ? &rm.step_rays : &rm.bootstrap_rays) = 0;
 	}
@@ -487,7 +487,7 @@ static void plans_travel(void **state)
 		m.mutations = mixtures[i];
 		assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
 		rm.mixture = mixtures[i];
-		assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+		assert_int_equal(plan_request_from_wire(&rm, &unpacked_request, &e), -EBADMSG);
 	}
 	longest[PLAN_MUTATIONS_MAX - 1] = 0;
 	plan_to_wire(&p, &m);
@@ -498,15 +498,15 @@ static void plans_travel(void **state)
 /* The most chains that a plan allows in a lease: the longest seeds, and the sizes of chain states, fit into a header of
  * 1 MB, the limit of a coordinator. A worker accepts four times as much, and 256 MB of states: 16 KB each, more than
  * any state has. */
-static void the_largest_lease_travels(void **state)
+static void largest_lease_fits_into_its_message(void **state)
 {
 	(void)state;
-	enum { COUNT = PLAN_MAX_LEASE_CHAINS, STATE = 1 << 9 };
+	enum { COUNT = PLAN_LEASE_CHAINS_MAX, STATE = 1 << 9 };
 	struct lease_key k = {.job = UINT64_MAX, .kind = LEASE_RENDER, .group = 63, .part = 63, .epoch = UINT64_MAX};
 	uint64_t *seeds = mem_alloc(COUNT, sizeof *seeds);
 	for (int i = 0; i < COUNT; i++)
 		seeds[i] = UINT64_MAX;
-	struct grant g = grant_travels(&k, seeds, NULL, COUNT);
+	struct grant g = pack_and_unpack_grant(&k, seeds, NULL, COUNT);
 	assert_int_equal(g.chain_count, COUNT);
 	grant_fini(&g);
 	mem_free(seeds);
@@ -514,7 +514,7 @@ static void the_largest_lease_travels(void **state)
 	struct batch b = chain_batch(&p);
 	struct envelope env;
 	struct frame_reader r;
-	states_fini(b.states, b.state_count);
+	chain_states_free(b.states, b.state_count);
 	b.state_count = COUNT;
 	b.states = mem_alloc(COUNT, sizeof *b.states);
 	for (int i = 0; i < COUNT; i++)
@@ -529,16 +529,16 @@ static void the_largest_lease_travels(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_batch_travels),
-		cmocka_unit_test(tiles_are_counted_first),
-		cmocka_unit_test(memory_may_end_anywhere),
-		cmocka_unit_test(moments_are_the_plans),
-		cmocka_unit_test(states_are_as_long_as_paths),
-		cmocka_unit_test(weights_travel),
-		cmocka_unit_test(grants_travel),
-		cmocka_unit_test(the_largest_lease_travels),
-		cmocka_unit_test(plans_travel),
-		cmocka_unit_test(strategies_are_the_plans),
+		cmocka_unit_test(batch_is_unpacked_as_it_was_packed),
+		cmocka_unit_test(number_of_tiles_is_checked_first),
+		cmocka_unit_test(any_failed_allocation_is_reported),
+		cmocka_unit_test(moments_must_match_the_plan),
+		cmocka_unit_test(size_of_a_chain_state_is_limited_by_path_length),
+		cmocka_unit_test(weights_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(grants_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(largest_lease_fits_into_its_message),
+		cmocka_unit_test(plans_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(number_of_strategies_must_match_the_plan),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,7 +38,7 @@ static unsigned char *pack_hello(uint32_t version, size_t *size)
 	return bytes;
 }
 
-static void goes_out_and_comes_in(void **state)
+static void message_is_unpacked_as_it_was_packed(void **state)
 {
 	(void)state;
 	size_t size;
@@ -47,21 +47,21 @@ static void goes_out_and_comes_in(void **state)
 	struct error e;
 	assert_memory_equal(bytes + size - 4, "tail", 4);
 	assert_int_equal(bytes[3], size - 8 - 4);
-	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX, size - FRAME_PREFIX - 4, &e), 0);
+	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX_SIZE, size - FRAME_PREFIX_SIZE - 4, &e), 0);
 	assert_int_equal(env.message->body_case, FARM__ENVELOPE__BODY_HELLO);
 	assert_string_equal(env.message->hello->name, "w1");
 	assert_int_equal(env.message->hello->role, FARM__ROLE__ROLE_WORKER);
 	envelope_fini(&env);
-	for (size_t n = 0; n < size - FRAME_PREFIX - 4;
+	for (size_t n = 0; n < size - FRAME_PREFIX_SIZE - 4;
 	     n++) { /* cut anywhere: refused, or read as another message, but never a crash */
-		if (envelope_unpack(&env, bytes + FRAME_PREFIX, n, &e) == 0)
+		if (envelope_unpack(&env, bytes + FRAME_PREFIX_SIZE, n, &e) == 0)
 			envelope_fini(&env);
 		assert_null(env.blocks);
 	}
 	mem_free(bytes);
 }
 
-static void assert_same(const Farm__Envelope *a, const Farm__Envelope *b)
+static void assert_same_bytes(const Farm__Envelope *a, const Farm__Envelope *b)
 {
 	unsigned char *x, *y;
 	size_t size, other;
@@ -76,19 +76,19 @@ static void assert_same(const Farm__Envelope *a, const Farm__Envelope *b)
 
 /* A message made by the macros has the same bytes as one initialised by protobuf-c's functions: every kind without
  * members, and one kind with some members. */
-static void the_macros_make_the_same_messages(void **state)
+static void macros_make_the_same_messages_as_protobuf(void **state)
 {
 	(void)state;
 	Farm__Envelope m;
-#define EMPTY(BODY, member)                                         \
-	{                                                           \
-		__typeof__(*m.member) empty;                        \
-		farm__envelope__init(&m);                           \
-		farm__##member##__init(&empty);                     \
-		m.body_case = FARM__ENVELOPE__BODY_##BODY;          \
-		m.member = &empty;                                  \
-		assert_same(ENVELOPE(BODY, member), &m);            \
-		assert_same(ENVELOPE_OF(BODY, member, &empty), &m); \
+#define EMPTY(BODY, member)                                               \
+	{                                                                 \
+		__typeof__(*m.member) empty;                              \
+		farm__envelope__init(&m);                                 \
+		farm__##member##__init(&empty);                           \
+		m.body_case = FARM__ENVELOPE__BODY_##BODY;                \
+		m.member = &empty;                                        \
+		assert_same_bytes(ENVELOPE(BODY, member), &m);            \
+		assert_same_bytes(ENVELOPE_OF(BODY, member, &empty), &m); \
 	}
 	EMPTY(HELLO, hello)
 	EMPTY(HELLO_ACK, hello_ack)
@@ -130,32 +130,33 @@ static void the_macros_make_the_same_messages(void **state)
 	chunk.output = output;
 	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 	m.fetch_chunk = &chunk;
-	assert_same(ENVELOPE(FETCH_CHUNK, fetch_chunk, .job = 7, .offset = 1ull << 40, .error = text, .output = output),
-		    &m);
+	assert_same_bytes(
+		ENVELOPE(FETCH_CHUNK, fetch_chunk, .job = 7, .offset = 1ull << 40, .error = text, .output = output),
+		&m);
 }
 
 /* A hello of this version with any bit flipped is never taken for that hello. */
-static void a_changed_hello_is_none(void **state)
+static void changed_hello_is_never_taken_for_a_hello(void **state)
 {
 	(void)state;
 	size_t size;
 	unsigned char *bytes = pack_hello(FARM_VERSION, &size);
 	struct envelope env;
 	struct error e;
-	size_t header = size - FRAME_PREFIX - 4, noticed = 0;
-	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX, header, &e), 0);
+	size_t header = size - FRAME_PREFIX_SIZE - 4, detected_count = 0;
+	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX_SIZE, header, &e), 0);
 	envelope_fini(&env);
 	for (size_t bit = 0; bit < 8 * header; bit++) {
-		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
-		int rc = envelope_unpack(&env, bytes + FRAME_PREFIX, header, &e);
-		noticed += rc == -EILSEQ;
+		bytes[FRAME_PREFIX_SIZE + bit / 8] ^= (unsigned char)(1u << bit % 8);
+		int rc = envelope_unpack(&env, bytes + FRAME_PREFIX_SIZE, header, &e);
+		detected_count += rc == -EILSEQ;
 		if (!rc)
 			assert_true(env.message->body_case != FARM__ENVELOPE__BODY_HELLO ||
 				    env.message->hello->version != FARM_VERSION);
 		envelope_fini(&env);
-		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
+		bytes[FRAME_PREFIX_SIZE + bit / 8] ^= (unsigned char)(1u << bit % 8);
 	}
-	assert_true(noticed > 4 * header); /* the other flips give another message, or none */
+	assert_true(detected_count > 4 * header); /* the other flips give another message, or none */
 	mem_free(bytes);
 }
 
@@ -169,7 +170,7 @@ static int unpack_code(const char *bytes, size_t size)
 }
 
 /* The sender is not at fault. */
-static void memory_is_out(void **state)
+static void lack_of_memory_is_not_the_senders_fault(void **state)
 {
 	(void)state;
 	struct envelope env;
@@ -181,7 +182,7 @@ static void memory_is_out(void **state)
 	assert_null(env.blocks);
 }
 
-static void what_is_not_known_is_refused(void **state)
+static void unknown_fields_are_refused(void **state)
 {
 	(void)state;
 	assert_int_equal(unpack_code("", 0), -EBADMSG);
@@ -195,7 +196,7 @@ static void what_is_not_known_is_refused(void **state)
 }
 
 /* A megabyte of empty strings would take some 60 MB: refused above 16 bytes of memory per byte of message. */
-static void a_bomb_is_defused(void **state)
+static void message_that_expands_too_far_is_refused(void **state)
 {
 	(void)state;
 	enum { INNER = 1 << 20 };
@@ -210,7 +211,7 @@ static void a_bomb_is_defused(void **state)
 }
 
 /* Thousands of small messages may wait, so each is counted by the memory that it takes. */
-static void memory_is_counted(void **state)
+static void memory_of_a_message_is_counted(void **state)
 {
 	(void)state;
 	enum { NAME = 100000 };
@@ -235,33 +236,33 @@ static void memory_is_counted(void **state)
 	free(name);
 }
 
-static void text_is_checked(void **state)
+static void malformed_text_is_refused(void **state)
 {
 	(void)state;
-	assert_true(envelope_text_ok("", 0));
-	assert_true(envelope_text_ok("gr\xc3\xbcn \xf0\x9f\x98\x80", 20));
-	assert_false(envelope_text_ok("abc", 2));
-	assert_false(envelope_text_ok("a\nb", 9));
-	assert_false(envelope_text_ok("a\xc2\x9b"
-				      "b",
-				      9));		   /* a terminal control character */
-	assert_false(envelope_text_ok("\xc0\xaf", 9));	   /* overlong */
-	assert_false(envelope_text_ok("\xed\xa0\x80", 9)); /* a surrogate */
-	assert_false(envelope_text_ok("\xe2\x82", 9));	   /* truncated */
-	assert_false(envelope_text_ok("\xff", 9));
+	assert_true(envelope_text_is_valid("", 0));
+	assert_true(envelope_text_is_valid("gr\xc3\xbcn \xf0\x9f\x98\x80", 20));
+	assert_false(envelope_text_is_valid("abc", 2));
+	assert_false(envelope_text_is_valid("a\nb", 9));
+	assert_false(envelope_text_is_valid("a\xc2\x9b"
+					    "b",
+					    9));		 /* a terminal control character */
+	assert_false(envelope_text_is_valid("\xc0\xaf", 9));	 /* overlong */
+	assert_false(envelope_text_is_valid("\xed\xa0\x80", 9)); /* a surrogate */
+	assert_false(envelope_text_is_valid("\xe2\x82", 9));	 /* truncated */
+	assert_false(envelope_text_is_valid("\xff", 9));
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(goes_out_and_comes_in),
-		cmocka_unit_test(the_macros_make_the_same_messages),
-		cmocka_unit_test(a_changed_hello_is_none),
-		cmocka_unit_test(memory_is_out),
-		cmocka_unit_test(what_is_not_known_is_refused),
-		cmocka_unit_test(a_bomb_is_defused),
-		cmocka_unit_test(memory_is_counted),
-		cmocka_unit_test(text_is_checked),
+		cmocka_unit_test(message_is_unpacked_as_it_was_packed),
+		cmocka_unit_test(macros_make_the_same_messages_as_protobuf),
+		cmocka_unit_test(changed_hello_is_never_taken_for_a_hello),
+		cmocka_unit_test(lack_of_memory_is_not_the_senders_fault),
+		cmocka_unit_test(unknown_fields_are_refused),
+		cmocka_unit_test(message_that_expands_too_far_is_refused),
+		cmocka_unit_test(memory_of_a_message_is_counted),
+		cmocka_unit_test(malformed_text_is_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -25,7 +25,7 @@
 static void expect_end(struct farm *f, enum job_state state, enum job_end end, int code)
 {
 	struct job_status s;
-	assert_true(farm_job(f, 1, 1000, &s));
+	assert_true(farm_job_status(f, 1, 1000, &s));
 	assert_int_equal(s.state, state);
 	assert_int_equal(s.end, end);
 	assert_int_equal(job_exit_code(&s), code);
@@ -34,10 +34,10 @@ static void expect_end(struct farm *f, enum job_state state, enum job_end end, i
 	farm_free(f);
 }
 
-static void by_time(void **state)
+static void job_ends_at_its_time_limit(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   START("rounds=inf seconds=5"),
@@ -52,10 +52,10 @@ static void by_time(void **state)
 	expect_end(f, JOB_DONE, END_TIME, 0);
 }
 
-static void by_error(void **state)
+static void job_ends_at_its_target_error(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -87,10 +87,10 @@ static void by_error(void **state)
 	expect_end(f, JOB_DONE, END_ERROR, 0);
 }
 
-static void bound_before_error(void **state)
+static void time_limit_ends_a_job_above_its_target(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   "[0] submit groups=2 rounds=7 seconds=3 target=0.1 -> j1 submitted, j1 is queued",
@@ -112,10 +112,10 @@ static void bound_before_error(void **state)
 
 /* The warning that chains disagree is given for every bound that ends a job. The message has no effect before the job's
  * end, after a failure, or on other jobs. */
-static void chains_disagree(void **state)
+static void disagreement_of_chains_sets_the_exit_code(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=1 target=0.1"),
 				   "[11] image j1 disagrees -> -",
@@ -125,7 +125,7 @@ static void chains_disagree(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_true(farm_job(f, 1, 1000, &s));
+	assert_true(farm_job_status(f, 1, 1000, &s));
 	assert_int_equal(job_exit_code(&s), 4);
 	transcript_play(f, (const char *const[]){
 				   "[14] image j1 disagrees -> -",
@@ -133,7 +133,7 @@ static void chains_disagree(void **state)
 				   NULL,
 			   });
 	expect_end(f, JOB_DONE, END_MUTATIONS, 5);
-	f = transcript_farm();
+	f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=1"),
 				   "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
@@ -143,10 +143,10 @@ static void chains_disagree(void **state)
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
-static void error_with_the_last_round(void **state)
+static void target_met_by_the_last_round_counts(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=1 target=0.1"),
 				   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
@@ -160,7 +160,7 @@ static void error_with_the_last_round(void **state)
 static void no_light_in_the_bootstrap_ends_the_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -173,10 +173,10 @@ static void no_light_in_the_bootstrap_ends_the_job(void **state)
 
 /* A round has 8 x 8 pixels of 8,000 samples, so two rounds make a million samples. A job with another bound goes on
  * until then. */
-static void black_samples(void **state)
+static void black_image_ends_a_job_without_another_bound(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   START("samples rounds=inf target=0.1 epoch=8000"),
@@ -189,7 +189,7 @@ static void black_samples(void **state)
 			   NULL,
 		   });
 	expect_end(f, JOB_DONE, END_BLACK, 0);
-	f = transcript_farm();
+	f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("samples rounds=1 target=0.1 epoch=80000"),
 				   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
@@ -200,10 +200,10 @@ static void black_samples(void **state)
 	expect_end(f, JOB_DONE, END_MUTATIONS, 4);
 }
 
-static void cannot_be_prepared(void **state)
+static void failed_preparation_fails_the_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=1"),
 				   "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
@@ -215,7 +215,7 @@ static void cannot_be_prepared(void **state)
 static void an_overflown_sum_fails_the_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -227,44 +227,44 @@ static void an_overflown_sum_fails_the_job(void **state)
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
-static struct job_status job_status_of(const struct farm *f, double now)
+static struct job_status read_job_status(const struct farm *f, double now)
 {
 	struct job_status s;
-	assert_true(farm_job(f, 1, now, &s));
+	assert_true(farm_job_status(f, 1, now, &s));
 	return s;
 }
 
-static void near(double a, double b)
+static void expect_near(double a, double b)
 {
 	if (!(fabs(a - b) <= 1e-9 * fabs(b)))
 		fail_msg("%.17g is not %.17g", a, b);
 }
 
-static void progress_and_rate(void **state)
+static void progress_and_rate_follow_merged_mutations(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	/* 1000 bootstrap samples and 10 rounds of 400 mutations */
 	transcript_play(f, (const char *const[]){
 				   START("rounds=10"),
 				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
 				   NULL,
 			   });
-	near(job_status_of(f, 11).progress, 1000.0 / 5000);
-	assert_true(isnan(job_status_of(f, 11).eta));
+	expect_near(read_job_status(f, 11).progress, 1000.0 / 5000);
+	assert_true(isnan(read_job_status(f, 11).eta));
 	transcript_play(f, (const char *const[]){
 				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
 				   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	struct job_status s = job_status_of(f, 15);
-	near(s.progress, 1800.0 / 5000);
-	near(s.rate, 200);
-	near(s.eta, 16);
+	struct job_status s = read_job_status(f, 15);
+	expect_near(s.progress, 1800.0 / 5000);
+	expect_near(s.rate, 200);
+	expect_near(s.eta, 16);
 	assert_int_equal(s.mutations, 800);
 	assert_true(s.started == 10 && s.submitted == 0);
 	transcript_play(f, (const char *const[]){"[15] hold order j1 held by ann -> -", NULL});
-	s = job_status_of(f, 15);
+	s = read_job_status(f, 15);
 	assert_true(isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
 	farm_free(f);
 }
@@ -273,7 +273,7 @@ static void progress_and_rate(void **state)
 static void no_eta_without_leases(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=10"),
 				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
@@ -281,18 +281,18 @@ static void no_eta_without_leases(void **state)
 				   "[15] submit groups=1 priority=5 -> j2 submitted, j2 is queued",
 				   NULL,
 			   });
-	near(job_status_of(f, 15).eta, 36);
+	expect_near(read_job_status(f, 15).eta, 36);
 	transcript_play(f, (const char *const[]){
 				   "[17] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j2 is bootstrap, "
 				   "w1 gets j2 g0 p0 boot",
 				   NULL,
 			   });
-	struct job_status s = job_status_of(f, 17);
+	struct job_status s = read_job_status(f, 17);
 	assert_string_equal(s.waiting, "waits for j2 of higher priority (5)");
 	assert_true(s.rate > 0 && isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
 	farm_free(f);
 	/* The time limit ends the job all the same. */
-	f = transcript_farm();
+	f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=10 seconds=100"),
 				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
@@ -300,18 +300,18 @@ static void no_eta_without_leases(void **state)
 				   "[14] w1 leaves -> -",
 				   NULL,
 			   });
-	s = job_status_of(f, 14);
+	s = read_job_status(f, 14);
 	assert_string_equal(s.waiting, "no worker is connected");
-	near(s.eta, 96);
+	expect_near(s.eta, 96);
 	farm_free(f);
 }
 
 /* Progress in the bootstrap does not predict the end either: a bootstrap may be so short that its rate only measures
  * waiting. */
-static void no_eta_by_bootstrap(void **state)
+static void no_eta_during_the_bootstrap(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=2 rounds=10 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 -> -",
@@ -319,15 +319,15 @@ static void no_eta_by_bootstrap(void **state)
 				   "[5] w1 batch j1 g0 p0 boot -> merge, merged",
 				   NULL,
 			   });
-	struct job_status s = job_status_of(f, 5);
+	struct job_status s = read_job_status(f, 5);
 	assert_true(s.rate > 0 && s.progress > 0 && isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
 	farm_free(f);
 }
 
-static void progress_of_errors(void **state)
+static void progress_towards_a_target_error_never_falls(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   START("rounds=inf target=0.1"),
@@ -337,23 +337,23 @@ static void progress_of_errors(void **state)
 			   NULL,
 		   });
 	/* Twice the target error needs four rounds; when these turn out to be too few, progress does not fall back. */
-	near(job_status_of(f, 13).progress, 1400.0 / 2600);
-	near(job_status_of(f, 13).eta, 1200 / 200.0);
+	expect_near(read_job_status(f, 13).progress, 1400.0 / 2600);
+	expect_near(read_job_status(f, 13).eta, 1200 / 200.0);
 	transcript_play(
 		f, (const char *const[]){
 			   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
 			   "[15] error j1 2 0.9 -> -",
 			   NULL,
 		   });
-	near(job_status_of(f, 15).progress, 1800.0 / 2600);
+	expect_near(read_job_status(f, 15).progress, 1800.0 / 2600);
 	farm_free(f);
 }
 
 /* An estimate below the target whose interval is unknown does not end the job; the next one with an interval does. */
-static void doubtful_looks_end_nothing(void **state)
+static void doubtful_estimate_does_not_end_the_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   START("rounds=inf target=0.1"),
@@ -361,28 +361,28 @@ static void doubtful_looks_end_nothing(void **state)
 			   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
 			   NULL,
 		   });
-	struct event ev = {.kind = EVENT_ERROR_KNOWN,
+	struct event ev = {.kind = EVENT_ERROR_ESTIMATED,
 			   .time = 13.5,
-			   .error_known = {.job = 1,
-					   .rounds = 1,
-					   .rel_error = 0.05,
-					   .rel_mse = 0.002,
-					   .degrees = 2000,
-					   .doubtful = true,
-					   .cpu_seconds = 5}};
+			   .error_estimated = {.job = 1,
+					       .rounds = 1,
+					       .rel_error = 0.05,
+					       .rel_mse = 0.002,
+					       .degrees = 2000,
+					       .doubtful = true,
+					       .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
-	struct job_status s = job_status_of(f, 13.5);
+	struct job_status s = read_job_status(f, 13.5);
 	assert_int_equal(s.state, JOB_RUNNING);
 	assert_true(isnan(s.rel_error) && s.looks->count == 1 && s.looks->looks[0].doubtful);
 	farm_free(f);
 }
 
 /* Once the parts of the error are known, the forecast of common/film replaces the simple rule. */
-static void looks_give_a_forecast(void **state)
+static void estimates_of_the_error_give_a_forecast(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   START("rounds=inf target=0.1"),
@@ -391,21 +391,21 @@ static void looks_give_a_forecast(void **state)
 			   NULL,
 		   });
 	struct event ev = {
-		.kind = EVENT_ERROR_KNOWN,
+		.kind = EVENT_ERROR_ESTIMATED,
 		.time = 13.5,
-		.error_known = {
+		.error_estimated = {
 			.job = 1, .rounds = 1, .rel_error = 0.2, .rel_mse = 0.038, .degrees = 2000, .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
-	struct job_status s = job_status_of(f, 13.5);
+	struct job_status s = read_job_status(f, 13.5);
 	assert_int_equal(s.looks->count, 1);
-	near(s.looks->looks[0].work, 400);
-	near(s.looks->looks[0].cpu_seconds, 5);
-	near(s.looks->looks[0].seconds, 2);
+	expect_near(s.looks->looks[0].work, 400);
+	expect_near(s.looks->looks[0].cpu_seconds, 5);
+	expect_near(s.looks->looks[0].seconds, 2);
 	struct forecast_range error;
-	assert_true(forecast_error(s.looks, &error));
-	near(error.middle, sqrt(0.038));
-	near(error.high, 0.2);
+	assert_true(forecast_current_error(s.looks, &error));
+	expect_near(error.middle, sqrt(0.038));
+	expect_near(error.high, 0.2);
 	/* Half the error needs four times the work: three times the CPU time used so far, at the present rate of 400
 	 * mutations in 2.5 s. */
 	assert_true(fabs(s.halving_cpu.middle / 15 - 1) < 0.1);
@@ -417,17 +417,17 @@ static void looks_give_a_forecast(void **state)
 	farm_free(f);
 }
 
-static void progress_of_time(void **state)
+static void progress_towards_a_time_limit_follows_the_clock(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){START("rounds=inf seconds=20"), NULL});
-	near(job_status_of(f, 15).progress, 5.0 / 20);
-	near(job_status_of(f, 15).eta, 15);
-	near(job_status_of(f, 100).progress, 0.99);
+	expect_near(read_job_status(f, 15).progress, 5.0 / 20);
+	expect_near(read_job_status(f, 15).eta, 15);
+	expect_near(read_job_status(f, 100).progress, 0.99);
 	farm_free(f);
 	/* A round of 400 mutations takes two seconds: the tenth is complete one second after the time limit. */
-	f = transcript_farm();
+	f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START("rounds=inf seconds=20"),
 				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
@@ -435,29 +435,29 @@ static void progress_of_time(void **state)
 				   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	near(job_status_of(f, 15).eta, 16);
+	expect_near(read_job_status(f, 15).eta, 16);
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(by_time),
-		cmocka_unit_test(by_error),
-		cmocka_unit_test(bound_before_error),
-		cmocka_unit_test(chains_disagree),
-		cmocka_unit_test(error_with_the_last_round),
+		cmocka_unit_test(job_ends_at_its_time_limit),
+		cmocka_unit_test(job_ends_at_its_target_error),
+		cmocka_unit_test(time_limit_ends_a_job_above_its_target),
+		cmocka_unit_test(disagreement_of_chains_sets_the_exit_code),
+		cmocka_unit_test(target_met_by_the_last_round_counts),
 		cmocka_unit_test(no_light_in_the_bootstrap_ends_the_job),
-		cmocka_unit_test(black_samples),
-		cmocka_unit_test(cannot_be_prepared),
+		cmocka_unit_test(black_image_ends_a_job_without_another_bound),
+		cmocka_unit_test(failed_preparation_fails_the_job),
 		cmocka_unit_test(an_overflown_sum_fails_the_job),
-		cmocka_unit_test(progress_and_rate),
+		cmocka_unit_test(progress_and_rate_follow_merged_mutations),
 		cmocka_unit_test(no_eta_without_leases),
-		cmocka_unit_test(no_eta_by_bootstrap),
-		cmocka_unit_test(progress_of_errors),
-		cmocka_unit_test(doubtful_looks_end_nothing),
-		cmocka_unit_test(looks_give_a_forecast),
-		cmocka_unit_test(progress_of_time),
+		cmocka_unit_test(no_eta_during_the_bootstrap),
+		cmocka_unit_test(progress_towards_a_target_error_never_falls),
+		cmocka_unit_test(doubtful_estimate_does_not_end_the_job),
+		cmocka_unit_test(estimates_of_the_error_give_a_forecast),
+		cmocka_unit_test(progress_towards_a_time_limit_follows_the_clock),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -25,17 +25,17 @@
 
 #define WORKER(N, NAME) "[3] w" #N " joins A threads=1 name=" NAME " -> -"
 
-static uint32_t wrong_count(const struct farm *f, uint64_t who)
+static uint32_t read_wrong_count(const struct farm *f, uint64_t who)
 {
 	struct worker_status w;
-	assert_true(farm_worker(f, who, &w));
-	return w.wrong;
+	assert_true(farm_worker_status(f, who, &w));
+	return w.wrong_results;
 }
 
-static void without_what_came_before_the_chains_begin_anew(void **state)
+static void chains_begin_anew_where_no_earlier_states_are_left(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -48,7 +48,7 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   NULL,
 			   });
 	struct job_status j;
-	assert_true(farm_job(f, 1, 4, &j));
+	assert_true(farm_job_status(f, 1, 4, &j));
 	assert_non_null(strstr(
 		j.waiting,
 		"a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused"));
@@ -61,24 +61,24 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   NULL,
 			   });
 	struct peer_status p;
-	assert_int_equal(wrong_count(f, 1), 1);
-	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
-	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
-	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
+	assert_int_equal(read_wrong_count(f, 1), 1);
+	assert_int_equal(read_wrong_count(f, 2) + read_wrong_count(f, 3), 0);
+	assert_true(farm_peer_status(f, 2, &p) && p.failures == 0 && p.faults == 0);
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
 	/* The maker of the states is unknown for other leases: of an earlier epoch, of one that no worker holds, or
 	 * without states. */
-	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
-	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
-	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
-	assert_true(farm_job(f, 1, 8, &j));
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
+	assert_true(farm_job_status(f, 1, 8, &j));
 	assert_int_equal(j.state, JOB_RUNNING);
 	farm_free(f);
 }
 
-static void a_third_that_goes_on_is_right(void **state)
+static void third_worker_that_continues_outvotes_the_refusal(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -92,16 +92,16 @@ static void a_third_that_goes_on_is_right(void **state)
 			"#2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
 			NULL,
 		});
-	assert_int_equal(wrong_count(f, 2), 1);
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 3), 0);
+	assert_int_equal(read_wrong_count(f, 2), 1);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 /* With one worker's word against another's nobody is to blame, and the job goes on. */
-static void without_a_third_the_chains_begin_anew(void **state)
+static void chains_begin_anew_if_there_is_no_third_worker(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -114,15 +114,15 @@ static void without_a_third_the_chains_begin_anew(void **state)
 				   "[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
 /* The third worker leaves before it has answered: the first two are asked again. */
-static void a_third_that_leaves(void **state)
+static void first_two_are_asked_again_if_the_third_leaves(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -133,15 +133,15 @@ static void a_third_that_leaves(void **state)
 				   "[6] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
 /* The worker that made the states may continue from them; its result does not count as a third opinion. */
-static void the_maker_goes_on(void **state)
+static void maker_may_continue_from_its_own_states(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -154,16 +154,16 @@ static void the_maker_goes_on(void **state)
 				   "[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
 /* The epoch that ended in the refused states is computed again, by another worker; if its round was complete, the round
  * is open again. */
-static void a_second_refusal_takes_the_epoch_back(void **state)
+static void second_refusal_takes_the_epoch_back(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -177,7 +177,7 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 				   NULL,
 			   });
 	struct job_status j;
-	assert_true(farm_job(f, 1, 6, &j));
+	assert_true(farm_job_status(f, 1, 6, &j));
 	assert_int_equal(j.rounds, 0);
 	assert_int_equal(j.leases_merged, 0);
 	assert_true(j.progress > 0);
@@ -194,17 +194,17 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 				   "[9] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1), 1);
-	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
+	assert_int_equal(read_wrong_count(f, 1), 1);
+	assert_int_equal(read_wrong_count(f, 2) + read_wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 /* The grant crossed with the refusal of states that are now discarded: the worker still has the lease, and nobody is to
  * blame. */
-static void a_late_refusal_is_of_no_consequence(void **state)
+static void late_refusal_of_discarded_states_is_ignored(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -220,17 +220,17 @@ static void a_late_refusal_is_of_no_consequence(void **state)
 				   "[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1), 1);
-	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
+	assert_int_equal(read_wrong_count(f, 1), 1);
+	assert_int_equal(read_wrong_count(f, 2) + read_wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 /* A copy of the lease is at another worker, with the states that are discarded: it is taken back, and what that worker
  * then says about these states comes too late. */
-static void who_has_states_that_are_given_up_loses_them(void **state)
+static void lease_with_discarded_states_is_revoked(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -254,10 +254,10 @@ static void who_has_states_that_are_given_up_loses_them(void **state)
 }
 
 /* A worker that refuses states again and again does not hold up the job for ever. */
-static void after_four_times_the_chains_begin_anew(void **state)
+static void chains_begin_anew_after_four_refusals(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   START,
 				   WORKER(2, "b"),
@@ -284,15 +284,15 @@ static void after_four_times_the_chains_begin_anew(void **state)
 				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 2), 0);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 2), 0);
 	farm_free(f);
 }
 
 /* One worker made several epochs in a row, and so far only the last states were checked. */
-static void one_epoch_after_the_other_is_taken_back(void **state)
+static void unchecked_epochs_are_taken_back_one_by_one(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=2 name=a -> -",
@@ -329,16 +329,16 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 			"[9] w2 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
 			NULL,
 		});
-	assert_int_equal(wrong_count(f, 1), 2);
-	assert_int_equal(wrong_count(f, 2) + wrong_count(f, 3), 0);
+	assert_int_equal(read_wrong_count(f, 1), 2);
+	assert_int_equal(read_wrong_count(f, 2) + read_wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 /* A worker that refuses states which others can continue from is quarantined after three times. */
-static void a_liar_is_quarantined(void **state)
+static void worker_that_refuses_good_states_is_quarantined(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -373,24 +373,24 @@ static void a_liar_is_quarantined(void **state)
 				   "w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
 				   NULL,
 			   });
-	assert_int_equal(wrong_count(f, 1) + wrong_count(f, 3), 0);
+	assert_int_equal(read_wrong_count(f, 1) + read_wrong_count(f, 3), 0);
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(without_what_came_before_the_chains_begin_anew),
-		cmocka_unit_test(a_third_that_goes_on_is_right),
-		cmocka_unit_test(without_a_third_the_chains_begin_anew),
-		cmocka_unit_test(a_third_that_leaves),
-		cmocka_unit_test(the_maker_goes_on),
-		cmocka_unit_test(a_second_refusal_takes_the_epoch_back),
-		cmocka_unit_test(a_late_refusal_is_of_no_consequence),
-		cmocka_unit_test(who_has_states_that_are_given_up_loses_them),
-		cmocka_unit_test(after_four_times_the_chains_begin_anew),
-		cmocka_unit_test(one_epoch_after_the_other_is_taken_back),
-		cmocka_unit_test(a_liar_is_quarantined),
+		cmocka_unit_test(chains_begin_anew_where_no_earlier_states_are_left),
+		cmocka_unit_test(third_worker_that_continues_outvotes_the_refusal),
+		cmocka_unit_test(chains_begin_anew_if_there_is_no_third_worker),
+		cmocka_unit_test(first_two_are_asked_again_if_the_third_leaves),
+		cmocka_unit_test(maker_may_continue_from_its_own_states),
+		cmocka_unit_test(second_refusal_takes_the_epoch_back),
+		cmocka_unit_test(late_refusal_of_discarded_states_is_ignored),
+		cmocka_unit_test(lease_with_discarded_states_is_revoked),
+		cmocka_unit_test(chains_begin_anew_after_four_refusals),
+		cmocka_unit_test(unchecked_epochs_are_taken_back_one_by_one),
+		cmocka_unit_test(worker_that_refuses_good_states_is_quarantined),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,11 +10,11 @@
 
 #include <cmocka.h>
 
-static void failed_lease(void **state)
+static void lease_that_fails_on_three_workers_fails_the_job(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w1 fails j1 g0 p0 e0 out of memory -> -",
 		"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
 		"[4] w1 fails j1 g0 p0 e0 stale -> -",
@@ -29,10 +29,10 @@ static void failed_lease(void **state)
 	});
 }
 
-static void never_a_success(void **state)
+static void job_whose_only_worker_never_succeeds_fails(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -48,10 +48,10 @@ static void never_a_success(void **state)
 }
 
 /* One broken worker, however many leases it holds, fails no job that others could compute. */
-static void out_of_order(void **state)
+static void one_broken_worker_fails_no_job(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=5 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=3 -> -",
 		"[0] w2 joins A threads=1 -> -",
@@ -74,10 +74,10 @@ static void out_of_order(void **state)
 
 /* Leases fail on two workers, which are all: the job fails once a third worker fails, or when one of the two fails
  * again after the pauses. */
-static void out_of_order_all(void **state)
+static void job_fails_if_all_workers_fail(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=5 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w2 joins A threads=1 -> -",
@@ -102,12 +102,12 @@ static void out_of_order_all(void **state)
 }
 
 /* Finished work is not lost to one worker, however often it fails and reconnects: the job waits, and says what for. */
-static void one_bad_worker(void **state)
+static void one_worker_cannot_fail_a_job_with_results(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
-				   START_TWO,
+				   TRANSCRIPT_START_TWO,
 				   "[2] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g1 p0 e1",
 				   "[2] w2 leaves -> -",
 				   "[2] w1 fails j1 g0 p0 e0 sorry -> -",
@@ -135,7 +135,7 @@ static void one_bad_worker(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_true(farm_job(f, 1, 160, &s));
+	assert_true(farm_job_status(f, 1, 160, &s));
 	assert_int_equal(s.state, JOB_RUNNING);
 	assert_string_equal(s.waiting, "no worker can compute it; worker b failed last: sorry");
 	transcript_play(f, (const char *const[]){
@@ -148,10 +148,10 @@ static void one_bad_worker(void **state)
 }
 
 /* Three machines with full disks do not fail a job that a fourth can compute, in whatever order they come. */
-static void three_full_disks(void **state)
+static void full_disks_fail_no_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=5 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 -> -",
@@ -173,7 +173,7 @@ static void three_full_disks(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_true(farm_job(f, 1, 12, &s));
+	assert_true(farm_job_status(f, 1, 12, &s));
 	assert_int_equal(s.state, JOB_BOOTSTRAP);
 	assert_int_equal(s.counts.failures, 6);
 	assert_string_equal(
@@ -185,17 +185,17 @@ static void three_full_disks(void **state)
 				   "[14] w4 batch j1 g1 p0 boot -> merge, merged, w4 gets j1 g2 p0 boot",
 				   NULL,
 			   });
-	assert_true(farm_job(f, 1, 14, &s));
+	assert_true(farm_job_status(f, 1, 14, &s));
 	assert_string_equal(s.waiting, "");
 	farm_free(f);
 }
 
 /* A full disk does not cancel what others report about the job: for its failure, a worker that lacks something counts
  * as absent. */
-static void full_disks_and_a_bad_scene(void **state)
+static void full_disk_does_not_hide_a_bad_scene(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=5 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w2 joins A threads=1 -> -",
@@ -224,10 +224,10 @@ static void full_disks_and_a_bad_scene(void **state)
 
 /* Names are free, certificates are not: where the farm knows three certificates, three names with one certificate do
  * not count as three workers. */
-static void made_up_names(void **state)
+static void names_with_one_certificate_count_as_one_worker(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 certificate=a name=a -> -",
 		"[0] w2 joins A threads=1 certificate=b name=a -> -",
@@ -261,10 +261,10 @@ static void made_up_names(void **state)
 /* A worker whose memory is taken by another scene postpones the lease: this never counts as a failure, and its pause
  * does not grow. Meanwhile the worker gets leases of the jobs that it already has leases of, and no third job is tried;
  * once it has none of those, there is room. */
-static void no_room_now(void **state)
+static void postponed_lease_is_no_failure(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f,
 			(const char *const[]){
 				"[0] submit groups=5 -> j1 submitted, j1 is queued",
@@ -295,15 +295,15 @@ static void no_room_now(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(failed_lease),
-		cmocka_unit_test(never_a_success),
-		cmocka_unit_test(out_of_order),
-		cmocka_unit_test(out_of_order_all),
-		cmocka_unit_test(one_bad_worker),
-		cmocka_unit_test(three_full_disks),
-		cmocka_unit_test(full_disks_and_a_bad_scene),
-		cmocka_unit_test(made_up_names),
-		cmocka_unit_test(no_room_now),
+		cmocka_unit_test(lease_that_fails_on_three_workers_fails_the_job),
+		cmocka_unit_test(job_whose_only_worker_never_succeeds_fails),
+		cmocka_unit_test(one_broken_worker_fails_no_job),
+		cmocka_unit_test(job_fails_if_all_workers_fail),
+		cmocka_unit_test(one_worker_cannot_fail_a_job_with_results),
+		cmocka_unit_test(full_disks_fail_no_job),
+		cmocka_unit_test(full_disk_does_not_hide_a_bad_scene),
+		cmocka_unit_test(names_with_one_certificate_count_as_one_worker),
+		cmocka_unit_test(postponed_lease_is_no_failure),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,20 +8,20 @@
 
 #include <cmocka.h>
 
-#define EIGHT                                                                                          \
+#define EIGHT_LEASES                                                                                   \
 	"w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot, " \
 	"w1 gets j1 g4 p0 boot, w1 gets j1 g5 p0 boot, w1 gets j1 g6 p0 boot, w1 gets j1 g7 p0 boot"
 
 /* The first copy goes out after 30 s though the duration of leases is unknown, the next ones 1.5 medians after the
  * lease was sent. */
-static void one_hoarder_stalls_nothing(void **state)
+static void one_hoarder_stalls_no_job(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=10 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=4096 -> -",
 		"[0] w2 joins A threads=2 -> -",
-		"[0] w1 wants 4097 -> j1 is bootstrap, " EIGHT,
+		"[0] w1 wants 4097 -> j1 is bootstrap, " EIGHT_LEASES,
 		"[1] w1 wants 4097 -> -",
 		"[20] w1 heartbeat -> -",
 		"[20] w2 wants 3 -> w2 gets j1 g8 p0 boot, w2 gets j1 g9 p0 boot",
@@ -35,13 +35,13 @@ static void one_hoarder_stalls_nothing(void **state)
 	});
 }
 
-static void what_is_held_grows_with_what_is_given(void **state)
+static void lease_limit_grows_with_returned_results(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=30 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=64 -> -",
-		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT,
+		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT_LEASES,
 		"[5] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g8 p0 boot, w1 gets j1 g9 p0 boot, w1 gets j1 g10 p0 boot, "
 		"w1 gets j1 g11 p0 boot, w1 gets j1 g12 p0 boot, w1 gets j1 g13 p0 boot, w1 gets j1 g14 p0 boot, "
 		"w1 gets j1 g15 p0 boot, w1 gets j1 g16 p0 boot",
@@ -52,10 +52,10 @@ static void what_is_held_grows_with_what_is_given(void **state)
 
 /* Both copies are held by such workers: the older copy is given up after two minutes instead of ten, and only for a
  * worker that has nothing to do. */
-static void two_hoarders_stall_it_for_minutes(void **state)
+static void two_hoarders_stall_a_job_for_two_minutes(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=64 -> -",
 		"[0] w2 joins A threads=64 -> -",
@@ -82,10 +82,10 @@ static void two_hoarders_stall_it_for_minutes(void **state)
 }
 
 /* Honest workers with long leases: where no worker is idle, nothing is given up before ten minutes. */
-static void long_leases_are_waited_for(void **state)
+static void long_leases_are_kept_while_no_worker_is_idle(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=2 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w2 joins A threads=1 -> -",
@@ -110,14 +110,14 @@ static void long_leases_are_waited_for(void **state)
 
 /* A worker's limit is halved after each lease that others had to answer for it, and doubled again once it returns a
  * result. */
-static void who_is_overtaken_holds_less(void **state)
+static void overtaken_worker_may_hold_fewer_leases(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=8 rounds=9 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=64 -> -",
 		"[0] w2 joins A threads=8 -> -",
-		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT,
+		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT_LEASES,
 		"[20] w1 heartbeat -> -",
 		"[20] w2 wants 4 -> -",
 		"[30] tick -> w2 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot, w2 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
@@ -139,11 +139,11 @@ static void who_is_overtaken_holds_less(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(one_hoarder_stalls_nothing),
-		cmocka_unit_test(what_is_held_grows_with_what_is_given),
-		cmocka_unit_test(two_hoarders_stall_it_for_minutes),
-		cmocka_unit_test(long_leases_are_waited_for),
-		cmocka_unit_test(who_is_overtaken_holds_less),
+		cmocka_unit_test(one_hoarder_stalls_no_job),
+		cmocka_unit_test(lease_limit_grows_with_returned_results),
+		cmocka_unit_test(two_hoarders_stall_a_job_for_two_minutes),
+		cmocka_unit_test(long_leases_are_kept_while_no_worker_is_idle),
+		cmocka_unit_test(overtaken_worker_may_hold_fewer_leases),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

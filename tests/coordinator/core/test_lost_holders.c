@@ -12,9 +12,9 @@
 
 #define JOB "[0] submit groups=1 -> j1 submitted, j1 is queued"
 
-static enum job_state state_of(const struct farm *f, uint64_t job, double now, struct job_status *s)
+static enum job_state read_job_state(const struct farm *f, uint64_t job, double now, struct job_status *s)
 {
-	assert_true(farm_job(f, job, now, s));
+	assert_true(farm_job_status(f, job, now, s));
 	return s->state;
 }
 
@@ -24,10 +24,10 @@ static void play_line(struct farm *f, const char *line)
 }
 
 /* A lease that ends with its worker's connection is counted once, whichever side closed the connection. */
-static void lost_leases_are_counted(void **state)
+static void lease_lost_with_its_connection_is_counted_once(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	struct job_counts c;
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=2 parts=2 -> j1 submitted, j1 is queued",
@@ -39,10 +39,10 @@ static void lost_leases_are_counted(void **state)
 				   "[3] w1 leaves -> -",
 				   NULL,
 			   });
-	assert_true(farm_counts(f, 1, &c));
+	assert_true(farm_job_counts(f, 1, &c));
 	assert_int_equal(c.lost, 2);
 	play_line(f, "[4] w3 joins A threads=1 home=b start=2 -> close w2");
-	assert_true(farm_counts(f, 1, &c));
+	assert_true(farm_job_counts(f, 1, &c));
 	assert_int_equal(c.lost, 3);
 	farm_free(f);
 }
@@ -50,10 +50,10 @@ static void lost_leases_are_counted(void **state)
 /* The render process dies, and the worker reconnects after a restart and reports the lease that it held: this counts
  * once as a failure, as if the worker still held the lease. The job fails after three workers, and its owner's next job
  * gets one lease at a time. */
-static void told_after_a_restart(void **state)
+static void failure_reported_after_a_restart_counts_once(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -85,7 +85,7 @@ static void told_after_a_restart(void **state)
 			NULL,
 		});
 	struct job_status s;
-	assert_int_equal(state_of(f, 2, 4, &s), JOB_BOOTSTRAP);
+	assert_int_equal(read_job_state(f, 2, 4, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.leases, 1);
 	/* a result was merged: the job is as good as any other */
 	play_line(f, "[5] w4 batch j2 g0 p0 boot -> merge, merged, w5 gets j2 g0 p1 boot, w4 gets j2 g1 p0 boot");
@@ -93,10 +93,10 @@ static void told_after_a_restart(void **state)
 }
 
 /* The limit on an owner expires, and the status gives the reason while it lasts. */
-static void limit_ends(void **state)
+static void limit_on_an_owner_expires(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=1 owner=ann -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 home=a start=1 -> -",
@@ -118,7 +118,7 @@ static void limit_ends(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_int_equal(state_of(f, 3, 1, &s), JOB_QUEUED);
+	assert_int_equal(read_job_state(f, 3, 1, &s), JOB_QUEUED);
 	assert_non_null(strstr(s.waiting, "one lease at a time"));
 	transcript_play(f, (const char *const[]){
 				   "[25] w6 heartbeat -> -",
@@ -133,11 +133,11 @@ static void limit_ends(void **state)
 
 /* Workers vanish without a reason and do not return: the job fails after eight in a row on one lease, with nothing
  * merged in between. */
-static void never_heard_again(void **state)
+static void eight_workers_lost_in_a_row_fail_the_job(void **state)
 {
 	(void)state;
 	char line[160];
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	play_line(f, JOB);
 	for (int i = 1; i <= 8; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 -> -", i, i);
@@ -156,12 +156,12 @@ static void never_heard_again(void **state)
 
 /* One worker that vanishes again and again counts once, and comes back each time: killed and restarted, or cut off and
  * reconnected. */
-static void back_again(void **state)
+static void one_worker_lost_repeatedly_fails_no_job(void **state)
 {
 	(void)state;
 	char line[160];
 	struct job_status s;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	play_line(f, JOB);
 	for (int i = 1; i <= 20; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 name=a home=a start=%d -> -", i, i, 1 + i / 2);
@@ -172,19 +172,19 @@ static void back_again(void **state)
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
 		play_line(f, line);
 	}
-	assert_int_equal(state_of(f, 1, 21, &s), JOB_BOOTSTRAP);
+	assert_int_equal(read_job_state(f, 1, 21, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.counts.failures, 0);
 	farm_free(f);
 }
 
 /* Racks of four workers lose power again and again in the middle of all leases; then they, or others, connect. Each
  * merged result restarts the count. */
-static void racks_that_lose_power_fail_no_job(void **state)
+static void racks_losing_power_fail_no_job(void **state)
 {
 	(void)state;
 	char line[200];
 	struct job_status s;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	play_line(f, "[0] submit groups=4 rounds=9 -> j1 submitted, j1 is queued");
 	int peer = 0;
 	for (int rack = 0; rack < 14; rack++) {
@@ -195,14 +195,16 @@ static void racks_that_lose_power_fail_no_job(void **state)
 		struct update u;
 		for (int i = 1; i <= 4; i++)
 			farm_step(f,
-				  &(struct event){
-					  .kind = EVENT_REQUEST, .time = rack, .peer = (uint64_t)(peer + i), .want = 1},
+				  &(struct event){.kind = EVENT_REQUEST,
+						  .time = rack,
+						  .peer = (uint64_t)(peer + i),
+						  .wanted_leases = 1},
 				  &u);
 		if (rack % 7 == 6) /* one result of each lease is merged */
 			for (uint32_t g = 0; g < 4; g++)
 				for (uint64_t i = 1; i <= 4; i++) {
 					struct lease_status l;
-					if (!farm_lease(f, (uint64_t)peer + i, 0, &l) || l.key.group != g)
+					if (!farm_lease_status(f, (uint64_t)peer + i, 0, &l) || l.key.group != g)
 						continue;
 					struct event batch = {
 						.kind = EVENT_BATCH, .time = rack, .peer = (uint64_t)peer + i};
@@ -215,18 +217,18 @@ static void racks_that_lose_power_fail_no_job(void **state)
 				  &u);
 		peer += 4;
 	}
-	assert_true(state_of(f, 1, 15, &s) != JOB_FAILED);
+	assert_true(read_job_state(f, 1, 15, &s) != JOB_FAILED);
 	assert_int_equal(s.counts.failures, 0);
 	farm_free(f);
 }
 
 /* Eight names with one certificate do not count as eight workers, if the farm has workers with another certificate. */
-static void one_certificate(void **state)
+static void lost_workers_of_one_certificate_fail_no_job(void **state)
 {
 	(void)state;
 	char line[160];
 	struct job_status s;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	play_line(f, JOB);
 	play_line(f, "[0] w90 joins A threads=1 certificate=b -> -");
 	for (int i = 1; i <= 12; i++) {
@@ -238,20 +240,20 @@ static void one_certificate(void **state)
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
 		play_line(f, line);
 	}
-	assert_int_equal(state_of(f, 1, 13, &s), JOB_BOOTSTRAP);
+	assert_int_equal(read_job_state(f, 1, 13, &s), JOB_BOOTSTRAP);
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(lost_leases_are_counted),
-		cmocka_unit_test(told_after_a_restart),
-		cmocka_unit_test(limit_ends),
-		cmocka_unit_test(never_heard_again),
-		cmocka_unit_test(back_again),
-		cmocka_unit_test(racks_that_lose_power_fail_no_job),
-		cmocka_unit_test(one_certificate),
+		cmocka_unit_test(lease_lost_with_its_connection_is_counted_once),
+		cmocka_unit_test(failure_reported_after_a_restart_counts_once),
+		cmocka_unit_test(limit_on_an_owner_expires),
+		cmocka_unit_test(eight_workers_lost_in_a_row_fail_the_job),
+		cmocka_unit_test(one_worker_lost_repeatedly_fails_no_job),
+		cmocka_unit_test(racks_losing_power_fail_no_job),
+		cmocka_unit_test(lost_workers_of_one_certificate_fail_no_job),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,18 +12,18 @@
 
 #include <cmocka.h>
 
-static struct job_status status_of(const struct farm *f, uint64_t job, double now)
+static struct job_status read_job_status(const struct farm *f, uint64_t job, double now)
 {
 	struct job_status s;
-	assert_true(farm_job(f, job, now, &s));
+	assert_true(farm_job_status(f, job, now, &s));
 	return s;
 }
 
 /* No more leases go out, and those that are out count; the other job gets the workers. */
-static void hold_and_release(void **state)
+static void held_job_gets_no_leases_until_it_is_released(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=2 -> -",
@@ -33,8 +33,8 @@ static void hold_and_release(void **state)
 				   "[2] w1 batch j1 g0 p0 boot -> merge, merged",
 				   NULL,
 			   });
-	assert_int_equal(status_of(f, 1, 2).state, JOB_HELD);
-	assert_string_equal(status_of(f, 1, 2).waiting, "held by bob");
+	assert_int_equal(read_job_status(f, 1, 2).state, JOB_HELD);
+	assert_string_equal(read_job_status(f, 1, 2).waiting, "held by bob");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -48,16 +48,16 @@ static void hold_and_release(void **state)
 			"[5] hold order j1 held by ann -> rejected: the job is over",
 			NULL,
 		});
-	assert_int_equal(status_of(f, 1, 5).state, JOB_CANCELLED);
+	assert_int_equal(read_job_status(f, 1, 5).state, JOB_CANCELLED);
 	farm_free(f);
 }
 
 /* Leases that were sent before the files were repaired do not count when they fail, whenever the failure is reported;
  * later ones do. */
-static void damaged_files_are_nobodys_fault(void **state)
+static void failures_by_damaged_files_count_against_nobody(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=3 -> -",
@@ -69,20 +69,20 @@ static void damaged_files_are_nobodys_fault(void **state)
 				   "[4] w1 fails j1 g1 p0 boot it has the file no more -> w1 gets j1 g1 p0 boot",
 				   NULL,
 			   });
-	assert_int_equal(status_of(f, 1, 4).counts.failures, 0);
+	assert_int_equal(read_job_status(f, 1, 4).counts.failures, 0);
 	transcript_play(f, (const char *const[]){
 				   "[5] w1 lacks j1 g2 p0 boot no memory -> -",
 				   "[6] w1 fails j1 g0 p0 boot it has the file no more -> -",
 				   NULL,
 			   });
-	assert_int_equal(status_of(f, 1, 6).counts.failures, 2);
+	assert_int_equal(read_job_status(f, 1, 6).counts.failures, 2);
 	farm_free(f);
 }
 
-static void two_reasons(void **state)
+static void job_may_be_held_for_two_reasons(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit -> j1 submitted, j1 is queued",
 				   "[0] hold order j1 held by ann -> -",
@@ -91,19 +91,19 @@ static void two_reasons(void **state)
 				   "[0] w1 wants 1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status_of(f, 1, 0).waiting, "held by ann; no room");
+	assert_string_equal(read_job_status(f, 1, 0).waiting, "held by ann; no room");
 	transcript_play(f, (const char *const[]){
 				   "[1] release order j1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status_of(f, 1, 1).waiting, "no room");
+	assert_string_equal(read_job_status(f, 1, 1).waiting, "no room");
 	transcript_play(f, (const char *const[]){
 				   "[1] hold order j1 held by ann -> -",
 				   "[2] release j1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(status_of(f, 1, 2).waiting, "held by ann");
-	assert_int_equal(status_of(f, 1, 2).state, JOB_HELD);
+	assert_string_equal(read_job_status(f, 1, 2).waiting, "held by ann");
+	assert_int_equal(read_job_status(f, 1, 2).state, JOB_HELD);
 	transcript_play(f, (const char *const[]){
 				   "[3] release order j1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   NULL,
@@ -112,10 +112,10 @@ static void two_reasons(void **state)
 }
 
 /* A time limit does not run down while the job is on hold: 3 s of 8 before the hold, 90 s on hold, then five more. */
-static void the_clock_stands_still(void **state)
+static void time_limit_does_not_run_down_while_a_job_is_held(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   "[100] restore j1 render 2,3 elapsed=3 completed=2 rounds=inf seconds=8 -> j1 is running",
@@ -125,12 +125,12 @@ static void the_clock_stands_still(void **state)
 			   "[150] w1 batch j1 g0 p0 e3 -> merge, merged",
 			   NULL,
 		   });
-	assert_true(farm_elapsed(f, 1, 180) == 3);
+	assert_true(farm_job_elapsed(f, 1, 180) == 3);
 	transcript_play(f, (const char *const[]){
 				   "[190] release order j1 -> -",
 				   NULL,
 			   });
-	assert_true(farm_elapsed(f, 1, 194) == 7);
+	assert_true(farm_job_elapsed(f, 1, 194) == 7);
 	transcript_play(
 		f, (const char *const[]){
 			   "[194] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4",
@@ -141,10 +141,10 @@ static void the_clock_stands_still(void **state)
 	farm_free(f);
 }
 
-static void a_priority_moves_a_job_ahead(void **state)
+static void changed_priority_reorders_jobs(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -172,15 +172,15 @@ static void a_priority_moves_a_job_ahead(void **state)
 			"w1 gets j2 g1 p0 boot",
 			NULL,
 		});
-	assert_int_equal(status_of(f, 3, 5).priority, 100);
+	assert_int_equal(read_job_status(f, 3, 5).priority, 100);
 	farm_free(f);
 }
 
 /* While the job runs: its last rounds are no longer the last, and workers that waited for them get leases. */
-static void extend_while_it_runs(void **state)
+static void running_job_is_extended(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -199,7 +199,7 @@ static void extend_while_it_runs(void **state)
 		});
 	farm_free(f);
 	/* during the bootstrap */
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 boot 1,0 rounds=1 -> -",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g1 p0 boot",
@@ -213,10 +213,10 @@ static void extend_while_it_runs(void **state)
 }
 
 /* The error is estimated once more because a bound is met; after the extension the bound is no longer met. */
-static void extend_while_it_ends(void **state)
+static void ending_job_is_extended(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 render 2,2 elapsed=1 completed=1 rounds=2 target=0.1 -> j1 is running, j1 evaluate 2",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> -",
@@ -230,7 +230,7 @@ static void extend_while_it_ends(void **state)
 		NULL,
 	});
 	/* a single long job would not have estimated its error after nine rounds */
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 render 9,9 elapsed=1 completed=1 rounds=9 target=0.1 -> j1 is running, j1 evaluate 9",
 		"[1] extend j1 rounds=12 target=0.1 -> -",
 		"[2] error j1 9 0.05 -> -",
@@ -238,7 +238,7 @@ static void extend_while_it_ends(void **state)
 		"[3] w1 wants 1 -> w1 gets j1 g0 p0 e9",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[10] restore j1 render 2,2 elapsed=9 completed=9 rounds=inf seconds=8 target=0.1 -> j1 is running, j1 evaluate 2",
 		"[10] extend j1 rounds=inf seconds=20 target=0.1 -> -",
 		"[11] w1 joins A threads=1 -> -",
@@ -248,10 +248,10 @@ static void extend_while_it_ends(void **state)
 }
 
 /* A job that has ended is continued under its id; the caller that stored its counters passes them in. */
-static void extend_when_it_has_ended(void **state)
+static void ended_job_is_extended(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -270,9 +270,9 @@ static void extend_when_it_has_ended(void **state)
 			"[9] w1 batch j1 g1 p0 e0 -> repeat: merged already",
 			NULL,
 		});
-	assert_true(farm_elapsed(f, 1, 10) == 5);
+	assert_true(farm_job_elapsed(f, 1, 10) == 5);
 	struct job_counts counts;
-	assert_true(farm_counts(f, 1, &counts) && farm_counts(f, 2, &counts));
+	assert_true(farm_job_counts(f, 1, &counts) && farm_job_counts(f, 2, &counts));
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -288,14 +288,14 @@ static void extend_when_it_has_ended(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(damaged_files_are_nobodys_fault),
-		cmocka_unit_test(hold_and_release),
-		cmocka_unit_test(two_reasons),
-		cmocka_unit_test(the_clock_stands_still),
-		cmocka_unit_test(a_priority_moves_a_job_ahead),
-		cmocka_unit_test(extend_while_it_runs),
-		cmocka_unit_test(extend_while_it_ends),
-		cmocka_unit_test(extend_when_it_has_ended),
+		cmocka_unit_test(failures_by_damaged_files_count_against_nobody),
+		cmocka_unit_test(held_job_gets_no_leases_until_it_is_released),
+		cmocka_unit_test(job_may_be_held_for_two_reasons),
+		cmocka_unit_test(time_limit_does_not_run_down_while_a_job_is_held),
+		cmocka_unit_test(changed_priority_reorders_jobs),
+		cmocka_unit_test(running_job_is_extended),
+		cmocka_unit_test(ending_job_is_extended),
+		cmocka_unit_test(ended_job_is_extended),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,10 +14,10 @@
 
 #include <cmocka.h>
 
-static void in_the_bootstrap(void **state)
+static void job_is_restored_during_its_bootstrap(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j4 boot 1,0 fingerprint=A elapsed=3 -> -",
 		"[0] w1 joins B threads=1 -> -",
 		"[0] w1 wants 1 -> -", /* the job is pinned to fingerprint A */
@@ -32,10 +32,10 @@ static void in_the_bootstrap(void **state)
 
 /* Two rounds are open as before: merged results are repeats, and results of leases that were out count when they
  * arrive, whether the lease was handed out again or not. */
-static void in_a_round(void **state)
+static void job_is_restored_within_a_round(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f, (const char *const[]){
 			   "[0] restore j7 render 4,3,5 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
@@ -52,20 +52,20 @@ static void in_a_round(void **state)
 			   NULL,
 		   });
 	struct job_status s;
-	assert_true(farm_job(f, 7, 3, &s));
+	assert_true(farm_job_status(f, 7, 3, &s));
 	assert_int_equal(s.leases_merged, 4 + 3 + 5 + 3);
 	assert_int_equal(s.bootstrap_merged, 3);
 	assert_true(s.rounds == 5 && s.started == -10);
-	assert_true(farm_elapsed(f, 7, 3) == 13);
+	assert_true(farm_job_elapsed(f, 7, 3) == 13);
 	farm_free(f);
 }
 
 /* A result stored before the restart waits for an earlier epoch: it counts once that epoch is merged, and only the
  * worker that holds its lease is told. */
-static void stored_results(void **state)
+static void stored_result_counts_once_its_earlier_epoch_is_merged(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j7 render 0,1,0 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w1 stored j7 g0 p0 e1 -> -",
@@ -83,10 +83,10 @@ static void stored_results(void **state)
 	});
 }
 
-static void before_anything(void **state)
+static void job_is_restored_before_its_first_lease(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] restore j1 boot 0,0 -> -",
 				   "[0] restore j3 boot 0,0 priority=5 -> -",
@@ -95,7 +95,7 @@ static void before_anything(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_true(farm_job(f, 1, 3, &s));
+	assert_true(farm_job_status(f, 1, 3, &s));
 	assert_int_equal(s.state, JOB_QUEUED);
 	farm_free(f);
 }
@@ -105,12 +105,12 @@ static void before_anything(void **state)
 static void bounds_that_were_met_stay_met(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 render 2,2 elapsed=3 completed=3 rounds=2 -> "
 		"j1 is running, j1 publish 2, j1 is done (mutations)",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 render 2,3 elapsed=3 completed=3 rounds=9 target=0.1 -> j1 is running, j1 evaluate 2",
 		"[1] w1 joins A threads=1 -> -",
 		"[1] w1 wants 1 -> w1 gets j1 g0 p0 e2",
@@ -118,18 +118,18 @@ static void bounds_that_were_met_stay_met(void **state)
 		"[2] error j1 2 0.05 -> w1 loses j1 g0 p0 e2, j1 publish 2, j1 is done (error)",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[100] restore j1 render 2,3 elapsed=9 completed=7 rounds=inf seconds=8 -> j1 is running",
 		"[100] w1 joins A threads=1 -> -",
 		"[100] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 publish 3, j1 is done (time)",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[100] restore j1 render 2,3 elapsed=9 completed=8 rounds=inf seconds=8 -> "
 		"j1 is running, j1 publish 2, j1 is done (time)",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j1 render 0,0 elapsed=3 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
 		NULL});
 }
@@ -137,7 +137,7 @@ static void bounds_that_were_met_stay_met(void **state)
 static void a_job_on_hold_gets_no_leases(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=2 -> -",
@@ -148,7 +148,7 @@ static void a_job_on_hold_gets_no_leases(void **state)
 				   NULL,
 			   });
 	struct job_status s;
-	assert_true(farm_job(f, 1, 1, &s));
+	assert_true(farm_job_status(f, 1, 1, &s));
 	assert_int_equal(s.state, JOB_HELD);
 	assert_string_equal(s.waiting, "no room");
 	transcript_play(
@@ -159,13 +159,13 @@ static void a_job_on_hold_gets_no_leases(void **state)
 			"[4] cancel j1 -> j1 cancelled, w1 loses j1 g1 p0 boot, j1 is cancelled (cancelled: cancelled)",
 			NULL,
 		});
-	assert_true(farm_job(f, 1, 5, &s));
+	assert_true(farm_job_status(f, 1, 5, &s));
 	assert_int_equal(s.state, JOB_CANCELLED);
 	farm_free(f);
 }
 
 /* All jobs from before the restart run, and no new job starts before their number is below the limit. */
-static void more_than_are_taken(void **state)
+static void restored_jobs_may_exceed_the_limit(void **state)
 {
 	(void)state;
 	enum { JOBS = 30 };
@@ -174,7 +174,7 @@ static void more_than_are_taken(void **state)
 	struct job_status s;
 	farm_config_init(&c);
 	c.max_jobs = 2;
-	c.max_ended = 1;
+	c.max_ended_jobs = 1;
 	c.max_peers = 1;
 	assert_int_equal(farm_new(&f, &c, NULL), 0);
 	for (int i = 1; i <= JOBS; i++) {
@@ -183,7 +183,7 @@ static void more_than_are_taken(void **state)
 		transcript_play(f, (const char *const[]){line, NULL});
 	}
 	for (int i = 1; i <= JOBS; i++)
-		assert_true(farm_job(f, (uint64_t)i, 0, &s) && s.state == JOB_QUEUED);
+		assert_true(farm_job_status(f, (uint64_t)i, 0, &s) && s.state == JOB_QUEUED);
 	for (int i = 1; i < JOBS; i++) {
 		char line[128], forgotten[32] = "";
 		if (i > 1)
@@ -208,7 +208,7 @@ static void more_than_are_taken(void **state)
 
 /* An extended job brings back what its workers had reported: for connected workers the present report stays, for others
  * the latest report counts. */
-static void makers_reports_are_restored(void **state)
+static void reports_of_workers_are_restored_with_a_job(void **state)
 {
 	(void)state;
 	const struct plan plan = {.kind = PLAN_CHAINS,
@@ -227,7 +227,7 @@ static void makers_reports_are_restored(void **state)
 					 {.name = "two", .certificate = "", .home = "b", .restarts = 7},
 					 {.name = "two", .certificate = "", .home = "b", .restarts = 6}};
 	const struct forecast_history looks = {.count = 0};
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	struct peer_status p;
 	struct worker_status w;
 	struct update u;
@@ -237,19 +237,19 @@ static void makers_reports_are_restored(void **state)
 				       .submit = {.plan = &plan, .name = "job", .owner = ""},
 				       .fingerprint = "A",
 				       .kind = LEASE_RENDER,
-				       .next = next,
+				       .next_epochs = next,
 				       .makers = by,
 				       .elapsed = 1,
 				       .opened = 0,
 				       .completed = 1,
 				       .looks = &looks}};
 	farm_step(f, &ev, &u);
-	assert_true(farm_peer(f, 1, &p) && farm_worker(f, p.who, &w));
+	assert_true(farm_peer_status(f, 1, &p) && farm_worker_status(f, p.worker_id, &w));
 	assert_int_equal(w.restarts, 5);
 	assert_string_equal(w.name, "c");
-	assert_string_equal(doubt_maker(f, &(struct lease_key){3, LEASE_RENDER, 0, 0, 2}), "c");
-	assert_string_equal(doubt_maker(f, &(struct lease_key){3, LEASE_RENDER, 1, 0, 2}), "two");
-	assert_true(farm_worker(f, p.who + 1, &w));
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){3, LEASE_RENDER, 0, 0, 2}), "c");
+	assert_string_equal(doubt_maker_name(f, &(struct lease_key){3, LEASE_RENDER, 1, 0, 2}), "two");
+	assert_true(farm_worker_status(f, p.worker_id + 1, &w));
 	assert_int_equal(w.restarts, 7);
 	transcript_play(f, (const char *const[]){
 				   "[1] w1 leaves -> -",
@@ -262,14 +262,14 @@ static void makers_reports_are_restored(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(in_the_bootstrap),
-		cmocka_unit_test(in_a_round),
-		cmocka_unit_test(stored_results),
-		cmocka_unit_test(before_anything),
+		cmocka_unit_test(job_is_restored_during_its_bootstrap),
+		cmocka_unit_test(job_is_restored_within_a_round),
+		cmocka_unit_test(stored_result_counts_once_its_earlier_epoch_is_merged),
+		cmocka_unit_test(job_is_restored_before_its_first_lease),
 		cmocka_unit_test(bounds_that_were_met_stay_met),
 		cmocka_unit_test(a_job_on_hold_gets_no_leases),
-		cmocka_unit_test(more_than_are_taken),
-		cmocka_unit_test(makers_reports_are_restored),
+		cmocka_unit_test(restored_jobs_may_exceed_the_limit),
+		cmocka_unit_test(reports_of_workers_are_restored_with_a_job),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,11 +12,11 @@
 
 #include <cmocka.h>
 
-static void whole_job(void **state)
+static void job_runs_from_bootstrap_to_end(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
 		"[2] w2 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w2 gets j1 g1 p0 e1",
 		"[3] w2 batch j1 g1 p0 e1 -> merge, merged",
@@ -26,10 +26,10 @@ static void whole_job(void **state)
 	});
 }
 
-static void two_rounds_open(void **state)
+static void two_rounds_are_open_at_once(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit rounds=9 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
@@ -51,8 +51,8 @@ static void two_rounds_open(void **state)
 static void a_lease_counts_once(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w1 batch j1 g0 p0 boot -> repeat: merged already",
 		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
 		"[2] w1 batch j1 g0 p0 e0 -> repeat: merged already",
@@ -67,8 +67,8 @@ static void a_lease_counts_once(void **state)
 static void unknown_workers_and_ended_jobs_are_refused(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w9 batch j1 g0 p0 e0 -> refused: unknown worker",
 		"[2] w1 batch j2 g0 p0 e0 -> refused: no such job",
 		"[2] cancel j2 -> rejected: no such job",
@@ -79,14 +79,14 @@ static void unknown_workers_and_ended_jobs_are_refused(void **state)
 	});
 }
 
-static void quarantined_after_faults(void **state)
+static void worker_is_quarantined_after_three_faults(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
-			START_TWO,
+			TRANSCRIPT_START_TWO,
 			"[2] w1 batch j1 g0 p0 e0 bad tile 3 holds a NaN -> refused: tile 3 holds a NaN, w1 gets j1 g0 p0 e0",
 			"[3] w1 batch j1 g7 p0 e0 -> refused: not a lease of this job",
 			"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn, #1 quarantined",
@@ -101,21 +101,21 @@ static void quarantined_after_faults(void **state)
 			NULL,
 		});
 	struct peer_status p;
-	assert_true(farm_peer(f, 1, &p));
+	assert_true(farm_peer_status(f, 1, &p));
 	assert_int_equal(p.state, PEER_QUARANTINED);
 	assert_int_equal(p.faults, 3);
-	assert_string_equal(p.text, "torn");
+	assert_string_equal(p.last_fault, "torn");
 	struct job_status j;
-	assert_true(farm_job(f, 1, 40, &j));
+	assert_true(farm_job_status(f, 1, 40, &j));
 	assert_int_equal(j.counts.faults, 3);
 	farm_free(f);
 }
 
-static void worker_gone(void **state)
+static void lease_of_a_lost_or_silent_worker_is_given_again(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w3 joins A threads=1 -> -",
 		"[2] w3 wants 1 -> -",
 		"[2.4] w1 leaves -> w3 gets j1 g0 p0 e0",
@@ -129,11 +129,11 @@ static void worker_gone(void **state)
 }
 
 /* If the coordinator reads late what workers sent in time, no worker is taken for silent and no lease for overdue. */
-static void read_late(void **state)
+static void messages_read_late_make_no_worker_silent(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w3 joins A threads=1 -> -",
 		"[700] unread=690 tick -> -",
 		"[700] unread=690 w2 heartbeat -> -",
@@ -145,10 +145,10 @@ static void read_late(void **state)
 	});
 }
 
-static void hung_up(void **state)
+static void worker_silent_for_long_is_disconnected(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] w1 joins A threads=1 -> -",
 		"[0] wake -> 30",
 		"[30] tick -> -",
@@ -160,10 +160,10 @@ static void hung_up(void **state)
 	});
 }
 
-static void an_overdue_lease_is_given_again(void **state)
+static void overdue_lease_is_given_again(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=3 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=4 -> -",
 		"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
@@ -180,10 +180,10 @@ static void an_overdue_lease_is_given_again(void **state)
 	});
 }
 
-static void timeout_after_median(void **state)
+static void timeout_of_a_lease_follows_the_median_duration(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=3 rounds=9 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -206,14 +206,14 @@ static void timeout_after_median(void **state)
 	});
 }
 
-static void a_late_lease_gets_a_second_worker(void **state)
+static void late_lease_gets_a_second_worker(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
-			START_TWO,
+			TRANSCRIPT_START_TWO,
 			"[1] w3 joins A threads=1 -> -",
 			"[1] w3 wants 1 -> -",
 			"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w3 gets j1 g1 p0 e1",
@@ -228,7 +228,7 @@ static void a_late_lease_gets_a_second_worker(void **state)
 			NULL,
 		});
 	struct job_status j;
-	assert_true(farm_job(f, 1, 9, &j));
+	assert_true(farm_job_status(f, 1, 9, &j));
 	assert_int_equal(j.counts.duplicates, 1);
 	assert_int_equal(j.counts.repeats, 1);
 	farm_free(f);
@@ -236,7 +236,7 @@ static void a_late_lease_gets_a_second_worker(void **state)
 
 /* A worker whose lease a copy overtook may hold half as many leases afterwards; the one that had the copy keeps its
  * limit. */
-static void an_overtaken_worker_gets_half_as_many_leases(void **state)
+static void overtaken_worker_gets_half_as_many_leases(void **state)
 {
 	(void)state;
 	static const char *const before[] = {
@@ -251,7 +251,7 @@ static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 		"[30] tick -> w2 gets j1 g0 p0 e0",
 		"[30] w2 wants 0 -> -",
 		NULL};
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, before);
 	/* with seven leases it has more than half of eight */
 	transcript_play(f, (const char *const[]){
@@ -259,7 +259,7 @@ static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 				   NULL,
 			   });
 	farm_free(f);
-	f = transcript_farm();
+	f = transcript_farm_new();
 	transcript_play(f, before);
 	/* the first result counts all the same: no worker was late */
 	transcript_play(f,
@@ -270,11 +270,11 @@ static void an_overtaken_worker_gets_half_as_many_leases(void **state)
 	farm_free(f);
 }
 
-static void returned_lease(void **state)
+static void returned_lease_goes_to_another_worker(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
-		START_TWO,
+	transcript_check((const char *const[]){
+		TRANSCRIPT_START_TWO,
 		"[2] w1 wants 0 -> -",
 		"[2] w2 wants 2 -> -",
 		"[2] w1 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
@@ -282,11 +282,11 @@ static void returned_lease(void **state)
 	});
 }
 
-static void bounded_wish(void **state)
+static void number_of_requested_leases_is_limited_by_threads(void **state)
 {
 	(void)state;
 	/* the number of leases is limited by the worker's request, and by its threads */
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=8 parts=4 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1000 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g0 p1 boot, "
@@ -297,7 +297,7 @@ static void bounded_wish(void **state)
 	});
 }
 
-static bool is_joined(struct farm *f, uint64_t id, const char *name)
+static bool try_join(struct farm *f, uint64_t id, const char *name)
 {
 	struct event ev = {.kind = EVENT_JOINED, .join = {.peer = id, .name = name, .fingerprint = "A", .threads = 1}};
 	struct update u;
@@ -307,44 +307,44 @@ static bool is_joined(struct farm *f, uint64_t id, const char *name)
 
 /* A name is kept byte by byte, even if it ends within a letter; a worker without a name, or with one longer than hello
  * allows, is refused. */
-static void long_names(void **state)
+static void names_of_workers_are_limited_in_length(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	struct peer_status p, q;
-	char name[JOIN_NAME + 1];
+	char name[JOIN_NAME_SIZE + 1];
 	for (size_t i = 0; i + 1 < sizeof name; i += 2)
 		memcpy(name + i, "\xc3\xa4", 3);
-	assert_false(is_joined(f, 1, name));
-	assert_false(is_joined(f, 1, ""));
-	name[JOIN_NAME - 2] = 0;
-	assert_true(is_joined(f, 1, name));
-	name[JOIN_NAME - 4] = 0;
-	assert_true(is_joined(f, 2, name));
-	assert_true(farm_peer(f, 2, &p) && farm_peer(f, 1, &q));
+	assert_false(try_join(f, 1, name));
+	assert_false(try_join(f, 1, ""));
+	name[JOIN_NAME_SIZE - 2] = 0;
+	assert_true(try_join(f, 1, name));
+	name[JOIN_NAME_SIZE - 4] = 0;
+	assert_true(try_join(f, 2, name));
+	assert_true(farm_peer_status(f, 2, &p) && farm_peer_status(f, 1, &q));
 	assert_string_equal(p.name, name);
-	assert_true(p.who != q.who);
+	assert_true(p.worker_id != q.worker_id);
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(whole_job),
-		cmocka_unit_test(two_rounds_open),
+		cmocka_unit_test(job_runs_from_bootstrap_to_end),
+		cmocka_unit_test(two_rounds_are_open_at_once),
 		cmocka_unit_test(a_lease_counts_once),
 		cmocka_unit_test(unknown_workers_and_ended_jobs_are_refused),
-		cmocka_unit_test(quarantined_after_faults),
-		cmocka_unit_test(worker_gone),
-		cmocka_unit_test(read_late),
-		cmocka_unit_test(hung_up),
-		cmocka_unit_test(an_overdue_lease_is_given_again),
-		cmocka_unit_test(timeout_after_median),
-		cmocka_unit_test(a_late_lease_gets_a_second_worker),
-		cmocka_unit_test(an_overtaken_worker_gets_half_as_many_leases),
-		cmocka_unit_test(returned_lease),
-		cmocka_unit_test(bounded_wish),
-		cmocka_unit_test(long_names),
+		cmocka_unit_test(worker_is_quarantined_after_three_faults),
+		cmocka_unit_test(lease_of_a_lost_or_silent_worker_is_given_again),
+		cmocka_unit_test(messages_read_late_make_no_worker_silent),
+		cmocka_unit_test(worker_silent_for_long_is_disconnected),
+		cmocka_unit_test(overdue_lease_is_given_again),
+		cmocka_unit_test(timeout_of_a_lease_follows_the_median_duration),
+		cmocka_unit_test(late_lease_gets_a_second_worker),
+		cmocka_unit_test(overtaken_worker_gets_half_as_many_leases),
+		cmocka_unit_test(returned_lease_goes_to_another_worker),
+		cmocka_unit_test(number_of_requested_leases_is_limited_by_threads),
+		cmocka_unit_test(names_of_workers_are_limited_in_length),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

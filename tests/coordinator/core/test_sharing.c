@@ -15,17 +15,17 @@
 
 #include <cmocka.h>
 
-static const char *why_waiting(const struct farm *f, uint64_t job)
+static const char *read_waiting_reason(const struct farm *f, uint64_t job)
 {
 	static struct job_status s;
-	assert_true(farm_job(f, job, 1000, &s));
+	assert_true(farm_job_status(f, job, 1000, &s));
 	return s.waiting;
 }
 
 static void higher_priorities_are_served_first(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -37,7 +37,7 @@ static void higher_priorities_are_served_first(void **state)
 			"[0] submit priority=5 groups=1 -> j3 submitted, j3 is queued",
 			NULL,
 		});
-	assert_string_equal(why_waiting(f, 3), "workers busy with j1 (priority -1)");
+	assert_string_equal(read_waiting_reason(f, 3), "workers busy with j1 (priority -1)");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -45,8 +45,8 @@ static void higher_priorities_are_served_first(void **state)
 			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j3 prepare, j2 is bootstrap, w1 gets j2 g0 p0 boot",
 			NULL,
 		});
-	assert_string_equal(why_waiting(f, 3), "the bootstrap is being evaluated");
-	assert_string_equal(why_waiting(f, 2), "");
+	assert_string_equal(read_waiting_reason(f, 3), "the bootstrap is being evaluated");
+	assert_string_equal(read_waiting_reason(f, 2), "");
 	transcript_play(f, (const char *const[]){
 				   "[2] prepared j3 -> j3 is running",
 				   "[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j3 g0 p0 e0",
@@ -56,10 +56,10 @@ static void higher_priorities_are_served_first(void **state)
 }
 
 /* Equal shares by owner and by number of leases apply only among jobs of one priority. */
-static void priority_before_shares(void **state)
+static void priority_comes_before_equal_shares(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w2 joins A threads=1 -> -",
 		"[0] submit priority=5 groups=3 owner=ann -> j1 submitted, j1 is queued",
@@ -72,10 +72,10 @@ static void priority_before_shares(void **state)
 
 /* If workers of two fingerprints could begin a job, the one that has waited longest begins it, whichever fingerprint
  * connected first. */
-static void first_to_wait(void **state)
+static void worker_that_waited_longest_begins_the_job(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w2 joins B threads=1 -> -",
 		"[1] w1 wants 1 -> -",
@@ -83,7 +83,7 @@ static void first_to_wait(void **state)
 		"[3] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
 		NULL,
 	});
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w2 joins B threads=1 -> -",
 		"[1] w2 wants 1 -> -",
@@ -93,10 +93,10 @@ static void first_to_wait(void **state)
 	});
 }
 
-static void fair_sharing(void **state)
+static void equal_jobs_get_equal_shares(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=9 -> j1 submitted, j1 is queued",
 		"[0] submit groups=9 -> j2 submitted, j2 is queued",
 		"[0] w1 joins A threads=4 -> -",
@@ -110,10 +110,10 @@ static void fair_sharing(void **state)
 
 /* A delivered result that waits to be checked does not count against the number of leases that its worker may hold, as
  * long as the worker's table has room; the lease stays the worker's. */
-static void delivered_is_not_held(void **state)
+static void delivered_result_does_not_count_as_held(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=9 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -135,10 +135,10 @@ static void delivered_is_not_held(void **state)
 }
 
 /* Shares go by owner first: of nine leases bob's one job gets half, and ann's two jobs share the other half. */
-static void owners_share_first(void **state)
+static void shares_are_equal_by_owner_first(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -161,17 +161,17 @@ static void owners_share_first(void **state)
 			NULL,
 		});
 	struct job_status s;
-	assert_true(farm_job(f, 3, 3, &s));
+	assert_true(farm_job_status(f, 3, 3, &s));
 	assert_string_equal(s.owner, "bob");
 	farm_free(f);
 }
 
 /* Jobs without an owner's name share one owner's part, however many they are; a job restored after a restart keeps its
  * owner. */
-static void the_nameless_and_the_restored(void **state)
+static void jobs_without_an_owner_share_one_part(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] restore j5 boot 0,0,0,0 groups=4 owner=bob -> -",
 		"[0] submit groups=4 -> j6 submitted, j6 is queued",
 		"[0] submit groups=4 -> j7 submitted, j7 is queued",
@@ -187,7 +187,7 @@ static void the_nameless_and_the_restored(void **state)
 static void workers_take_turns(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] w1 joins A threads=2 -> -",
 		"[0] w2 joins A threads=2 -> -",
 		"[0] w1 wants 2 -> -",
@@ -201,18 +201,18 @@ static void workers_take_turns(void **state)
 static void a_job_is_pinned_to_a_fingerprint(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker is connected");
+	assert_string_equal(read_waiting_reason(f, 1), "no worker is connected");
 	transcript_play(f, (const char *const[]){
 				   "[0] w1 joins A threads=1 -> -",
 				   "[0] w2 joins B threads=1 -> -",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker asks for work");
+	assert_string_equal(read_waiting_reason(f, 1), "no worker asks for work");
 	transcript_play(
 		f, (const char *const[]){
 			   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -222,7 +222,7 @@ static void a_job_is_pinned_to_a_fingerprint(void **state)
 			   "[1] w1 leaves -> -",
 			   NULL,
 		   });
-	assert_string_equal(why_waiting(f, 1), "no connected worker has fingerprint A (1 have others)");
+	assert_string_equal(read_waiting_reason(f, 1), "no connected worker has fingerprint A (1 have others)");
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -238,10 +238,10 @@ static void a_job_is_pinned_to_a_fingerprint(void **state)
 	farm_free(f);
 }
 
-static void free_again_while_untouched(void **state)
+static void job_without_results_is_not_pinned(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w2 joins B threads=1 -> -",
@@ -252,37 +252,37 @@ static void free_again_while_untouched(void **state)
 	});
 }
 
-static void nobody_is_trusted(void **state)
+static void waiting_reason_names_silent_or_failed_workers(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 -> -",
 				   "[30] tick -> -",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker responds and is not quarantined (1 connected)");
+	assert_string_equal(read_waiting_reason(f, 1), "no worker responds and is not quarantined (1 connected)");
 	transcript_play(f, (const char *const[]){
 				   "[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
 				   NULL,
 			   });
-	assert_string_equal(why_waiting(f, 1), "no worker can compute it; worker w1 failed last: no such file");
+	assert_string_equal(read_waiting_reason(f, 1), "no worker can compute it; worker w1 failed last: no such file");
 	farm_free(f);
 }
 
-static void limits_of_jobs_and_workers(void **state)
+static void numbers_of_jobs_and_workers_are_limited(void **state)
 {
 	(void)state;
 	struct farm_config c;
 	struct farm *f;
 	farm_config_init(&c);
 	c.max_jobs = 2;
-	c.max_ended = 1;
+	c.max_ended_jobs = 1;
 	c.max_peers = 1;
-	c.max_slots = 4;
-	c.first_job = 7;
+	c.max_job_slots = 4;
+	c.first_job_id = 7;
 	assert_int_equal(farm_new(&f, &c, NULL), 0);
 	transcript_play(
 		f,
@@ -300,7 +300,8 @@ static void limits_of_jobs_and_workers(void **state)
 			NULL,
 		});
 	struct job_counts counts;
-	assert_true(!farm_counts(f, 7, &counts) && farm_counts(f, 8, &counts) && farm_counts(f, 9, &counts));
+	assert_true(!farm_job_counts(f, 7, &counts) && farm_job_counts(f, 8, &counts) &&
+		    farm_job_counts(f, 9, &counts));
 	/* both jobs ended at the same moment: the one that ends now is kept */
 	transcript_play(f,
 			(const char *const[]){
@@ -314,7 +315,7 @@ static void limits_of_jobs_and_workers(void **state)
 	assert_int_equal(farm_new(&f, &c, NULL), -EINVAL);
 }
 
-static void memory_runs_out(void **state)
+static void lack_of_memory_rejects_a_job_or_worker(void **state)
 {
 	(void)state;
 	struct farm_config c;
@@ -325,7 +326,7 @@ static void memory_runs_out(void **state)
 		assert_int_equal(farm_new(&f, &c, NULL), -ENOMEM);
 	}
 	mem_fail_after(-1);
-	f = transcript_farm();
+	f = transcript_farm_new();
 	mem_fail_after(1);
 	transcript_play(f, (const char *const[]){
 				   "[0] submit -> rejected: the coordinator has no memory for another job",
@@ -345,9 +346,9 @@ static void memory_runs_out(void **state)
 				   NULL,
 			   });
 	struct lease_status l;
-	assert_true(farm_lease(f, 1, 0, &l));
+	assert_true(farm_lease_status(f, 1, 0, &l));
 	assert_int_equal(l.key.job, 1);
-	assert_false(farm_lease(f, 1, 1, &l));
+	assert_false(farm_lease_status(f, 1, 1, &l));
 	farm_free(f);
 }
 
@@ -355,18 +356,18 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(higher_priorities_are_served_first),
-		cmocka_unit_test(priority_before_shares),
-		cmocka_unit_test(first_to_wait),
-		cmocka_unit_test(delivered_is_not_held),
-		cmocka_unit_test(fair_sharing),
-		cmocka_unit_test(owners_share_first),
-		cmocka_unit_test(the_nameless_and_the_restored),
+		cmocka_unit_test(priority_comes_before_equal_shares),
+		cmocka_unit_test(worker_that_waited_longest_begins_the_job),
+		cmocka_unit_test(delivered_result_does_not_count_as_held),
+		cmocka_unit_test(equal_jobs_get_equal_shares),
+		cmocka_unit_test(shares_are_equal_by_owner_first),
+		cmocka_unit_test(jobs_without_an_owner_share_one_part),
 		cmocka_unit_test(workers_take_turns),
 		cmocka_unit_test(a_job_is_pinned_to_a_fingerprint),
-		cmocka_unit_test(free_again_while_untouched),
-		cmocka_unit_test(nobody_is_trusted),
-		cmocka_unit_test(limits_of_jobs_and_workers),
-		cmocka_unit_test(memory_runs_out),
+		cmocka_unit_test(job_without_results_is_not_pinned),
+		cmocka_unit_test(waiting_reason_names_silent_or_failed_workers),
+		cmocka_unit_test(numbers_of_jobs_and_workers_are_limited),
+		cmocka_unit_test(lack_of_memory_rejects_a_job_or_worker),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

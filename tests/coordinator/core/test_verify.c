@@ -30,10 +30,10 @@
 	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g0 p0 e0"
 /* clang-format on */
 
-static void what_two_workers_agree_on_counts(void **state)
+static void result_counts_once_two_workers_agree(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -45,7 +45,7 @@ static void what_two_workers_agree_on_counts(void **state)
 			NULL,
 		});
 	struct job_status j;
-	assert_true(farm_job(f, 1, 4, &j));
+	assert_true(farm_job_status(f, 1, 4, &j));
 	assert_int_equal(j.counts.verified, 3);
 	assert_int_equal(j.counts.mismatched, 0);
 	assert_int_equal(j.counts.duplicates, 0);
@@ -53,10 +53,10 @@ static void what_two_workers_agree_on_counts(void **state)
 	farm_free(f);
 }
 
-static void third_decides(void **state)
+static void third_worker_decides_where_two_differ(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -71,21 +71,21 @@ static void third_decides(void **state)
 		});
 	struct job_status j;
 	struct peer_status p;
-	assert_true(farm_job(f, 1, 4, &j));
+	assert_true(farm_job_status(f, 1, 4, &j));
 	assert_int_equal(j.counts.verified, 2);
 	assert_int_equal(j.counts.mismatched, 1);
 	assert_int_equal(j.counts.failures, 0);
-	assert_true(farm_peer(f, 1, &p));
+	assert_true(farm_peer_status(f, 1, &p));
 	assert_int_equal(p.faults, 1);
-	assert_string_equal(p.text, "wrong result: j1 render group 0 part 0 epoch 0");
-	assert_true(farm_peer(f, 2, &p) && p.faults == 0);
+	assert_string_equal(p.last_fault, "wrong result: j1 render group 0 part 0 epoch 0");
+	assert_true(farm_peer_status(f, 2, &p) && p.faults == 0);
 	farm_free(f);
 }
 
-static void all_differ(void **state)
+static void job_fails_if_four_workers_all_differ(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		START,
 		"[1] w1 batch j1 g0 p0 boot says 1 -> noted",
 		"[1] w2 batch j1 g0 p0 boot says 2 -> noted: the result differs from another worker's",
@@ -100,10 +100,10 @@ static void all_differ(void **state)
 	});
 }
 
-static void one_worker_twice(void **state)
+static void worker_cannot_verify_itself(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 name=a -> -",
@@ -115,7 +115,7 @@ static void one_worker_twice(void **state)
 				   NULL,
 			   });
 	struct job_status j;
-	assert_true(farm_job(f, 1, 1, &j));
+	assert_true(farm_job_status(f, 1, 1, &j));
 	assert_string_equal(j.waiting, "verification waits for a second worker (2 leases have one answer)");
 	transcript_play(
 		f,
@@ -138,10 +138,10 @@ static void one_worker_twice(void **state)
 	farm_free(f);
 }
 
-static void leaves_between(void **state)
+static void reconnected_worker_is_not_asked_again(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		START_ROUNDS,
 		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
 		"[2] w1 leaves -> -",
@@ -155,10 +155,10 @@ static void leaves_between(void **state)
 	});
 }
 
-static void a_restart_computes_unverified_leases_anew(void **state)
+static void restart_computes_unverified_leases_anew(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		/* unconfirmed results are lost: two workers compute the lease anew */
 		"[0] restore j1 render 1 fingerprint=A elapsed=5 groups=1 rounds=9 verify=1 -> j1 is running",
 		"[0] w1 joins A threads=1 name=a -> -",
@@ -173,33 +173,33 @@ static void a_restart_computes_unverified_leases_anew(void **state)
 
 /* A share of the leases is verified: the same leases whichever workers compute them, and about as many as were asked
  * for. */
-static void a_share_of_the_leases_is_verified(void **state)
+static void requested_share_of_leases_is_verified(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=2 verify=0.3 -> j1 submitted, j1 is queued",
 				   "[0] submit groups=2 -> j2 submitted, j2 is queued",
 				   "[0] submit groups=2 mixed verify=1 -> j3 submitted, j3 is queued",
 				   NULL,
 			   });
-	int chosen = 0;
+	int verified_count = 0;
 	for (uint64_t e = 0; e < 10000; e++) {
 		struct lease_key k = {1, LEASE_RENDER, (uint32_t)(e & 1), 0, e / 2};
-		chosen += farm_verifies(f, &k);
+		verified_count += farm_lease_is_verified(f, &k);
 		k.job = 2;
-		assert_false(farm_verifies(f, &k));
+		assert_false(farm_lease_is_verified(f, &k));
 		k.job = 3;
-		assert_false(farm_verifies(f, &k));
+		assert_false(farm_lease_is_verified(f, &k));
 	}
-	assert_in_range(chosen, 2760, 3240); /* within 5.2 sigma of a fair draw; the draw is fixed */
+	assert_in_range(verified_count, 2760, 3240); /* within 5.2 sigma of a fair draw; the draw is fixed */
 	farm_free(f);
 }
 
-static void outvoted_three_times_is_quarantined(void **state)
+static void worker_outvoted_three_times_is_quarantined(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(
 		f,
 		(const char *const[]){
@@ -237,16 +237,16 @@ static void outvoted_three_times_is_quarantined(void **state)
 	struct peer_status p;
 	struct worker_status w;
 	struct job_status j;
-	assert_true(farm_peer(f, 6, &p));
+	assert_true(farm_peer_status(f, 6, &p));
 	assert_int_equal(p.state, PEER_QUARANTINED);
 	assert_int_equal(farm_next_quarantined(f, 0), 3);
 	assert_int_equal(farm_next_quarantined(f, 3), 0);
-	assert_true(farm_worker(f, 3, &w));
-	assert_int_equal(w.wrong, 3);
+	assert_true(farm_worker_status(f, 3, &w));
+	assert_int_equal(w.wrong_results, 3);
 	assert_string_equal(w.name, "c");
 	assert_int_equal(w.restarts, 5);
-	assert_string_equal(w.text, "wrong result: j1 render group 0 part 0 epoch 1");
-	assert_true(farm_job(f, 1, 5, &j));
+	assert_string_equal(w.last_fault, "wrong result: j1 render group 0 part 0 epoch 1");
+	assert_true(farm_job_status(f, 1, 5, &j));
 	assert_int_equal(j.counts.failures, 0);
 	assert_int_equal(j.counts.mismatched, 3);
 	transcript_play(f, (const char *const[]){
@@ -257,10 +257,10 @@ static void outvoted_three_times_is_quarantined(void **state)
 }
 
 /* Its unconfirmed results of other leases do not count either. */
-static void notes_of_a_liar(void **state)
+static void unconfirmed_results_of_a_quarantined_worker_are_dropped(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 name=a -> -",
 		"[0] w2 joins A threads=1 name=b -> -",
@@ -278,7 +278,7 @@ static void notes_of_a_liar(void **state)
 static void quarantined_workers_are_remembered(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] quarantined certificate=a name=b home=c -> -",
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 certificate=a name=b -> -",
@@ -292,7 +292,7 @@ static void quarantined_workers_are_remembered(void **state)
 static void one_identity_is_one_worker_at_a_time(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 name=a home=a start=7 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
@@ -315,10 +315,10 @@ static void one_identity_is_one_worker_at_a_time(void **state)
 }
 
 /* The only worker of its kind cannot spoil a job of which nothing is merged yet. */
-static void odd_one_out(void **state)
+static void only_worker_of_its_fingerprint_cannot_block_a_job(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",
 				   "[0] w1 joins A threads=1 name=a -> -",
@@ -337,10 +337,10 @@ static void odd_one_out(void **state)
 }
 
 /* If one result is there and the second takes long, a third worker gets the lease. */
-static void a_slow_second_answer_is_asked_of_a_third(void **state)
+static void third_worker_is_asked_if_the_second_is_slow(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){
+	transcript_check((const char *const[]){
 		START_ROUNDS,
 		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
 		"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
@@ -354,7 +354,7 @@ static void a_slow_second_answer_is_asked_of_a_third(void **state)
 	});
 }
 
-static void give_faults(struct farm *f, uint64_t peer, const char *certificate, const char *name)
+static void quarantine_by_faults(struct farm *f, uint64_t peer, const char *certificate, const char *name)
 {
 	struct update u;
 	struct event ev = {
@@ -372,29 +372,29 @@ static void give_faults(struct farm *f, uint64_t peer, const char *certificate, 
 
 /* A worker that changes its name again and again is remembered by the last names, and displaces no record of another
  * certificate. */
-static void names_without_end(void **state)
+static void changing_names_displace_no_other_record(void **state)
 {
 	(void)state;
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	struct worker_status w;
 	char name[16];
 	transcript_play(f, (const char *const[]){
 				   "[0] submit groups=1 -> j1 submitted, j1 is queued",
 				   NULL,
 			   });
-	give_faults(f, 1, "b", "honest once");
+	quarantine_by_faults(f, 1, "b", "honest once");
 	for (uint64_t i = 2; i < 500; i++) {
 		snprintf(name, sizeof name, "n%u", (unsigned)i);
-		give_faults(f, i, "a", name);
+		quarantine_by_faults(f, i, "a", name);
 	}
 	uint64_t who = farm_next_quarantined(f, 0);
-	assert_true(farm_worker(f, who, &w) && strcmp(w.certificate, "b") == 0);
+	assert_true(farm_worker_status(f, who, &w) && strcmp(w.certificate, "b") == 0);
 	int count = 0;
 	while ((who = farm_next_quarantined(f, who))) {
-		assert_true(farm_worker(f, who, &w));
+		assert_true(farm_worker_status(f, who, &w));
 		count++;
 	}
-	assert_int_equal(count, IDENTITY_QUARANTINED);
+	assert_int_equal(count, IDENTITY_QUARANTINED_MAX);
 	assert_string_equal(w.name, "n499");
 	farm_free(f);
 }
@@ -402,20 +402,20 @@ static void names_without_end(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_two_workers_agree_on_counts),
-		cmocka_unit_test(third_decides),
-		cmocka_unit_test(all_differ),
-		cmocka_unit_test(one_worker_twice),
-		cmocka_unit_test(leaves_between),
-		cmocka_unit_test(a_restart_computes_unverified_leases_anew),
-		cmocka_unit_test(a_share_of_the_leases_is_verified),
-		cmocka_unit_test(outvoted_three_times_is_quarantined),
-		cmocka_unit_test(notes_of_a_liar),
+		cmocka_unit_test(result_counts_once_two_workers_agree),
+		cmocka_unit_test(third_worker_decides_where_two_differ),
+		cmocka_unit_test(job_fails_if_four_workers_all_differ),
+		cmocka_unit_test(worker_cannot_verify_itself),
+		cmocka_unit_test(reconnected_worker_is_not_asked_again),
+		cmocka_unit_test(restart_computes_unverified_leases_anew),
+		cmocka_unit_test(requested_share_of_leases_is_verified),
+		cmocka_unit_test(worker_outvoted_three_times_is_quarantined),
+		cmocka_unit_test(unconfirmed_results_of_a_quarantined_worker_are_dropped),
 		cmocka_unit_test(quarantined_workers_are_remembered),
 		cmocka_unit_test(one_identity_is_one_worker_at_a_time),
-		cmocka_unit_test(odd_one_out),
-		cmocka_unit_test(a_slow_second_answer_is_asked_of_a_third),
-		cmocka_unit_test(names_without_end),
+		cmocka_unit_test(only_worker_of_its_fingerprint_cannot_block_a_job),
+		cmocka_unit_test(third_worker_is_asked_if_the_second_is_slow),
+		cmocka_unit_test(changing_names_displace_no_other_record),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,12 +10,12 @@
 
 #include <cmocka.h>
 
-enum { LINES = 24 };
+enum { LINES_MAX = 24 };
 
 static const struct {
-	const char *lines[LINES]; /* the events that lead to the state */
-	const char *why;	  /* the reason that job 1 gives then; "": it does not wait */
-} states[] = {
+	const char *lines[LINES_MAX]; /* the events that lead to the state */
+	const char *reason;	      /* the reason that job 1 gives then; "": it does not wait */
+} cases[] = {
 	{{"[0] submit -> j1 submitted, j1 is queued"}, "no worker is connected"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -"}, "no worker asks for work"},
 	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -",
@@ -106,34 +106,34 @@ static void a_lack_of_room_is_no_failure(void **state)
 {
 	(void)state;
 	struct job_status s;
-	struct farm *f = transcript_farm();
-	const char *lines[LINES] = {
+	struct farm *f = transcript_farm_new();
+	const char *lines[LINES_MAX] = {
 		"[0] submit groups=5 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", "[1] w1 postpones j1 g0 p0 boot full -> -"};
 	transcript_play(f, lines);
-	assert_true(farm_job(f, 1, 2, &s));
+	assert_true(farm_job_status(f, 1, 2, &s));
 	assert_string_equal(s.waiting, "worker w1 has no room for its scene now: full");
 	assert_string_equal(s.why, "");
 	farm_free(f);
 }
 
-static void every_state(void **state)
+static void every_waiting_state_gives_its_reason(void **state)
 {
 	(void)state;
-	for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct job_status s;
-		struct farm *f = transcript_farm();
-		transcript_play(f, states[i].lines);
-		assert_true(farm_job(f, 1, 100, &s));
-		if (strcmp(s.waiting, states[i].why) != 0)
-			fail_msg("state %zu: '%s', not '%s'", i, s.waiting, states[i].why);
+		struct farm *f = transcript_farm_new();
+		transcript_play(f, cases[i].lines);
+		assert_true(farm_job_status(f, 1, 100, &s));
+		if (strcmp(s.waiting, cases[i].reason) != 0)
+			fail_msg("state %zu: '%s', not '%s'", i, s.waiting, cases[i].reason);
 		assert_true(!*s.waiting == !*s.owners_waiting);
 		farm_free(f);
 	}
 }
 
 /* Room on the disk is reserved for jobs that have leases at workers, or that lack nothing else. */
-static void whose_results_may_come(void **state)
+static void results_are_expected_only_of_jobs_that_can_get_them(void **state)
 {
 	(void)state;
 	static const struct {
@@ -150,11 +150,11 @@ static void whose_results_may_come(void **state)
 		{"[4] release j1 -> -", false},
 		{"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)", false},
 	};
-	struct farm *f = transcript_farm();
+	struct farm *f = transcript_farm_new();
 	for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
 		int priority;
 		transcript_play(f, (const char *const[]){steps[i].line, NULL});
-		if (farm_expects_results(f, 1, &priority) != steps[i].expected)
+		if (farm_job_expects_results(f, 1, &priority) != steps[i].expected)
 			fail_msg("step %zu", i);
 		assert_int_equal(priority, 7);
 	}
@@ -163,8 +163,8 @@ static void whose_results_may_come(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_waiting_state_gives_its_reason),
 					   cmocka_unit_test(a_lack_of_room_is_no_failure),
-					   cmocka_unit_test(whose_results_may_come)};
+					   cmocka_unit_test(results_are_expected_only_of_jobs_that_can_get_them)};
 	return cmocka_run_group_tests_name("coordinator/core/test_why", tests, NULL, NULL);
 }

@@ -5,7 +5,7 @@
 
 #include "common/base/disk.h"
 #include "tests/support/failing_list.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -25,31 +25,31 @@ static int folder_fault, file_fault; /* errno of the fault; 0: none */
 static int set_up(void **state)
 {
 	static char spool[128];
-	if (folder_set_up(state))
+	if (temporary_folder_set_up(state))
 		return -1;
 	memset(&jobs, 0, sizeof jobs);
 	folder_fault = file_fault = 0;
-	snprintf(spool, sizeof spool, "%s/spool", folder);
-	jobs.config.spool = spool;
-	return spool_open(&jobs.spool, spool, &e) || spool_make_job(jobs.spool, JOB, &e);
+	snprintf(spool, sizeof spool, "%s/spool", temporary_folder);
+	jobs.config.spool_folder = spool;
+	return spool_open(&jobs.spool, spool, &e) || spool_create_job_folder(jobs.spool, JOB, &e);
 }
 
 static int tear_down(void **state)
 {
-	disk_use(NULL);
+	disk_set_calls(NULL);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
-	return folder_tear_down(state);
+	return temporary_folder_tear_down(state);
 }
 
-static bool is_there(const char *file)
+static bool job_file_exists(const char *file)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, JOB, file, path);
 	return access(path, F_OK) == 0;
 }
 
-static DIR *own_opendir(const char *path)
+static DIR *faulty_opendir(const char *path)
 {
 	if (folder_fault && strstr(path, "/jobs/j")) {
 		errno = folder_fault;
@@ -58,7 +58,7 @@ static DIR *own_opendir(const char *path)
 	return disk_system.opendir(path);
 }
 
-static int own_stat(const char *path, struct stat *st)
+static int faulty_stat(const char *path, struct stat *st)
 {
 	if (file_fault && strstr(path, "/checkpoint")) {
 		errno = file_fault;
@@ -67,62 +67,62 @@ static int own_stat(const char *path, struct stat *st)
 	return disk_system.stat(path, st);
 }
 
-static int start(int folder_error, int file_error)
+static int reconcile_with_faults(int folder_error, int file_error)
 {
-	struct disk own = disk_system;
-	own.opendir = own_opendir;
-	own.stat = own_stat;
-	disk_use(&own);
+	struct disk faulty_calls = disk_system;
+	faulty_calls.opendir = faulty_opendir;
+	faulty_calls.stat = faulty_stat;
+	disk_set_calls(&faulty_calls);
 	folder_fault = folder_error;
 	file_fault = file_error;
-	int rc = reconcile(&jobs, &e);
-	disk_use(NULL);
+	int rc = reconcile_spool(&jobs, &e);
+	disk_set_calls(NULL);
 	ledger_close(jobs.ledger);
 	jobs.ledger = NULL;
 	return rc;
 }
 
-static void a_file_that_cannot_be_read_stops_the_start(void **state)
+static void unreadable_file_stops_the_start(void **state)
 {
 	(void)state;
-	assert_int_equal(spool_write(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
+	assert_int_equal(spool_write_job_file(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
 	static const int faults[] = {EMFILE, EIO, EACCES};
 	for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
-		assert_int_equal(start(faults[i], 0), -faults[i]);
-		assert_true(is_there("checkpoint"));
-		assert_int_equal(start(0, faults[i]), -faults[i]);
-		assert_true(is_there("checkpoint"));
+		assert_int_equal(reconcile_with_faults(faults[i], 0), -faults[i]);
+		assert_true(job_file_exists("checkpoint"));
+		assert_int_equal(reconcile_with_faults(0, faults[i]), -faults[i]);
+		assert_true(job_file_exists("checkpoint"));
 	}
-	assert_int_equal(start(0, 0), -EBADMSG); /* the folder is read this time: the job is lost */
-	assert_true(is_there("checkpoint"));
+	assert_int_equal(reconcile_with_faults(0, 0), -EBADMSG); /* the folder is read this time: the job is lost */
+	assert_true(job_file_exists("checkpoint"));
 }
 
-static void never_accepted(void **state)
+static void job_that_was_never_accepted_is_deleted(void **state)
 {
 	(void)state;
-	assert_int_equal(start(0, 0), 0);
-	assert_false(is_there(NULL));
+	assert_int_equal(reconcile_with_faults(0, 0), 0);
+	assert_false(job_file_exists(NULL));
 }
 
-static void listed_in_part(void **state)
+static void partial_listing_stops_the_start(void **state)
 {
 	(void)state;
-	assert_int_equal(spool_write(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
+	assert_int_equal(spool_write_job_file(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
 	failing_list_begin("/jobs/j", 0, EIO);
-	int rc = reconcile(&jobs, &e);
+	int rc = reconcile_spool(&jobs, &e);
 	failing_list_end();
 	ledger_close(jobs.ledger);
 	jobs.ledger = NULL;
 	assert_int_equal(rc, -EIO);
-	assert_true(is_there("checkpoint"));
+	assert_true(job_file_exists("checkpoint"));
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(a_file_that_cannot_be_read_stops_the_start, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(never_accepted, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(listed_in_part, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(unreadable_file_stops_the_start, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(job_that_was_never_accepted_is_deleted, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(partial_listing_stops_the_start, set_up, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

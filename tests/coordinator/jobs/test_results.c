@@ -4,11 +4,11 @@
  * once, come late, are useless, or failed; and extensions of jobs that are done. Slow connections are in
  * test_slow_links.c.
  */
-#include "tests/support/served.h"
+#include "tests/support/child_server.h"
 
 #include "common/base/mem.h"
 #include "coordinator/store/ledger.h"
-#include "tests/support/black_results.h"
+#include "tests/support/black_batch.h"
 #include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
@@ -27,56 +27,56 @@
 static int set_up(void **state)
 {
 	(void)state;
-	return served_start(60, 60, 60);
+	return child_server_start(60, 60, 60);
 }
 
 static void a_black_job_ends(void **state)
 {
 	(void)state;
-	struct scripted *client = peer_call(), *worker = peer_call();
+	struct scripted_peer *client = child_server_connect(), *worker = child_server_connect();
 	struct plan plan;
 	struct error e;
-	struct plan_request r = peer_plan_request(NULL);
+	struct plan_request r = child_server_plan_request(NULL);
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
-	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
-	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
-	peer_send_blob(client, "<scene/>", "<scene/>");
-	const Farm__SubmitAnswer *a = peer_submit_answer(client);
+	assert_true(child_server_exchange_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	child_server_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(child_server_receive_submit_answer(client)->n_missing, 1);
+	child_server_send_blob(client, "<scene/>", "<scene/>");
+	const Farm__SubmitAnswer *a = child_server_receive_submit_answer(client);
 	assert_int_equal(a->job, 1);
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct lease_queue d = {.count = 0};
+	assert_true(child_server_exchange_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	child_server_send_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct pending_leases d = {.count = 0};
 	bool first = true;
 	while (!d.job_ended) {
 		if (d.count == 0) {
-			peer_attend(worker, &d);
+			child_server_handle_message(worker, &d);
 			continue;
 		}
 		struct batch b = black_batch(&d.keys[--d.count], &plan, 0);
 		if (first) { /* wrong results, then right ones, then a repeat */
 			b.weights[0] = NAN;
-			peer_send_batch(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			child_server_send_batch(worker, &b, &plan);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
 			b.weights[0] = 0;
-			peer_send_batch(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
-			peer_send_batch(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			child_server_send_batch(worker, &b, &plan);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+			child_server_send_batch(worker, &b, &plan);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
 			first = false;
 		} else {
-			peer_send_batch(worker, &b, &plan);
+			child_server_send_batch(worker, &b, &plan);
 		}
 		batch_fini(&b);
 	}
-	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = scripted_hear(client);
+	child_server_send_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_peer_receive(client);
 	assert_non_null(m);
 	assert_int_equal(m->job_list_answer->n_jobs, 1);
 	assert_string_equal(m->job_list_answer->jobs[0]->state, "done");
 	assert_true(m->job_list_answer->jobs[0]->fetchable);
-	scripted_hang_up(client);
-	scripted_hang_up(worker);
+	scripted_peer_disconnect(client);
+	scripted_peer_disconnect(worker);
 }
 
 /* ---- fetching ---- */
@@ -88,7 +88,7 @@ static void make_preview(char letter)
 {
 	char path[96], temporary[112];
 	static char bytes[FILE_SIZE];
-	snprintf(path, sizeof path, "%s/spool/jobs/j1/preview.exr", served_folder());
+	snprintf(path, sizeof path, "%s/spool/jobs/j1/preview.exr", child_server_folder());
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	memset(bytes, letter, sizeof bytes);
 	FILE *f = fopen(temporary, "w");
@@ -98,15 +98,15 @@ static void make_preview(char letter)
 	assert_int_equal(rename(temporary, path), 0);
 }
 
-static const Farm__FetchChunk *fetch_piece(struct scripted *p, uint64_t offset)
+static const Farm__FetchChunk *fetch_piece(struct scripted_peer *p, uint64_t offset)
 {
-	assert_true(scripted_fetch(p, 1, FARM__WHAT__WHAT_PREVIEW, offset));
-	const Farm__Envelope *answer = scripted_hear(p);
+	assert_true(scripted_peer_fetch(p, 1, FARM__WHAT__WHAT_PREVIEW, offset));
+	const Farm__Envelope *answer = scripted_peer_receive(p);
 	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_FETCH_CHUNK);
 	return answer->fetch_chunk;
 }
 
-static void expect_piece(struct scripted *p, uint64_t offset, char letter)
+static void expect_piece(struct scripted_peer *p, uint64_t offset, char letter)
 {
 	const Farm__FetchChunk *c = fetch_piece(p, offset);
 	assert_string_equal(c->error, "");
@@ -116,13 +116,13 @@ static void expect_piece(struct scripted *p, uint64_t offset, char letter)
 	assert_int_equal(p->reader.payload.bytes[p->reader.payload.size - 1], letter);
 }
 
-static void what_is_fetched_is_one_file(void **state)
+static void fetched_pieces_are_of_one_file(void **state)
 {
 	(void)state;
-	struct scripted *client[3];
+	struct scripted_peer *client[3];
 	for (int i = 0; i < 3; i++) {
-		client[i] = peer_call();
-		assert_true(peer_hello(client[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+		client[i] = child_server_connect();
+		assert_true(child_server_exchange_hello(client[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	}
 	make_preview('a');
 	assert_true(*fetch_piece(client[0], PIECE)->error); /* no fetch has begun */
@@ -142,11 +142,11 @@ static void what_is_fetched_is_one_file(void **state)
 	expect_piece(client[0], 0, 'b');
 	expect_piece(client[2], PIECE, 'b');
 	for (int i = 0; i < 3; i++)
-		scripted_hang_up(client[i]);
+		scripted_peer_disconnect(client[i]);
 }
 
 /* Result of a lease: chains that find no light; a bootstrap in uniform light. */
-static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
+static struct batch make_counting_batch(const struct lease_key *k, const struct plan *plan)
 {
 	struct batch b = black_batch(k, plan, 4);
 	if (k->kind == LEASE_BOOTSTRAP) {
@@ -158,24 +158,24 @@ static struct batch counting_batch(const struct lease_key *k, const struct plan 
 	b.counters[COUNT_STUCK] = b.state_count;
 	b.counters[COUNT_LONGEST_STUCK] = 1 + k->group;
 	b.strategy_count = 2;
-	b.strategy[0][STRATEGY_PROPOSED] = 3;
-	b.strategy[1][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] - 3;
-	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 40;
-	b.strategy[1][STRATEGY_FAIL_MODE] = 7 + k->part;
+	b.strategies[0][STRATEGY_PROPOSED] = 3;
+	b.strategies[1][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] - 3;
+	b.strategies[1][STRATEGY_RAYS] = UINT64_C(1) << 40;
+	b.strategies[1][STRATEGY_FAIL_MODE] = 7 + k->part;
 	return b;
 }
 
 /* The value is finite, and larger than all mutations of the job can add up to. */
-static void send_with_huge_pixel(struct scripted *worker, struct batch *b, const struct plan *plan)
+static void send_with_huge_pixel(struct scripted_peer *worker, struct batch *b, const struct plan *plan)
 {
 	size_t count = (size_t)plan->crop_width * plan->crop_height * TILE_CHANNELS;
 	struct tile tile = {plan->crop_x, plan->crop_y, plan->crop_width, plan->crop_height,
 			    mem_alloc(count, sizeof(float))};
-	struct batch with = *b;
+	struct batch batch_with_tile = *b;
 	tile.xyz[count / 2] = 1e30f;
-	with.tiles = &tile;
-	with.tile_count = 1;
-	peer_send_batch(worker, &with, plan);
+	batch_with_tile.tiles = &tile;
+	batch_with_tile.tile_count = 1;
+	child_server_send_batch(worker, &batch_with_tile, plan);
 	mem_free(tile.xyz);
 }
 
@@ -185,8 +185,9 @@ static void expect_counts_in_spool(const struct plan *plan)
 	struct error e;
 	char path[96], command[300];
 	struct ledger *l;
-	snprintf(path, sizeof path, "%s/read", served_folder()); /* the coordinator has its own file locked */
-	snprintf(command, sizeof command, "mkdir '%s' && cp '%s/spool/jobs.db'* '%s'", path, served_folder(), path);
+	snprintf(path, sizeof path, "%s/read", child_server_folder()); /* the coordinator has its own file locked */
+	snprintf(command, sizeof command, "mkdir '%s' && cp '%s/spool/jobs.db'* '%s'", path, child_server_folder(),
+		 path);
 	assert_int_equal(system(command), 0);
 	assert_int_equal(ledger_open(&l, path, &e), 0);
 	assert_int_equal(ledger_read_record(l, 2, &r, &e), 0);
@@ -196,10 +197,10 @@ static void expect_counts_in_spool(const struct plan *plan)
 	assert_int_equal(r.counts.repeats, 1);
 	assert_int_equal(r.counts.refused, 2);
 	assert_string_equal(r.mixture, "independent=0.1,hslt=0.9");
-	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
-	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
-	assert_true(r.strategy[1][STRATEGY_RAYS] == leases << 40);
-	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE],
+	assert_int_equal(r.strategies[0][STRATEGY_PROPOSED], 3 * leases);
+	assert_int_equal(r.strategies[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
+	assert_true(r.strategies[1][STRATEGY_RAYS] == leases << 40);
+	assert_int_equal(r.strategies[1][STRATEGY_FAIL_MODE],
 			 plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
 	assert_int_equal(r.stuck, chains);
 	assert_int_equal(r.longest_stuck, 2);
@@ -207,67 +208,67 @@ static void expect_counts_in_spool(const struct plan *plan)
 	assert_non_null(strstr(r.note, "longest run: 2 rejections"));
 }
 
-static void strategies_are_counted_once(void **state)
+static void strategies_of_a_result_are_counted_once(void **state)
 {
 	(void)state;
-	struct scripted *client = peer_call(), *worker = peer_call();
+	struct scripted_peer *client = child_server_connect(), *worker = child_server_connect();
 	struct plan plan;
 	struct error e;
-	struct plan_request r = peer_plan_request("independent=0.1,hslt=0.9");
+	struct plan_request r = child_server_plan_request("independent=0.1,hslt=0.9");
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
-	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_submit(client, r.mixture, "<scene/>", "s.xml", "s.xml");
-	assert_int_equal(peer_submit_answer(client)->job, 2); /* the scene is still stored */
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct lease_queue d = {.count = 0};
+	assert_true(child_server_exchange_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	child_server_submit(client, r.mixture, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(child_server_receive_submit_answer(client)->job, 2); /* the scene is still stored */
+	assert_true(child_server_exchange_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	child_server_send_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct pending_leases d = {.count = 0};
 	bool first = true;
 	while (!d.job_ended) {
 		if (d.count == 0) {
-			peer_attend(worker, &d);
+			child_server_handle_message(worker, &d);
 			continue;
 		}
-		struct batch b = counting_batch(&d.keys[--d.count], &plan);
+		struct batch b = make_counting_batch(&d.keys[--d.count], &plan);
 		bool wrong = first && b.key.kind == LEASE_RENDER;
 		if (wrong) {
-			b.strategy[0][STRATEGY_ACCEPTED] = 4; /* accepted, of 3 proposals */
-			peer_send_batch(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
-			b.strategy[0][STRATEGY_ACCEPTED] = 0;
+			b.strategies[0][STRATEGY_ACCEPTED] = 4; /* accepted, of 3 proposals */
+			child_server_send_batch(worker, &b, &plan);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			b.strategies[0][STRATEGY_ACCEPTED] = 0;
 			send_with_huge_pixel(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
 		}
-		peer_send_batch(worker, &b, &plan);
-		assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+		child_server_send_batch(worker, &b, &plan);
+		assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 		if (wrong) {
-			peer_send_batch(worker, &b, &plan);
-			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			child_server_send_batch(worker, &b, &plan);
+			assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
 			first = false;
 		}
 		batch_fini(&b);
 	}
 	expect_counts_in_spool(&plan);
-	scripted_hang_up(client);
-	scripted_hang_up(worker);
+	scripted_peer_disconnect(client);
+	scripted_peer_disconnect(worker);
 }
 
 /* ---- results that wait ---- */
 
-static void send_bootstrap(struct scripted *p, const struct lease_key *k)
+static void send_bootstrap_result(struct scripted_peer *p, const struct lease_key *k)
 {
 	struct plan plan;
 	struct error e;
-	struct plan_request r = peer_plan_request(NULL);
+	struct plan_request r = child_server_plan_request(NULL);
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
 	struct batch b = black_batch(k, &plan, 0);
-	peer_send_batch(p, &b, &plan);
+	child_server_send_batch(p, &b, &plan);
 	batch_fini(&b);
 }
 
-static const Farm__JobStatus *list_job(struct scripted *client, uint64_t job)
+static const Farm__JobStatus *list_job(struct scripted_peer *client, uint64_t job)
 {
-	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = scripted_hear(client);
+	child_server_send_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_peer_receive(client);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
 	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++)
 		if (m->job_list_answer->jobs[i]->job == job)
@@ -278,63 +279,64 @@ static const Farm__JobStatus *list_job(struct scripted *client, uint64_t job)
 
 /* While the film may not be read, only results that would be merged wait, each once; all other messages are answered at
  * once. */
-static void what_is_useless_does_not_wait(void **state)
+static void only_useful_results_wait_for_the_film(void **state)
 {
 	(void)state;
-	struct scripted *client = peer_call(), *worker = peer_call(), *other = peer_call();
-	struct lease_queue d = {.count = 0}, none = {.count = 0};
-	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
-	uint64_t job = peer_submit_answer(client)->job;
+	struct scripted_peer *client = child_server_connect(), *worker = child_server_connect(),
+			     *other = child_server_connect();
+	struct pending_leases d = {.count = 0}, none = {.count = 0};
+	assert_true(child_server_exchange_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	child_server_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	uint64_t job = child_server_receive_submit_answer(client)->job;
 	assert_true(job > 0);
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	assert_true(child_server_exchange_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	child_server_send_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	while (d.count < 2)
-		peer_attend(worker, &d);
-	send_bootstrap(worker, &d.keys[0]);
-	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+		child_server_handle_message(worker, &d);
+	send_bootstrap_result(worker, &d.keys[0]);
+	assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	while (d.count < 3)
-		peer_attend(worker, &d);
-	assert_true(peer_hello(other, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_job_get(other, job);
-	assert_int_equal(scripted_hear(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
-	served_set_busy(true);
+		child_server_handle_message(worker, &d);
+	assert_true(child_server_exchange_hello(other, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	child_server_send_job_get(other, job);
+	assert_int_equal(scripted_peer_receive(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
+	child_server_set_busy(true);
 	for (int i = 0; i < 3; i++)
-		send_bootstrap(worker, &d.keys[1]);
-	send_bootstrap(worker, &d.keys[0]);
-	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
-	send_bootstrap(other, &d.keys[0]);
-	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
-	send_bootstrap(other, &d.keys[1]); /* the result waits already */
-	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REFUSED);
-	send_bootstrap(other, &d.keys[2]); /* open: the worker may have held the lease before it reconnected */
-	send_bootstrap(other, &d.keys[2]);
-	send_bootstrap(other, &d.keys[0]);
-	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
-	served_at_once(); /* from other tests */
-	served_set_busy(false);
-	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
-	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
-	assert_int_equal(served_at_once(), 1); /* other connections are read in between */
-	send_bootstrap(worker, &d.keys[0]);    /* no other result was kept */
-	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+		send_bootstrap_result(worker, &d.keys[1]);
+	send_bootstrap_result(worker, &d.keys[0]);
+	assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap_result(other, &d.keys[0]);
+	assert_int_equal(child_server_await_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap_result(other, &d.keys[1]); /* the result waits already */
+	assert_int_equal(child_server_await_verdict(other, &none), FARM__VERDICT__VERDICT_REFUSED);
+	send_bootstrap_result(other, &d.keys[2]); /* open: the worker may have held the lease before it reconnected */
+	send_bootstrap_result(other, &d.keys[2]);
+	send_bootstrap_result(other, &d.keys[0]);
+	assert_int_equal(child_server_await_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	child_server_max_batches_per_turn(); /* from other tests */
+	child_server_set_busy(false);
+	assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	assert_int_equal(child_server_await_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	assert_int_equal(child_server_max_batches_per_turn(), 1); /* other connections are read in between */
+	send_bootstrap_result(worker, &d.keys[0]);		  /* no other result was kept */
+	assert_int_equal(child_server_await_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
 	assert_true(d.count >= 4); /* a worker that leaves takes its waiting results with it */
-	served_set_busy(true);
-	send_bootstrap(worker, &d.keys[3]);
-	scripted_hang_up(worker);
+	child_server_set_busy(true);
+	send_bootstrap_result(worker, &d.keys[3]);
+	scripted_peer_disconnect(worker);
 	while (list_job(client, job)->leases)
 		usleep(1000);
-	send_bootstrap(other, &d.keys[3]);
-	served_set_busy(false);
-	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
-	scripted_hang_up(client);
-	scripted_hang_up(other);
+	send_bootstrap_result(other, &d.keys[3]);
+	child_server_set_busy(false);
+	assert_int_equal(child_server_await_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	scripted_peer_disconnect(client);
+	scripted_peer_disconnect(other);
 }
 
-static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int times)
+static void send_extend(const struct scripted_peer *p, uint64_t job, uint64_t spp, int times)
 {
-	unsigned char all[512];
-	size_t at = 0;
+	unsigned char frames[512];
+	size_t total_size = 0;
 	Farm__Control c;
 	Farm__Envelope m;
 	farm__control__init(&c);
@@ -346,17 +348,17 @@ static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int
 	m.control = &c;
 	for (int i = 0; i < times; i++) {
 		size_t size;
-		unsigned char *frame = checksummed_message(&m, NULL, 0, &size);
-		memcpy(all + at, frame, size);
-		at += size;
+		unsigned char *frame = checksummed_frame_from_message(&m, NULL, 0, &size);
+		memcpy(frames + total_size, frame, size);
+		total_size += size;
 		free(frame);
 	}
-	peer_say_bytes(p, all, at);
+	child_server_send_bytes(p, frames, total_size);
 }
 
-static void hear_done(struct scripted *p, bool ok, const char *text)
+static void expect_done(struct scripted_peer *p, bool ok, const char *text)
 {
-	const Farm__Envelope *m = scripted_hear(p);
+	const Farm__Envelope *m = scripted_peer_receive(p);
 	assert_non_null(m);
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
 	assert_int_equal(m->done->ok, ok);
@@ -368,31 +370,31 @@ static void hear_done(struct scripted *p, bool ok, const char *text)
 static void extensions_wait_for_films(void **state)
 {
 	(void)state;
-	struct scripted *a = peer_call(), *b = peer_call();
-	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	assert_true(peer_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	say_extend(a, 2, 0, 1); /* this is no reason to wait */
-	hear_done(a, false, "a bound is missing");
-	say_extend(a, 2, 8, 3);
-	say_extend(b, 2, 8, 1);
-	hear_done(a, false, "one extension at a time");
-	hear_done(a, false, "one extension at a time");
-	hear_done(a, true, "continues after");
-	hear_done(b, true, "continues after"); /* the job runs by then */
-	say_extend(a, 1, 8, 1);
-	hear_done(a, false, "it is black");
-	scripted_hang_up(a);
-	scripted_hang_up(b);
-	a = peer_call();
-	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_say_empty(a, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = scripted_hear(a);
+	struct scripted_peer *a = child_server_connect(), *b = child_server_connect();
+	assert_true(child_server_exchange_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	assert_true(child_server_exchange_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	send_extend(a, 2, 0, 1); /* this is no reason to wait */
+	expect_done(a, false, "a bound is missing");
+	send_extend(a, 2, 8, 3);
+	send_extend(b, 2, 8, 1);
+	expect_done(a, false, "one extension at a time");
+	expect_done(a, false, "one extension at a time");
+	expect_done(a, true, "continues after");
+	expect_done(b, true, "continues after"); /* the job runs by then */
+	send_extend(a, 1, 8, 1);
+	expect_done(a, false, "it is black");
+	scripted_peer_disconnect(a);
+	scripted_peer_disconnect(b);
+	a = child_server_connect();
+	assert_true(child_server_exchange_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	child_server_send_empty(a, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_peer_receive(a);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
 	assert_false(m->job_list_answer->jobs[1]->ended);
-	scripted_hang_up(a);
+	scripted_peer_disconnect(a);
 }
 
-static void say_failed(struct scripted *p, const struct lease_key *k, const char *text)
+static void send_failure(struct scripted_peer *p, const struct lease_key *k, const char *text)
 {
 	Farm__LeaseKey key;
 	Farm__LeaseFailed failed;
@@ -406,7 +408,7 @@ static void say_failed(struct scripted *p, const struct lease_key *k, const char
 	failed.text = copy;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
-	peer_say(p, &m, NULL, 0);
+	child_server_send(p, &m, NULL, 0);
 }
 
 /* A failure counts against the scene or the worker, and never ends the connection because of bytes that a scene's
@@ -414,32 +416,32 @@ static void say_failed(struct scripted *p, const struct lease_key *k, const char
 static void a_failure_counts_whatever_its_text(void **state)
 {
 	(void)state;
-	struct scripted *client = peer_call(), *worker = peer_call();
-	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
-	assert_true(peer_submit_answer(client)->job);
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct lease_queue d = {.count = 0};
+	struct scripted_peer *client = child_server_connect(), *worker = child_server_connect();
+	assert_true(child_server_exchange_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	child_server_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_true(child_server_receive_submit_answer(client)->job);
+	assert_true(child_server_exchange_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	child_server_send_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct pending_leases d = {.count = 0};
 	while (d.count == 0)
-		peer_attend(worker, &d);
-	say_failed(worker, &d.keys[0], "half a letter \xc3\nof a file");
-	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+		child_server_handle_message(worker, &d);
+	send_failure(worker, &d.keys[0], "half a letter \xc3\nof a file");
+	child_server_send_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	while (!strstr(list_job(client, d.keys[0].job)->why, "scripted failed last: half a letter ? of a file"))
 		usleep(1000);
 	struct pollfd ready = {worker->fd, POLLIN, 0};
 	while (poll(&ready, 1, 200) == 1) /* neither an error nor the end of the connection */
-		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE &&
+		assert_true(child_server_handle_message(worker, &d) == FARM__VERDICT__VERDICT_NONE &&
 			    worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
-	scripted_hang_up(client);
-	scripted_hang_up(worker);
+	scripted_peer_disconnect(client);
+	scripted_peer_disconnect(worker);
 }
 
-static off_t size_of_log(uint64_t job)
+static off_t log_size(uint64_t job)
 {
 	char path[128];
 	struct stat st;
-	snprintf(path, sizeof path, "%s/spool/jobs/j%llu/log", served_folder(), (unsigned long long)job);
+	snprintf(path, sizeof path, "%s/spool/jobs/j%llu/log", child_server_folder(), (unsigned long long)job);
 	assert_int_equal(stat(path, &st), 0);
 	return st.st_size;
 }
@@ -448,52 +450,54 @@ static off_t size_of_log(uint64_t job)
 static void complaints_do_not_fill_the_log(void **state)
 {
 	(void)state;
-	enum { COMPLAINTS = 4000, MOST = 100000 /* bytes */ };
+	enum { COMPLAINTS = 4000, LOG_BYTES_MAX = 100000 /* bytes */ };
 	const struct lease_key k = {.job = 3, .kind = LEASE_BOOTSTRAP};
-	struct scripted *worker = peer_call();
-	struct lease_queue d = {.count = 0};
-	off_t before = size_of_log(k.job);
-	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	struct scripted_peer *worker = child_server_connect();
+	struct pending_leases d = {.count = 0};
+	off_t before = log_size(k.job);
+	assert_true(child_server_exchange_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	for (int i = 0; i < COMPLAINTS; i++)
-		say_failed(worker, &k, "I do not like it");
-	peer_say_job_get(worker, 1000); /* answered once all complaints were read */
+		send_failure(worker, &k, "I do not like it");
+	child_server_send_job_get(worker, 1000); /* answered once all complaints were read */
 	while (!d.job_ended)
-		peer_attend(worker, &d);
-	assert_in_range(size_of_log(k.job) - before, 1, MOST);
-	scripted_hang_up(worker);
+		child_server_handle_message(worker, &d);
+	assert_in_range(log_size(k.job) - before, 1, LOG_BYTES_MAX);
+	scripted_peer_disconnect(worker);
 }
 
 /* Sends an extension of job 2 and waits until the coordinator has it. */
-static void send_extension(struct scripted *p)
+static void send_extension(struct scripted_peer *p)
 {
-	say_extend(p, 2, 8, 1);
-	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = scripted_hear(p);
+	send_extend(p, 2, 8, 1);
+	child_server_send_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_peer_receive(p);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
 }
 
-static void extensions_are_served_as_they_came(void **state)
+static void extensions_are_served_in_their_order(void **state)
 {
 	(void)state;
 	enum { CLIENTS = 4 };
 	static const unsigned order[CLIENTS] = {1, 3, 0, 2};
-	struct scripted *p[CLIENTS];
+	struct scripted_peer *p[CLIENTS];
 	unsigned long long last = 0, rounds = 0;
 	for (int i = 0; i < CLIENTS; i++)
-		assert_true(peer_hello(p[i] = peer_call(), FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	served_set_busy(true);
+		assert_true(child_server_exchange_hello(p[i] = child_server_connect(), FARM_VERSION,
+							FARM__ROLE__ROLE_CLIENT)
+				    ->accepted);
+	child_server_set_busy(true);
 	for (int i = 0; i < CLIENTS; i++)
 		send_extension(p[order[i]]);
-	scripted_hang_up(p[order[1]]);
-	served_set_busy(false);
+	scripted_peer_disconnect(p[order[1]]);
+	child_server_set_busy(false);
 	for (int i = 0; i < CLIENTS; i++, last = rounds) {
 		if (i == 1)
 			continue;
-		hear_done(p[order[i]], true, "continues after");
+		expect_done(p[order[i]], true, "continues after");
 		const char *text = strstr(p[order[i]]->env.message->done->text, "until ");
 		assert_int_equal(sscanf(text, "until %llu", &rounds), 1);
 		assert_true(rounds > last);
-		scripted_hang_up(p[order[i]]);
+		scripted_peer_disconnect(p[order[i]]);
 	}
 }
 
@@ -501,13 +505,14 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_black_job_ends),
-		cmocka_unit_test(what_is_fetched_is_one_file), /* uses that job */
-		cmocka_unit_test(strategies_are_counted_once),
-		cmocka_unit_test(what_is_useless_does_not_wait),
-		cmocka_unit_test(extensions_wait_for_films), /* continues the job of strategies_are_counted_once */
-		cmocka_unit_test(extensions_are_served_as_they_came),
+		cmocka_unit_test(fetched_pieces_are_of_one_file), /* uses that job */
+		cmocka_unit_test(strategies_of_a_result_are_counted_once),
+		cmocka_unit_test(only_useful_results_wait_for_the_film),
+		cmocka_unit_test(
+			extensions_wait_for_films), /* continues the job of strategies_of_a_result_are_counted_once */
+		cmocka_unit_test(extensions_are_served_in_their_order),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 		cmocka_unit_test(complaints_do_not_fill_the_log), /* uses that job */
 	};
-	return cmocka_run_group_tests(tests, set_up, served_stop);
+	return cmocka_run_group_tests(tests, set_up, child_server_stop);
 }

@@ -8,7 +8,7 @@
 #include "coordinator/live_job/stored.h"
 #include "common/wire/envelope.h"
 #include "tests/support/canvas_batches.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/golden.h"
 
 #include <setjmp.h>
@@ -21,23 +21,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { JOB = 5, GENERATION = 7, CHAINS = 4, HEAD = 12, FILE_MOST = 1 << 20 };
+enum { JOB = 5, GENERATION = 7, CHAINS = 4, PREFIX_SIZE = 12, FILE_SIZE_MAX = 1 << 20 };
 
 /* After the head: four seeds, no chain states of the first part, two of the second, the version of the films. */
-static const unsigned char middle[] = {
+static const unsigned char golden_middle[] = {
 	8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 10, 0, 0, 0,
 	0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'a',  'b',  'c',  1,	0,    0,    0,	  'd',	2,  0, 0, 0,
 };
-enum { STATES = 8 * CHAINS, FIRST_SIZE = STATES + 8, SECOND_SIZE = FIRST_SIZE + 7, FILMS = sizeof middle - 4 };
+enum {
+	STATES_OFFSET = 8 * CHAINS,
+	FIRST_STATE_SIZE_OFFSET = STATES_OFFSET + 8,
+	SECOND_STATE_SIZE_OFFSET = FIRST_STATE_SIZE_OFFSET + 7,
+	FILMS_OFFSET = sizeof golden_middle - 4
+};
 
 static struct error e;
 static struct spool *spool;
 static char path[SPOOL_PATH_MAX];
-static unsigned char bytes[FILE_MOST];
+static unsigned char bytes[FILE_SIZE_MAX];
 
 static struct live_job *make_job(void)
 {
-	struct plan p = canvas_plan(PLAN_CHAINS, 1, 1, 1, 2);
+	struct plan p = canvas_test_plan(PLAN_CHAINS, 1, 1, 1, 2);
 	Farm__Submit submit;
 	Farm__Envelope m;
 	struct envelope env;
@@ -58,7 +63,7 @@ static struct live_job *make_job(void)
 	return job;
 }
 
-static struct chain_state state_of(const char *text)
+static struct chain_state make_state(const char *text)
 {
 	struct chain_state s = {mem_alloc(strlen(text), 1), (uint32_t)strlen(text)};
 	memcpy(s.bytes, text, s.size);
@@ -74,8 +79,8 @@ static size_t write_file(size_t *size)
 	struct checked_file f;
 	memcpy(job->seeds, seeds, sizeof seeds);
 	job->states[1] = mem_alloc(2, sizeof *job->states[1]);
-	job->states[1][0] = state_of("abc");
-	job->states[1][1] = state_of("d");
+	job->states[1][0] = make_state("abc");
+	job->states[1][1] = make_state("d");
 	assert_int_equal(canvas_new(&job->canvas, &job->plan, canvas_grid_exponent(&job->plan, 0, 0), NULL, &e), 0);
 	assert_int_equal(checked_file_create(&f, path, &e), 0);
 	assert_int_equal(checkpoint_write(job, &h, &f, &e), 0);
@@ -84,18 +89,18 @@ static size_t write_file(size_t *size)
 	FILE *in = fopen(path, "rb");
 	assert_non_null(in);
 	*size = fread(bytes, 1, sizeof bytes, in);
-	assert_int_equal(*size, f.bytes);
+	assert_int_equal(*size, f.bytes_written);
 	fclose(in);
 	*size -= 4;
-	return HEAD + get32(bytes + 8);
+	return PREFIX_SIZE + get32(bytes + 8);
 }
 
 /* Loads the first `size` bytes; *job is the loaded job, which the caller frees. */
-static int load(struct live_job **job, size_t size)
+static int load_bytes(struct live_job **job, size_t size)
 {
 	struct checked_file f;
 	uint64_t generation = 0;
-	golden_open(&f, path, bytes, size);
+	golden_write_and_open(&f, path, bytes, size);
 	checked_file_close(&f);
 	*job = make_job();
 	int rc = checkpoint_load(spool, *job, &generation, NULL, NULL, &e);
@@ -106,16 +111,16 @@ static int load(struct live_job **job, size_t size)
 static void assert_refused(size_t size, int code)
 {
 	struct live_job *job;
-	assert_int_equal(load(&job, size), code);
+	assert_int_equal(load_bytes(&job, size), code);
 	live_job_free(job);
 }
 
 static int set_up(void **state)
 {
 	char name[128];
-	int rc = folder_set_up(state);
-	snprintf(name, sizeof name, "%s/spool", folder);
-	if (rc || spool_open(&spool, name, &e) || spool_make_job(spool, JOB, &e))
+	int rc = temporary_folder_set_up(state);
+	snprintf(name, sizeof name, "%s/spool", temporary_folder);
+	if (rc || spool_open(&spool, name, &e) || spool_create_job_folder(spool, JOB, &e))
 		return -1;
 	spool_job_path(spool, JOB, "checkpoint", path);
 	return 0;
@@ -125,7 +130,7 @@ static int tear_down(void **state)
 {
 	spool_close(spool);
 	spool = NULL;
-	return folder_tear_down(state);
+	return temporary_folder_tear_down(state);
 }
 
 static void assert_loaded(const struct live_job *job, double cpu_seconds)
@@ -137,44 +142,44 @@ static void assert_loaded(const struct live_job *job, double cpu_seconds)
 	assert_true(job->states[1][0].size == 3 && job->states[1][1].size == 1);
 	assert_memory_equal(job->states[1][0].bytes, "abc", 3);
 	assert_int_equal(*job->states[1][1].bytes, 'd');
-	assert_int_equal(canvas_rounds(job->canvas), 0);
+	assert_int_equal(canvas_complete_rounds(job->canvas), 0);
 }
 
-static void files_stay_as_they_are(void **state)
+static void bytes_of_files_never_change(void **state)
 {
 	(void)state;
 	struct live_job *job;
 	size_t size, seeds = write_file(&size);
 	assert_memory_equal(bytes, "hsltC005", 8);
-	assert_memory_equal(bytes + seeds, middle, sizeof middle);
-	assert_int_equal(load(&job, size), 0);
+	assert_memory_equal(bytes + seeds, golden_middle, sizeof golden_middle);
+	assert_int_equal(load_bytes(&job, size), 0);
 	assert_loaded(job, 1.5);
 	live_job_free(job);
 	/* Replaces the head by that of version 004, whose first 16 bytes are magic number, size and worker_count. */
-	enum { OLD = 16 + STORED_OLD_HEAD };
-	memmove(bytes + OLD, bytes + seeds, size - seeds);
-	memset(bytes, 0, OLD);
+	enum { OLD_HEAD_SIZE = 16 + STORED_OLD_HEAD_SIZE };
+	memmove(bytes + OLD_HEAD_SIZE, bytes + seeds, size - seeds);
+	memset(bytes, 0, OLD_HEAD_SIZE);
 	memcpy(bytes, "hsltC004", 8);
-	put32(bytes + 8, OLD);
+	put32(bytes + 8, OLD_HEAD_SIZE);
 	put32(bytes + 12, 3);
 	put64(bytes + 16, JOB);
 	put64(bytes + 24, GENERATION);
 	put_double(bytes + 32, 2.5);
-	assert_int_equal(load(&job, OLD + size - seeds), 0);
+	assert_int_equal(load_bytes(&job, OLD_HEAD_SIZE + size - seeds), 0);
 	assert_loaded(job, 2.5);
 	live_job_free(job);
-	assert_refused(OLD - 1, -EBADMSG);
+	assert_refused(OLD_HEAD_SIZE - 1, -EBADMSG);
 	bytes[16]++;
-	assert_refused(OLD + size - seeds, -EBADMSG);
-	put32(bytes + 8, OLD + 8);
-	assert_refused(OLD + size - seeds, -EPROTO);
+	assert_refused(OLD_HEAD_SIZE + size - seeds, -EBADMSG);
+	put32(bytes + 8, OLD_HEAD_SIZE + 8);
+	assert_refused(OLD_HEAD_SIZE + size - seeds, -EPROTO);
 }
 
 static void cut_and_longer_files_are_refused(void **state)
 {
 	(void)state;
 	size_t size, seeds = write_file(&size);
-	for (size_t cut = 0; cut < seeds + sizeof middle; cut += cut < 16 || cut + 4 > seeds ? 1 : 13)
+	for (size_t cut = 0; cut < seeds + sizeof golden_middle; cut += cut < 16 || cut + 4 > seeds ? 1 : 13)
 		assert_refused(cut, -EBADMSG);
 	assert_refused(size - 1, -EBADMSG);
 	for (size_t more = 1; more < 200000; more *= 7) {
@@ -184,37 +189,37 @@ static void cut_and_longer_files_are_refused(void **state)
 }
 
 /* Any flipped bit before the head gives another version or another size. Also sizes of states that no chain has. */
-static void other_files_are_refused(void **state)
+static void files_with_wrong_sizes_are_refused(void **state)
 {
 	(void)state;
 	size_t size, seeds = write_file(&size);
-	for (int bit = 0; bit < 8 * HEAD; bit++) {
+	for (int bit = 0; bit < 8 * PREFIX_SIZE; bit++) {
 		struct live_job *job;
 		bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
-		int rc = load(&job, size);
+		int rc = load_bytes(&job, size);
 		assert_true(rc == -EPROTO || rc == -EBADMSG);
 		live_job_free(job);
 		bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
 	}
 	static const uint32_t sizes[] = {0, 1217 /* paths have up to 8 edges */, 1u << 31, UINT32_MAX};
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-		put32(bytes + seeds + FIRST_SIZE, sizes[i]);
+		put32(bytes + seeds + FIRST_STATE_SIZE_OFFSET, sizes[i]);
 		assert_refused(size, -EBADMSG);
-		put32(bytes + seeds + FIRST_SIZE, 3);
-		put32(bytes + seeds + SECOND_SIZE, sizes[i]);
+		put32(bytes + seeds + FIRST_STATE_SIZE_OFFSET, 3);
+		put32(bytes + seeds + SECOND_STATE_SIZE_OFFSET, sizes[i]);
 		assert_refused(size, -EBADMSG);
-		put32(bytes + seeds + SECOND_SIZE, 1);
+		put32(bytes + seeds + SECOND_STATE_SIZE_OFFSET, 1);
 	}
-	put32(bytes + seeds + FILMS, 3);
+	put32(bytes + seeds + FILMS_OFFSET, 3);
 	assert_refused(size, -EPROTO);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(files_stay_as_they_are, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(bytes_of_files_never_change, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(cut_and_longer_files_are_refused, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(other_files_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(files_with_wrong_sizes_are_refused, set_up, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,7 +19,7 @@ struct sample {
 	float weights[WEIGHTS], moments[MOMENTS];
 };
 
-static void begin(struct sample *s)
+static void sample_init(struct sample *s)
 {
 	memset(s, 0, sizeof *s);
 	s->batch = (struct batch){.key = {7, LEASE_RENDER, 1, 2, 3},
@@ -39,64 +39,64 @@ static void begin(struct sample *s)
 		s->states[i] = (struct chain_state){s->bytes[i], 5};
 }
 
-static void check(const struct sample *s, bool same)
+static void check_digest(const struct sample *s, bool same)
 {
 	static struct sample plain;
 	struct batch_digest a, b;
 	struct error e;
-	begin(&plain);
+	sample_init(&plain);
 	assert_int_equal(digest_batch(&plain.batch, &a, &e), 0);
 	assert_int_equal(digest_batch(&s->batch, &b, &e), 0);
 	assert_int_equal(memcmp(&a, &b, sizeof a) == 0, same);
 }
 
-static void every_number_counts(void **state)
+static void every_number_changes_the_digest(void **state)
 {
 	(void)state;
 	static struct sample s;
-#define CHANGED(what)             \
-	do {                      \
-		begin(&s);        \
-		what;             \
-		check(&s, false); \
+#define EXPECT_CHANGED(what)             \
+	do {                             \
+		sample_init(&s);         \
+		what;                    \
+		check_digest(&s, false); \
 	} while (0)
-	begin(&s);
-	check(&s, true);
+	sample_init(&s);
+	check_digest(&s, true);
 	s.batch.cpu_seconds = 2;
-	s.batch.strategy[2][0] = 1; /* beyond the strategies of the plan */
-	check(&s, true);
-	CHANGED(s.batch.key.job = 8);
-	CHANGED(s.batch.key.kind = LEASE_BOOTSTRAP);
-	CHANGED(s.batch.key.group = 0);
-	CHANGED(s.batch.key.part = 0);
-	CHANGED(s.batch.key.epoch = 4);
+	s.batch.strategies[2][0] = 1; /* beyond the strategies of the plan */
+	check_digest(&s, true);
+	EXPECT_CHANGED(s.batch.key.job = 8);
+	EXPECT_CHANGED(s.batch.key.kind = LEASE_BOOTSTRAP);
+	EXPECT_CHANGED(s.batch.key.group = 0);
+	EXPECT_CHANGED(s.batch.key.part = 0);
+	EXPECT_CHANGED(s.batch.key.epoch = 4);
 	for (int i = 0; i < BATCH_COUNTERS; i++)
-		CHANGED(s.batch.counters[i] = 1);
+		EXPECT_CHANGED(s.batch.counters[i] = 1);
 	for (int i = 0; i < STRATEGY_COUNTERS; i++)
-		CHANGED(s.batch.strategy[1][i] = 1);
+		EXPECT_CHANGED(s.batch.strategies[1][i] = 1);
 	for (int i = 0; i < PATH_CLASSES; i++)
-		CHANGED(s.batch.classes[i] = 1);
-	CHANGED(s.batch.independent_sum = -0.0);
-	CHANGED(s.batch.independent_square = 1);
-	CHANGED(s.batch.beyond_sum = 1);
-	CHANGED(s.batch.strategy_count = 1);
-	CHANGED(s.batch.tile_count = 1);
-	CHANGED(s.batch.state_count = 1);
-	CHANGED(s.batch.weight_count = 2);
-	CHANGED(s.batch.moment_count = 3);
-	CHANGED(s.tiles[1].x = 0);
-	CHANGED(s.tiles[1].y = 1);
-	CHANGED((s.tiles[1].width = 1, s.tiles[1].height = 4));
-	CHANGED(s.pixels[0][0] = 1e-45f);
-	CHANGED(s.pixels[1][2 * 2 * TILE_CHANNELS - 1] = 1);
-	CHANGED(s.bytes[1][4] = 1);
-	CHANGED(s.states[0].size = 4);
-	CHANGED(s.weights[2] = 1);
-	CHANGED(s.moments[3] = 1);
+		EXPECT_CHANGED(s.batch.classes[i] = 1);
+	EXPECT_CHANGED(s.batch.independent_sum = -0.0);
+	EXPECT_CHANGED(s.batch.independent_square = 1);
+	EXPECT_CHANGED(s.batch.beyond_sum = 1);
+	EXPECT_CHANGED(s.batch.strategy_count = 1);
+	EXPECT_CHANGED(s.batch.tile_count = 1);
+	EXPECT_CHANGED(s.batch.state_count = 1);
+	EXPECT_CHANGED(s.batch.weight_count = 2);
+	EXPECT_CHANGED(s.batch.moment_count = 3);
+	EXPECT_CHANGED(s.tiles[1].x = 0);
+	EXPECT_CHANGED(s.tiles[1].y = 1);
+	EXPECT_CHANGED((s.tiles[1].width = 1, s.tiles[1].height = 4));
+	EXPECT_CHANGED(s.pixels[0][0] = 1e-45f);
+	EXPECT_CHANGED(s.pixels[1][2 * 2 * TILE_CHANNELS - 1] = 1);
+	EXPECT_CHANGED(s.bytes[1][4] = 1);
+	EXPECT_CHANGED(s.states[0].size = 4);
+	EXPECT_CHANGED(s.weights[2] = 1);
+	EXPECT_CHANGED(s.moments[3] = 1);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(every_number_counts)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_number_changes_the_digest)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

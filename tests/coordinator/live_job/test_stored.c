@@ -41,10 +41,10 @@ static void assert_look(const struct forecast_look *l, double work)
 	assert_memory_equal(l, &want, sizeof want);
 }
 
-static void counts_come_back(void **state)
+static void counts_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
-	unsigned char bytes[STORED_NOTE_MOST];
+	unsigned char bytes[STORED_NOTE_MAX];
 	struct job_counts c = make_counts(), back = {0};
 	size_t size = stored_pack_counts(&c, bytes);
 	assert_int_equal(stored_unpack_counts(bytes, size, &back, &e), 0);
@@ -57,10 +57,10 @@ static void counts_come_back(void **state)
 	mem_fail_after(-1);
 }
 
-static void looks_come_back(void **state)
+static void estimates_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
-	unsigned char bytes[STORED_NOTE_MOST];
+	unsigned char bytes[STORED_NOTE_MAX];
 	struct forecast_look l = make_look(1e9), back;
 	size_t size = stored_pack_look(&l, bytes);
 	assert_int_equal(stored_unpack_look(bytes, size, &back, &e), 0);
@@ -79,11 +79,11 @@ static struct checkpoint_head make_head(void)
 				    .bootstrap_cpu_seconds = 2.5,
 				    .look_written = 3.5,
 				    .times = {4.5, 5.5, NAN},
-				    .lit = {.b_pooled = 6.5, .beyond_share = 7.5, .black = true},
+				    .bootstrap_result = {.b_pooled = 6.5, .beyond_share = 7.5, .black = true},
 				    .counts = make_counts()};
-	for (int i = 0; i < PLAN_MAX_GROUPS; i++)
-		h.lit.b[i] = 1.0 / (1 + i);
-	for (; h.looks.count < FORECAST_LOOKS; h.looks.count++)
+	for (int i = 0; i < PLAN_GROUPS_MAX; i++)
+		h.bootstrap_result.b[i] = 1.0 / (1 + i);
+	for (; h.looks.count < FORECAST_LOOKS_MAX; h.looks.count++)
 		h.looks.looks[h.looks.count] = make_look(h.looks.count);
 	snprintf(h.fingerprint, sizeof h.fingerprint, "%0255d", 9);
 	return h;
@@ -95,17 +95,18 @@ static void assert_head(const struct checkpoint_head *h)
 	assert_true(h->job == want.job && h->generation == want.generation && h->worker_count == want.worker_count);
 	assert_true(h->cpu_seconds == 1.5 && h->bootstrap_cpu_seconds == 2.5 && h->look_written == 3.5);
 	assert_true(h->times.elapsed == 4.5 && h->times.opened == 5.5 && isnan(h->times.completed));
-	assert_memory_equal(h->lit.b, want.lit.b, sizeof want.lit.b);
-	assert_true(h->lit.b_pooled == 6.5 && h->lit.beyond_share == 7.5 && h->lit.black);
-	assert_int_equal(h->looks.count, FORECAST_LOOKS);
+	assert_memory_equal(h->bootstrap_result.b, want.bootstrap_result.b, sizeof want.bootstrap_result.b);
+	assert_true(h->bootstrap_result.b_pooled == 6.5 && h->bootstrap_result.beyond_share == 7.5 &&
+		    h->bootstrap_result.black);
+	assert_int_equal(h->looks.count, FORECAST_LOOKS_MAX);
 	for (uint32_t i = 0; i < h->looks.count; i++)
 		assert_look(&h->looks.looks[i], i);
 	assert_string_equal(h->fingerprint, want.fingerprint);
 }
 
-static unsigned char bytes[STORED_HEAD_MOST + 64];
+static unsigned char bytes[STORED_HEAD_MAX + 64];
 
-static void heads_come_back(void **state)
+static void heads_are_unpacked_as_they_were_packed(void **state)
 {
 	(void)state;
 	struct checkpoint_head h = make_head(), back;
@@ -120,7 +121,7 @@ static void heads_come_back(void **state)
 	static const size_t sizes[] = {10, 2, 3, 5};
 	h.looks.count--;
 	for (int i = 0; i < 4; i++) {
-		h.looks.count = i == 1 ? FORECAST_LOOKS : 1;
+		h.looks.count = i == 1 ? FORECAST_LOOKS_MAX : 1;
 		size = stored_pack_head(&h, bytes);
 		memcpy(bytes + size, more[i], sizes[i]);
 		assert_int_equal(stored_unpack_head(bytes, size + sizes[i], &back, &e), -EPROTO);
@@ -129,25 +130,26 @@ static void heads_come_back(void **state)
 
 /* ---- as earlier versions wrote it: little endian, numbers without padding ---- */
 
-static size_t put_all(size_t at, const double *v, size_t count)
+static size_t put_doubles(size_t offset, const double *v, size_t count)
 {
-	copy_numbers(bytes + at, v, sizeof *v, count);
-	return at + count * sizeof *v;
+	copy_numbers(bytes + offset, v, sizeof *v, count);
+	return offset + count * sizeof *v;
 }
 
-static size_t put_look(size_t at, double work)
+static size_t put_look(size_t offset, double work)
 {
 	struct forecast_look l = make_look(work);
-	at = put_all(at, (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
-	put64(bytes + at, l.doubtful);
-	return at + 8;
+	offset = put_doubles(offset,
+			     (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
+	put64(bytes + offset, l.doubtful);
+	return offset + 8;
 }
 
-static size_t put_counts(size_t at)
+static size_t put_counts(size_t offset)
 {
-	for (uint64_t n = 1; n <= 8; n++, at += 8)
-		put64(bytes + at, n);
-	return at;
+	for (uint64_t n = 1; n <= 8; n++, offset += 8)
+		put64(bytes + offset, n);
+	return offset;
 }
 
 static void assert_old_counts(const struct job_counts *c)
@@ -162,15 +164,15 @@ static void old_notes_are_read(void **state)
 	struct job_counts back = {0};
 	struct forecast_look read;
 	size_t size = put_counts(0);
-	assert_int_equal(stored_old_counts(bytes, size, &back, &e), 0);
+	assert_int_equal(stored_unpack_old_counts(bytes, size, &back, &e), 0);
 	assert_old_counts(&back);
-	assert_int_equal(stored_old_counts(bytes, size + 8, &back, &e), -EPROTO);
-	assert_int_equal(stored_old_counts(bytes, size - 1, &back, &e), -EPROTO);
+	assert_int_equal(stored_unpack_old_counts(bytes, size + 8, &back, &e), -EPROTO);
+	assert_int_equal(stored_unpack_old_counts(bytes, size - 1, &back, &e), -EPROTO);
 	size = put_look(0, 5);
-	assert_int_equal(stored_old_look(bytes, size, &read, &e), 0);
+	assert_int_equal(stored_unpack_old_look(bytes, size, &read, &e), 0);
 	assert_look(&read, 5);
-	assert_int_equal(stored_old_look(bytes, size - 8, &read, &e), -EPROTO);
-	assert_int_equal(stored_old_look(bytes, size + 1, &read, &e), -EPROTO);
+	assert_int_equal(stored_unpack_old_look(bytes, size - 8, &read, &e), -EPROTO);
+	assert_int_equal(stored_unpack_old_look(bytes, size + 1, &read, &e), -EPROTO);
 }
 
 static void old_heads_are_read(void **state)
@@ -179,23 +181,23 @@ static void old_heads_are_read(void **state)
 	struct checkpoint_head h = make_head(), back;
 	put64(bytes, h.job);
 	put64(bytes + 8, h.generation);
-	size_t at = put_all(16, (double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 6);
-	at = put_all(at, h.lit.b, 64);
-	at = put_all(at, (double[2]){6.5, 7.5}, 2);
-	put64(bytes + at, 1); /* black */
-	put64(bytes + at + 8, 64);
-	at += 16;
+	size_t offset = put_doubles(16, (double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 6);
+	offset = put_doubles(offset, h.bootstrap_result.b, 64);
+	offset = put_doubles(offset, (double[2]){6.5, 7.5}, 2);
+	put64(bytes + offset, 1); /* black */
+	put64(bytes + offset + 8, 64);
+	offset += 16;
 	for (int i = 0; i < 64; i++)
-		at = put_look(at, i);
-	at = put_counts(at);
-	memcpy(bytes + at, h.fingerprint, 256);
-	assert_int_equal(at + 256, STORED_OLD_HEAD);
-	stored_old_head(bytes, 3, &back);
+		offset = put_look(offset, i);
+	offset = put_counts(offset);
+	memcpy(bytes + offset, h.fingerprint, 256);
+	assert_int_equal(offset + 256, STORED_OLD_HEAD_SIZE);
+	stored_unpack_old_head(bytes, 3, &back);
 	assert_head(&back);
 	assert_old_counts(&back.counts);
 	memset(bytes + 600, 0xff, 4); /* more estimates than there can be */
-	memset(bytes + at, 'a', 256);
-	stored_old_head(bytes, 3, &back);
+	memset(bytes + offset, 'a', 256);
+	stored_unpack_old_head(bytes, 3, &back);
 	assert_int_equal(back.looks.count, 64);
 	assert_int_equal(strlen(back.fingerprint), 255);
 }
@@ -203,8 +205,10 @@ static void old_heads_are_read(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(counts_come_back),   cmocka_unit_test(looks_come_back),
-		cmocka_unit_test(heads_come_back),    cmocka_unit_test(old_notes_are_read),
+		cmocka_unit_test(counts_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(estimates_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(heads_are_unpacked_as_they_were_packed),
+		cmocka_unit_test(old_notes_are_read),
 		cmocka_unit_test(old_heads_are_read),
 	};
 	return cmocka_run_group_tests_name("coordinator/live_job/test_stored", tests, NULL, NULL);

@@ -22,15 +22,15 @@ static struct job_record make_record(void)
 	n.counters[COUNT_SAMPLES] = 1024 * 100 * 2;
 	n.counters[COUNT_STUCK] = 3;
 	n.counters[COUNT_LONGEST_STUCK] = 5210;
-	n.strategy[0][STRATEGY_PROPOSED] = 20000;
-	n.strategy[1][STRATEGY_PROPOSED] = 180000;
-	n.strategy[1][STRATEGY_ACCEPTED] = 90000;
-	n.strategy[1][STRATEGY_FAIL_REVERSE] = 11;
-	record_take_counted(&r, &p, &n, false, 0.25);
+	n.strategies[0][STRATEGY_PROPOSED] = 20000;
+	n.strategies[1][STRATEGY_PROPOSED] = 180000;
+	n.strategies[1][STRATEGY_ACCEPTED] = 90000;
+	n.strategies[1][STRATEGY_FAIL_REVERSE] = 11;
+	record_set_counters(&r, &p, &n, false, 0.25);
 	return r;
 }
 
-static json_int_t int_of(const json_t *o, const char *key)
+static json_int_t get_integer(const json_t *o, const char *key)
 {
 	const json_t *n = json_object_get(o, key);
 	assert_true(json_is_integer(n));
@@ -42,18 +42,18 @@ static void json_shows_the_strategies(void **state)
 	(void)state;
 	struct job_record r = make_record();
 	struct job_view v;
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	json_t *o = view_to_json(&v, true);
 	const json_t *list = json_object_get(o, "strategies"), *counts = json_object_get(o, "counts");
 	assert_int_equal(json_array_size(list), 2);
 	const json_t *hslt = json_array_get(list, 1);
 	assert_string_equal(json_string_value(json_object_get(hslt, "name")), "hslt");
-	assert_int_equal(int_of(hslt, "proposed"), 180000);
-	assert_int_equal(int_of(hslt, "accepted"), 90000);
-	assert_int_equal(int_of(json_object_get(hslt, "failures"), "reverse"), 11);
-	assert_int_equal(int_of(json_array_get(list, 0), "proposed"), 20000);
-	assert_int_equal(int_of(counts, "stuck"), 3);
-	assert_int_equal(int_of(counts, "longestStuck"), 5210);
+	assert_int_equal(get_integer(hslt, "proposed"), 180000);
+	assert_int_equal(get_integer(hslt, "accepted"), 90000);
+	assert_int_equal(get_integer(json_object_get(hslt, "failures"), "reverse"), 11);
+	assert_int_equal(get_integer(json_array_get(list, 0), "proposed"), 20000);
+	assert_int_equal(get_integer(counts, "stuck"), 3);
+	assert_int_equal(get_integer(counts, "longestStuck"), 5210);
 	static const char note[] =
 		"3 of 2,048 chain epochs accepted nothing (1,024 chains); longest run: 5,210 rejections; "
 		"25 % of the light is missing: it comes by paths of more edges than are simulated (128; pssmlt: 32)";
@@ -65,12 +65,12 @@ static void json_shows_the_strategies(void **state)
 	assert_string_equal(m.note, note);
 }
 
-static void json_of_other_jobs_has_none(void **state)
+static void json_without_strategies_has_an_empty_list(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 1, .state = "done"};
 	struct job_view v;
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	json_t *o = view_to_json(&v, true);
 	assert_true(json_is_array(json_object_get(o, "strategies")) &&
 		    json_array_size(json_object_get(o, "strategies")) == 0);
@@ -83,12 +83,12 @@ static void json_says_why_no_error_is_stated(void **state)
 {
 	(void)state;
 	struct job_record r = make_record();
-	struct canvas_image img = {.rel_mse = 0.04, .rel_mse_upper = 0.09, .rel_mse_doubt = ERROR_SHORT};
+	struct canvas_image img = {.rel_mse = 0.04, .rel_mse_upper = 0.09, .rel_mse_doubt = ERROR_DOUBT_SHORT_CHAINS};
 	for (int known = 0; known < 2; known++) {
 		struct job_view v;
-		img.rel_mse_doubt = known ? ERROR_KNOWN : ERROR_SHORT;
-		record_take_error(&r, &img);
-		view_of_record(&v, &r);
+		img.rel_mse_doubt = known ? ERROR_DOUBT_NONE : ERROR_DOUBT_SHORT_CHAINS;
+		record_set_error(&r, &img);
+		view_from_record(&v, &r);
 		json_t *o = view_to_json(&v, true);
 		const char *why = json_string_value(json_object_get(o, "errorDoubt"));
 		assert_string_equal(why, known ? "" : "the chains are too short to be judged");
@@ -107,7 +107,7 @@ static void json_shows_the_forecast(void **state)
 	for (int i = 1; i < 9; i++)
 		forecast_add_look(&r.looks,
 				  &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	v.eta = 30;
 	v.eta_low = 20;
 	v.eta_high = -1;
@@ -134,7 +134,7 @@ static void json_shows_the_forecast(void **state)
 	json_decref(o);
 }
 
-static void shows_the_share(void **state)
+static void json_shows_the_share_of_machines(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 1, .state = "running", .owner = "ann"};
@@ -149,10 +149,10 @@ static void shows_the_share(void **state)
 			       .state = JOB_RUNNING};
 	struct job_view v;
 	Farm__JobStatus wire;
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	view_add_status(&v, &s);
 	json_t *o = view_to_json(&v, true);
-	assert_true(int_of(o, "workers") == 3 && int_of(o, "machines") == 8);
+	assert_true(get_integer(o, "workers") == 3 && get_integer(o, "machines") == 8);
 	assert_true(json_number_value(json_object_get(o, "share")) == 2.5);
 	assert_string_equal(json_string_value(json_object_get(o, "owner")), "ann");
 	assert_string_equal(json_string_value(json_object_get(o, "place")), s.place);
@@ -165,14 +165,14 @@ static void shows_the_share(void **state)
 	view_to_wire(&v, &wire);
 	assert_string_equal(wire.place, "3 of 8 machines; 1 job of another owner comes first");
 	assert_string_equal(wire.why, "waits for a job of another owner");
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	o = view_to_json(&v, true);
 	assert_true(json_is_null(json_object_get(o, "share")));
 	json_decref(o);
 }
 
 /* While a job is not over, the core's numbers replace those of its record; all other fields of the record stay. */
-static void shows_what_the_core_says(void **state)
+static void numbers_of_the_core_replace_those_of_the_record(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 1, .state = "queued", .name = "a", .priority = 1, .b = 7, .cpu_seconds = 9};
@@ -193,7 +193,7 @@ static void shows_what_the_core_says(void **state)
 			       .looks = &r.looks,
 			       .state = JOB_RUNNING};
 	struct job_view v;
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	view_add_status(&v, &s);
 	assert_string_equal(v.record.state, "running");
 	assert_string_equal(v.record.why, "a lease failed");
@@ -211,7 +211,7 @@ static void shows_what_the_core_says(void **state)
 }
 
 /* The estimates as hslt-submit --estimate receives them. */
-static void looks_travel(void **state)
+static void estimates_are_sent_on_request(void **state)
 {
 	(void)state;
 	struct job_record r = make_record();
@@ -221,7 +221,7 @@ static void looks_travel(void **state)
 	for (int i = 1; i < 9; i++)
 		forecast_add_look(&r.looks,
 				  &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
-	view_of_record(&v, &r);
+	view_from_record(&v, &r);
 	view_to_wire(&v, &wire);
 	assert_int_equal(wire.n_looks, 0);
 	view_looks_to_wire(&v, &looks, &wire);
@@ -235,12 +235,12 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(json_shows_the_strategies),
-		cmocka_unit_test(json_of_other_jobs_has_none),
+		cmocka_unit_test(json_without_strategies_has_an_empty_list),
 		cmocka_unit_test(json_says_why_no_error_is_stated),
 		cmocka_unit_test(json_shows_the_forecast),
-		cmocka_unit_test(shows_the_share),
-		cmocka_unit_test(shows_what_the_core_says),
-		cmocka_unit_test(looks_travel),
+		cmocka_unit_test(json_shows_the_share_of_machines),
+		cmocka_unit_test(numbers_of_the_core_replace_those_of_the_record),
+		cmocka_unit_test(estimates_are_sent_on_request),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

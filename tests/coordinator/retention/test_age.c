@@ -11,98 +11,101 @@
 #define DAY 86400.0
 
 /* Films and results of 100 bytes each; the jobs ended on days 5, 1, 3, 4, 2. */
-static void fill(struct age_job jobs[5])
+static void make_jobs(struct age_job jobs[5])
 {
 	static const double days[] = {5, 1, 3, 4, 2};
 	for (int i = 0; i < 5; i++)
-		jobs[i] = (struct age_job){
-			.id = 10 + (uint64_t)i, .order = days[i], .ended = days[i] * DAY, .films = 100, .result = 100};
+		jobs[i] = (struct age_job){.id = 10 + (uint64_t)i,
+					   .end_order = days[i],
+					   .ended = days[i] * DAY,
+					   .film_bytes = 100,
+					   .result_bytes = 100};
 }
 
 /* One letter per job, in the order of their ends: . nothing is deleted, f its films, r also its result, x also its
  * record. */
-static void expect(const struct age_job jobs[5], const char *what)
+static void expect_deletions(const struct age_job jobs[5], const char *what)
 {
-	char seen[6] = "";
+	char deletions[6] = "";
 	for (int i = 0; i < 5; i++) {
 		assert_true(i == 0 || jobs[i].ended >= jobs[i - 1].ended);
-		assert_true(!jobs[i].no_record || jobs[i].no_result);
-		assert_true(!jobs[i].no_result || jobs[i].no_films || !jobs[i].films);
-		seen[i] = jobs[i].no_record ? 'x' : jobs[i].no_result ? 'r' : jobs[i].no_films ? 'f' : '.';
+		assert_true(!jobs[i].drop_record || jobs[i].drop_result);
+		assert_true(!jobs[i].drop_result || jobs[i].drop_films || !jobs[i].film_bytes);
+		deletions[i] = jobs[i].drop_record ? 'x' : jobs[i].drop_result ? 'r' : jobs[i].drop_films ? 'f' : '.';
 	}
-	assert_string_equal(seen, what);
+	assert_string_equal(deletions, what);
 }
 
-static void by_age(void **state)
+static void old_jobs_are_deleted_by_age(void **state)
 {
 	(void)state;
 	struct age_job jobs[5];
 	struct age_limits l = {3 * DAY, 0};
-	fill(jobs);
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, "r....");
-	age_choose(jobs, 5, &l, 6.5 * DAY);
-	expect(jobs, "rrr..");
-	age_choose(jobs, 5, &l, 33.5 * DAY);
-	expect(jobs, "xxxrr");
-	age_choose(jobs, 5, &l, -100 * DAY); /* the clock jumps back */
-	expect(jobs, ".....");
-	l.seconds = 0;
-	age_choose(jobs, 5, &l, 1e6 * DAY);
-	expect(jobs, ".....");
+	make_jobs(jobs);
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, "r....");
+	age_choose_deletions(jobs, 5, &l, 6.5 * DAY);
+	expect_deletions(jobs, "rrr..");
+	age_choose_deletions(jobs, 5, &l, 33.5 * DAY);
+	expect_deletions(jobs, "xxxrr");
+	age_choose_deletions(jobs, 5, &l, -100 * DAY); /* the clock jumps back */
+	expect_deletions(jobs, ".....");
+	l.max_age_seconds = 0;
+	age_choose_deletions(jobs, 5, &l, 1e6 * DAY);
+	expect_deletions(jobs, ".....");
 }
 
-static void by_space(void **state)
+static void oldest_jobs_are_deleted_for_space(void **state)
 {
 	(void)state;
 	struct age_job jobs[5];
 	struct age_limits l = {0, 1000};
-	fill(jobs);
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, ".....");
-	l.bytes = 999;
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, "f....");
-	l.bytes = 550; /* all films go before any result */
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, "fffff");
-	l.bytes = 300;
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, "rrfff");
+	make_jobs(jobs);
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, ".....");
+	l.max_bytes = 999;
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, "f....");
+	l.max_bytes = 550; /* all films go before any result */
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, "fffff");
+	l.max_bytes = 300;
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, "rrfff");
 }
 
-static void what_is_fetched_stays(void **state)
+static void job_being_fetched_stays(void **state)
 {
 	(void)state;
 	struct age_job jobs[5];
 	struct age_limits l = {1 * DAY, 0};
-	fill(jobs);
-	jobs[1].busy = true; /* the oldest job */
-	age_choose(jobs, 5, &l, 100 * DAY);
-	expect(jobs, ".xxxx");
+	make_jobs(jobs);
+	jobs[1].is_in_use = true; /* the oldest job */
+	age_choose_deletions(jobs, 5, &l, 100 * DAY);
+	expect_deletions(jobs, ".xxxx");
 	l = (struct age_limits){0, 300};
-	age_choose(jobs, 5, &l, 5 * DAY);
-	expect(jobs, "frrff");
+	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expect_deletions(jobs, "frrff");
 }
 
-static void by_age_and_by_size(void **state)
+static void limits_of_age_and_space_apply_together(void **state)
 {
 	(void)state;
 	struct age_job jobs[5];
 	struct age_limits l = {3 * DAY, 700};
-	fill(jobs);
-	age_choose(jobs, 5, &l, 5 * DAY); /* one job by age, and another for 100 bytes */
-	expect(jobs, "rf...");
-	age_choose(jobs, 0, &l, 5 * DAY);
+	make_jobs(jobs);
+	age_choose_deletions(jobs, 5, &l, 5 * DAY); /* one job by age, and another for 100 bytes */
+	expect_deletions(jobs, "rf...");
+	age_choose_deletions(jobs, 0, &l, 5 * DAY);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(by_age),
-		cmocka_unit_test(by_space),
-		cmocka_unit_test(what_is_fetched_stays),
-		cmocka_unit_test(by_age_and_by_size),
+		cmocka_unit_test(old_jobs_are_deleted_by_age),
+		cmocka_unit_test(oldest_jobs_are_deleted_for_space),
+		cmocka_unit_test(job_being_fetched_stays),
+		cmocka_unit_test(limits_of_age_and_space_apply_together),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,7 +4,7 @@
 #include "coordinator/store/journal_file.h"
 #include "common/base/bytes.h"
 #include "common/base/crc.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -19,7 +19,7 @@ enum { GENERATION = 3 };
 
 /* A journal as the first builds wrote it, from structs as they lay in memory on x86-64: a batch "abcde" of a lease, and
  * counters. */
-enum { OLD_FIRST = JOURNAL_HEAD, OLD_SECOND = OLD_FIRST + JOURNAL_RECORD + 5 };
+enum { OLD_FIRST = JOURNAL_HEAD_SIZE, OLD_SECOND = OLD_FIRST + JOURNAL_RECORD_HEAD_SIZE + 5 };
 static const uint64_t old_job = 0x0102030405060708, old_salt = 0x8877665544332211;
 static const struct lease_key old_lease = {0, LEASE_RENDER, 5, 6, 0x1122334455667788};
 static const unsigned char old_journal[] = {
@@ -37,7 +37,7 @@ static const unsigned char old_journal[] = {
 	0x00, 0x00, 0x00, 0xd5, 0xe7, 0x36, 0x39, 0x08, 0x07,
 };
 
-static int see_old(void *user, const struct journal_item *i, struct error *e)
+static int check_old_item(void *user, const struct journal_item *i, struct error *e)
 {
 	unsigned *count = user;
 	struct lease_key k = old_lease;
@@ -45,15 +45,15 @@ static int see_old(void *user, const struct journal_item *i, struct error *e)
 	k.job = old_job;
 	if (*count == 0) {
 		assert_true(i->kind == JOURNAL_BATCH && i->elapsed == 1.5 && lease_key_equal(&i->lease, &k));
-		assert_int_equal(i->size, 5);
+		assert_int_equal(i->body_size, 5);
 		assert_memory_equal(i->body, "abcde", 5);
-		assert_int_equal(i->at, OLD_FIRST);
+		assert_int_equal(i->offset, OLD_FIRST);
 	} else {
-		assert_true(i->kind == JOURNAL_COUNTS && i->elapsed == 2.5 && i->lease.kind == 0 && i->size == 2);
+		assert_true(i->kind == JOURNAL_COUNTS && i->elapsed == 2.5 && i->lease.kind == 0 && i->body_size == 2);
 		assert_memory_equal(i->body, "\x08\x07", 2);
-		assert_int_equal(i->at, OLD_SECOND);
+		assert_int_equal(i->offset, OLD_SECOND);
 	}
-	assert_int_equal(i->missing, 0);
+	assert_int_equal(i->damaged_count, 0);
 	++*count;
 	return 0;
 }
@@ -61,26 +61,27 @@ static int see_old(void *user, const struct journal_item *i, struct error *e)
 static void earlier_journals_are_read(void **state)
 {
 	(void)state;
-	struct journal_found found;
+	struct journal_damage found;
 	struct journal *j;
 	struct error e;
 	unsigned count = 0;
 	char path[512];
-	snprintf(path, sizeof path, "%s/journal.%d", folder, GENERATION);
+	snprintf(path, sizeof path, "%s/journal.%d", temporary_folder, GENERATION);
 	FILE *f = fopen(path, "wb");
 	assert_int_equal(fwrite(old_journal, 1, sizeof old_journal, f), sizeof old_journal);
 	fclose(f);
-	assert_int_equal(journal_open(&j, folder, old_job, GENERATION, see_old, &count, &found, &e), 0);
+	assert_int_equal(journal_open(&j, temporary_folder, old_job, GENERATION, check_old_item, &count, &found, &e),
+			 0);
 	assert_int_equal(count, 2);
-	assert_true(found.cut == 0 && found.damaged == 0);
+	assert_true(found.cut_bytes == 0 && found.damaged_count == 0);
 	journal_release(j);
 }
 
 /* A journal written now has each number where it has always been. */
-static void journals_stay_as_they_are(void **state)
+static void bytes_of_journals_never_change(void **state)
 {
 	(void)state;
-	unsigned char head[JOURNAL_HEAD], bytes[JOURNAL_RECORD];
+	unsigned char head[JOURNAL_HEAD_SIZE], bytes[JOURNAL_RECORD_HEAD_SIZE];
 	struct buf a = {.limit = 8}, b = {.limit = 8}, none = {.limit = 0};
 	struct journal_record r = {.kind = JOURNAL_BATCH, .elapsed = 1.5, .lease = old_lease, .salt = old_salt};
 	assert_true(buf_append(&a, "ab", 2) && buf_append(&b, "cde", 3));
@@ -90,7 +91,8 @@ static void journals_stay_as_they_are(void **state)
 	assert_memory_equal(bytes, old_journal + OLD_FIRST, sizeof bytes);
 	a.size = 0;
 	assert_true(buf_append(&a, "\x08\x07", 2));
-	r = (struct journal_record){.kind = JOURNAL_COUNTS, .number = 1, .stored = 1, .elapsed = 2.5, .salt = old_salt};
+	r = (struct journal_record){
+		.kind = JOURNAL_COUNTS, .number = 1, .durable_before = 1, .elapsed = 2.5, .salt = old_salt};
 	journal_record_pack(&r, bytes, &a, &none);
 	assert_memory_equal(bytes, old_journal + OLD_SECOND, sizeof bytes);
 	buf_fini(&a);
@@ -99,27 +101,28 @@ static void journals_stay_as_they_are(void **state)
 
 /* Record heads whose checksums fit, with sizes beyond the end of the file: they are not taken for records, and nothing
  * is allocated for them. */
-static void sizes_beyond_the_file(void **state)
+static void record_sizes_beyond_the_file_are_not_believed(void **state)
 {
 	(void)state;
-	static const uint32_t most[] = {6, 1000, 1u << 31, UINT32_MAX};
+	static const uint32_t sizes[] = {6, 1000, 1u << 31, UINT32_MAX};
 	char path[512];
-	snprintf(path, sizeof path, "%s/journal.%d", folder, GENERATION);
-	for (size_t i = 0; i < sizeof most / sizeof *most; i++) {
+	snprintf(path, sizeof path, "%s/journal.%d", temporary_folder, GENERATION);
+	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
 		unsigned char file[sizeof old_journal];
-		struct journal_found found;
+		struct journal_damage found;
 		struct journal *j;
 		struct error e;
 		unsigned count = 0;
 		memcpy(file, old_journal, sizeof file);
-		put32(file + OLD_SECOND + 4, most[i]);
+		put32(file + OLD_SECOND + 4, sizes[i]);
 		put32(file + OLD_SECOND + 76, crc32c(0, file + OLD_SECOND, 76));
 		FILE *f = fopen(path, "wb");
 		assert_int_equal(fwrite(file, 1, sizeof file, f), sizeof file);
 		fclose(f);
-		assert_int_equal(journal_open(&j, folder, old_job, GENERATION, see_old, &count, &found, &e), 0);
+		assert_int_equal(
+			journal_open(&j, temporary_folder, old_job, GENERATION, check_old_item, &count, &found, &e), 0);
 		assert_int_equal(count, 1);
-		assert_int_equal(found.cut, sizeof file - OLD_SECOND);
+		assert_int_equal(found.cut_bytes, sizeof file - OLD_SECOND);
 		journal_release(j);
 	}
 }
@@ -127,9 +130,11 @@ static void sizes_beyond_the_file(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(earlier_journals_are_read, folder_set_up, folder_tear_down),
-		cmocka_unit_test(journals_stay_as_they_are),
-		cmocka_unit_test_setup_teardown(sizes_beyond_the_file, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(earlier_journals_are_read, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test(bytes_of_journals_never_change),
+		cmocka_unit_test_setup_teardown(record_sizes_beyond_the_file_are_not_believed, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,7 +5,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/ledger_files.h"
 
 #include <setjmp.h>
@@ -28,11 +28,11 @@ static struct error e;
 static struct ledger *open_ledger(void)
 {
 	struct ledger *l;
-	assert_int_equal(ledger_open(&l, folder, &e), 0);
+	assert_int_equal(ledger_open(&l, temporary_folder, &e), 0);
 	return l;
 }
 
-static void fill(void)
+static void fill_ledger(void)
 {
 	struct ledger *l = open_ledger();
 	struct job_record r;
@@ -48,11 +48,11 @@ static void fill(void)
 				       .plan_size = 4};
 		assert_int_equal(ledger_add(l, &j, &e), 0);
 	}
-	record_begin(&r, ROWS, "box", "ann");
+	record_init(&r, ROWS, "box", "ann");
 	text_copy(r.state, sizeof r.state, "done");
-	assert_int_equal(ledger_end(l, &r, false, &e), 0);
-	assert_int_equal(ledger_priority(l, 2, 7, &e), 0);
-	assert_int_equal(ledger_set(l, "clock", "later", &e), 0);
+	assert_int_equal(ledger_end_job(l, &r, false, &e), 0);
+	assert_int_equal(ledger_set_priority(l, 2, 7, &e), 0);
+	assert_int_equal(ledger_set_note(l, "clock", "later", &e), 0);
 	ledger_close(l);
 }
 
@@ -65,13 +65,13 @@ static void assert_filled(void)
 		struct ledger_job j;
 		char *text;
 		for (uint64_t id = 1; id <= ROWS; id++) {
-			assert_int_equal(ledger_get(l, id, &j, &e), 1);
-			assert_true(!j.damaged && j.priority == (id == 2 ? 7 : 0));
+			assert_int_equal(ledger_read_row(l, id, &j, &e), 1);
+			assert_true(!j.is_damaged && j.priority == (id == 2 ? 7 : 0));
 			assert_string_equal(j.state, id == ROWS ? "done" : "live");
 			assert_int_equal(j.submission_size, id == ROWS ? 0 : 10);
 		}
 		assert_int_equal(ledger_read_record(l, ROWS, &r, &e), 0);
-		assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+		assert_int_equal(ledger_get_note(l, "clock", &text, &e), 0);
 		assert_string_equal(text, "later");
 		mem_free(text);
 		assert_int_equal(ledger_next_id(l), ROWS + 1);
@@ -88,20 +88,20 @@ static void overwrite_with_text(const char *file)
 	close(fd);
 }
 
-static void a_file_is_lost(void **state)
+static void lost_file_is_restored(void **state)
 {
 	(void)state;
-	fill();
+	fill_ledger();
 	for (int i = 0; i < 2; i++) {
 		assert_int_equal(unlink(ledger_files_path(files[i])), 0);
 		assert_filled();
 	}
 }
 
-static void a_file_is_no_database(void **state)
+static void file_that_is_no_database_is_replaced(void **state)
 {
 	(void)state;
-	fill();
+	fill_ledger();
 	for (int i = 0; i < 2; i++) {
 		char damaged[40];
 		overwrite_with_text(files[i]);
@@ -111,7 +111,7 @@ static void a_file_is_no_database(void **state)
 	}
 }
 
-static void rows_are_lost_or_changed(void **state)
+static void lost_or_changed_rows_are_restored(void **state)
 {
 	(void)state;
 	static const char *const statements[] = {
@@ -127,16 +127,16 @@ static void rows_are_lost_or_changed(void **state)
 		"UPDATE jobs SET checksum = NULL",
 		"DROP TABLE notes; CREATE TABLE notes (name TEXT PRIMARY KEY, text TEXT NOT NULL, revision INTEGER NOT NULL)",
 	};
-	fill();
+	fill_ledger();
 	for (size_t s = 0; s < sizeof statements / sizeof *statements; s++)
 		for (int i = 0; i < 2; i++) {
-			ledger_files_change(files[i], statements[s]);
+			ledger_files_execute(files[i], statements[s]);
 			assert_filled();
 		}
 }
 
 /* jobs.db is replaced by a backup from before a change. */
-static void a_file_is_older(void **state)
+static void older_file_is_brought_up_to_date(void **state)
 {
 	(void)state;
 	char command[500];
@@ -145,50 +145,50 @@ static void a_file_is_older(void **state)
 	assert_int_equal(ledger_add(l, &j, &e), 0);
 	ledger_close(l);
 	for (int i = 0; i < 2; i++) {
-		snprintf(command, sizeof command, "cp '%s/%s' '%s/old'", folder, files[i], folder);
+		snprintf(command, sizeof command, "cp '%s/%s' '%s/old'", temporary_folder, files[i], temporary_folder);
 		assert_int_equal(system(command), 0);
 		l = open_ledger();
-		assert_int_equal(ledger_priority(l, 1, 10 + i, &e), 0);
-		assert_int_equal(ledger_set(l, "clock", i ? "2" : "1", &e), 0);
+		assert_int_equal(ledger_set_priority(l, 1, 10 + i, &e), 0);
+		assert_int_equal(ledger_set_note(l, "clock", i ? "2" : "1", &e), 0);
 		ledger_close(l);
-		snprintf(command, sizeof command, "mv '%s/old' '%s/%s'", folder, folder, files[i]);
+		snprintf(command, sizeof command, "mv '%s/old' '%s/%s'", temporary_folder, temporary_folder, files[i]);
 		assert_int_equal(system(command), 0);
 		l = open_ledger();
 		char *text;
-		assert_int_equal(ledger_get(l, 1, &j, &e), 1);
+		assert_int_equal(ledger_read_row(l, 1, &j, &e), 1);
 		assert_int_equal(j.priority, 10 + i);
-		assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+		assert_int_equal(ledger_get_note(l, "clock", &text, &e), 0);
 		assert_string_equal(text, i ? "2" : "1");
 		mem_free(text);
 		ledger_close(l);
 	}
 }
 
-static void both_are_damaged(void **state)
+static void row_damaged_in_both_files_is_reported(void **state)
 {
 	(void)state;
 	struct ledger_job j;
 	struct job_record r;
 	char *text;
-	fill();
+	fill_ledger();
 	for (int i = 0; i < 2; i++)
-		ledger_files_change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5);"
-					      "UPDATE notes SET text = replace(text, 'later', 'never')");
+		ledger_files_execute(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5);"
+					       "UPDATE notes SET text = replace(text, 'later', 'never')");
 	struct ledger *l = open_ledger();
-	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
-	assert_true(j.damaged && j.id == 1);
-	assert_int_equal(ledger_note(l, "clock", &text, &e), -EBADMSG);
-	assert_int_equal(ledger_set(l, "clock", "again", &e), 0);
-	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_int_equal(ledger_read_row(l, 1, &j, &e), 1);
+	assert_true(j.is_damaged && j.id == 1);
+	assert_int_equal(ledger_get_note(l, "clock", &text, &e), -EBADMSG);
+	assert_int_equal(ledger_set_note(l, "clock", "again", &e), 0);
+	assert_int_equal(ledger_get_note(l, "clock", &text, &e), 0);
 	assert_string_equal(text, "again");
 	mem_free(text);
-	assert_int_equal(ledger_hold(l, 1, "bob", &e), -EBADMSG);
+	assert_int_equal(ledger_set_holder(l, 1, "bob", &e), -EBADMSG);
 	assert_non_null(strstr(e.text, "the row of j1 is damaged"));
 	assert_int_equal(ledger_read_record(l, 5, &r, &e), -EBADMSG);
-	assert_int_equal(ledger_get(l, 2, &j, &e), 1);
-	assert_false(j.damaged);
-	assert_int_equal(ledger_forget(l, 1, &e), 0);
-	assert_int_equal(ledger_get(l, 1, &j, &e), 0);
+	assert_int_equal(ledger_read_row(l, 2, &j, &e), 1);
+	assert_false(j.is_damaged);
+	assert_int_equal(ledger_delete(l, 1, &e), 0);
+	assert_int_equal(ledger_read_row(l, 1, &j, &e), 0);
 	ledger_close(l);
 	for (int i = 0; i < 2; i++)
 		overwrite_with_text(files[i]);
@@ -198,17 +198,17 @@ static void both_are_damaged(void **state)
 }
 
 /* Notes of spools from before notes had checksums. The highest job id replaces the missing number of the next job. */
-static void notes_without_checksums(void **state)
+static void notes_without_checksums_are_read(void **state)
 {
 	(void)state;
 	char *text;
-	fill();
+	fill_ledger();
 	for (int i = 0; i < 2; i++)
-		ledger_files_change(files[i],
-				    "UPDATE notes SET text = 'earlier';"
-				    "INSERT OR REPLACE INTO notes VALUES ('next-job', '77\ncrc32c=00000000', 1)");
+		ledger_files_execute(files[i],
+				     "UPDATE notes SET text = 'earlier';"
+				     "INSERT OR REPLACE INTO notes VALUES ('next-job', '77\ncrc32c=00000000', 1)");
 	struct ledger *l = open_ledger();
-	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_int_equal(ledger_get_note(l, "clock", &text, &e), 0);
 	assert_string_equal(text, "earlier");
 	mem_free(text);
 	assert_int_equal(ledger_next_id(l), ROWS + 1);
@@ -217,10 +217,10 @@ static void notes_without_checksums(void **state)
 
 /* ---- a copy that cannot be written ---- */
 
-static _Atomic bool refuse;
+static _Atomic bool refuses_copy_writes;
 static sqlite3 *connection; /* the ledger's own connection */
 
-static int take_connection(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
+static int record_connection(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
 {
 	(void)text;
 	(void)api;
@@ -237,36 +237,36 @@ static int deny_writes_to_copy(void *user, int what, const char *a, const char *
 	(void)b;
 	(void)trigger;
 	bool writes = what == SQLITE_INSERT || what == SQLITE_UPDATE || what == SQLITE_DELETE;
-	return refuse && writes && file && strcmp(file, "copy") == 0 ? SQLITE_DENY : SQLITE_OK;
+	return refuses_copy_writes && writes && file && strcmp(file, "copy") == 0 ? SQLITE_DENY : SQLITE_OK;
 }
 
 /* Rows written meanwhile are in jobs.db, and also in the copy once that can be written. */
-static void the_copy_falls_behind(void **state)
+static void copy_that_fell_behind_is_mended(void **state)
 {
 	(void)state;
 	struct ledger_job j;
-	fill();
-	sqlite3_auto_extension((void (*)(void))take_connection);
+	fill_ledger();
+	sqlite3_auto_extension((void (*)(void))record_connection);
 	struct ledger *l = open_ledger();
 	sqlite3_reset_auto_extension();
 	/* Setting an authorizer makes SQLite compile statements again. */
 	assert_int_equal(sqlite3_set_authorizer(connection, deny_writes_to_copy, NULL), SQLITE_OK);
-	refuse = true;
-	assert_int_equal(ledger_priority(l, 3, 9, &e), 0);
-	assert_int_equal(ledger_set(l, "clock", "latest", &e), 0);
-	assert_true(ledger_mend(l, &e) < 0);
-	assert_true(ledger_drop(l, (uint64_t[]){ROWS}, 1, &e) < 0);
-	refuse = false;
-	assert_int_equal(ledger_mend(l, &e), 0);
-	assert_int_equal(ledger_drop(l, (uint64_t[]){ROWS}, 1, &e), 0);
+	refuses_copy_writes = true;
+	assert_int_equal(ledger_set_priority(l, 3, 9, &e), 0);
+	assert_int_equal(ledger_set_note(l, "clock", "latest", &e), 0);
+	assert_true(ledger_repair_copy(l, &e) < 0);
+	assert_true(ledger_delete_ended(l, (uint64_t[]){ROWS}, 1, &e) < 0);
+	refuses_copy_writes = false;
+	assert_int_equal(ledger_repair_copy(l, &e), 0);
+	assert_int_equal(ledger_delete_ended(l, (uint64_t[]){ROWS}, 1, &e), 0);
 	ledger_close(l);
 	assert_int_equal(unlink(ledger_files_path("jobs.db")), 0);
 	l = open_ledger();
 	char *text;
-	assert_int_equal(ledger_get(l, 3, &j, &e), 1);
+	assert_int_equal(ledger_read_row(l, 3, &j, &e), 1);
 	assert_int_equal(j.priority, 9);
-	assert_int_equal(ledger_get(l, ROWS, &j, &e), 0);
-	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_int_equal(ledger_read_row(l, ROWS, &j, &e), 0);
+	assert_int_equal(ledger_get_note(l, "clock", &text, &e), 0);
 	assert_string_equal(text, "latest");
 	mem_free(text);
 	ledger_close(l);
@@ -275,13 +275,20 @@ static void the_copy_falls_behind(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(a_file_is_lost, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_file_is_no_database, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(rows_are_lost_or_changed, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_file_is_older, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(both_are_damaged, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(notes_without_checksums, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(the_copy_falls_behind, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(lost_file_is_restored, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(file_that_is_no_database_is_replaced, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(lost_or_changed_rows_are_restored, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(older_file_is_brought_up_to_date, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(row_damaged_in_both_files_is_reported, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(notes_without_checksums_are_read, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(copy_that_fell_behind_is_mended, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,7 +7,7 @@
 #include "common/base/checked_file.h"
 #include "proto/stored.pb-c.h"
 #include "tests/support/failing_memory.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -40,10 +40,10 @@ static const unsigned char old_file[] = {
 static int set_up(void **state)
 {
 	char name[128];
-	if (folder_set_up(state))
+	if (temporary_folder_set_up(state))
 		return -1;
-	snprintf(name, sizeof name, "%s/spool", folder);
-	if (spool_open(&spool, name, &e) || spool_make_job(spool, JOB, &e))
+	snprintf(name, sizeof name, "%s/spool", temporary_folder);
+	if (spool_open(&spool, name, &e) || spool_create_job_folder(spool, JOB, &e))
 		return -1;
 	spool_job_path(spool, JOB, "order", path);
 	return 0;
@@ -52,7 +52,7 @@ static int set_up(void **state)
 static int tear_down(void **state)
 {
 	spool_close(spool);
-	return folder_tear_down(state);
+	return temporary_folder_tear_down(state);
 }
 
 /* Writes the file with a checksum that fits. */
@@ -91,13 +91,13 @@ static void assert_row(void)
 {
 	struct old_row f;
 	const struct ledger_job *j = &f.job;
-	assert_int_equal(old_spool_row(spool, JOB, &f, &e), 0);
+	assert_int_equal(old_spool_read_row(spool, JOB, &f, &e), 0);
 	assert_true(j->id == 1 && j->extended == 3 && j->revision == revision && j->priority == -7 && j->mixed);
-	assert_true(j->submitted == 1.5 && j->ended == 0 && !j->damaged);
+	assert_true(j->submitted == 1.5 && j->end_time == 0 && !j->is_damaged);
 	assert_string_equal(j->owner, "anna");
 	assert_string_equal(j->name, "glass");
 	assert_string_equal(j->version, "0.2");
-	assert_string_equal(j->held, "");
+	assert_string_equal(j->holder, "");
 	assert_string_equal(j->state, "live");
 	assert_int_equal(j->submission_size, 5);
 	assert_memory_equal(j->submission, "sub\0m", 5);
@@ -109,12 +109,12 @@ static void assert_row(void)
 static void assert_refused(int rc)
 {
 	struct old_row f;
-	assert_int_equal(old_spool_row(spool, JOB, &f, &e), rc);
+	assert_int_equal(old_spool_read_row(spool, JOB, &f, &e), rc);
 	assert_null(f.memory);
 	assert_null(f.message);
 }
 
-static void comes_back(void **state)
+static void row_is_read_back(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
@@ -125,18 +125,19 @@ static void comes_back(void **state)
 	assert_row();
 	for (int n = 0; n < 4; n++) {
 		mem_fail_after(n);
-		int rc = old_spool_row(spool, JOB, &f, &e);
+		int rc = old_spool_read_row(spool, JOB, &f, &e);
 		mem_fail_after(-1);
 		assert_true(rc == -ENOMEM || rc == 0);
 		old_spool_row_free(&f);
 	}
-	assert_int_equal(spool_make_job(spool, 2, &e), 0); /* the file of one job does not restore another job's row */
+	assert_int_equal(spool_create_job_folder(spool, 2, &e),
+			 0); /* the file of one job does not restore another job's row */
 	spool_job_path(spool, 2, "order", path);
 	write_file(bytes, size);
-	assert_int_equal(old_spool_row(spool, 2, &f, &e), -EBADMSG);
+	assert_int_equal(old_spool_read_row(spool, 2, &f, &e), -EBADMSG);
 }
 
-static void old_file_is_read(void **state)
+static void row_of_version_002_is_read(void **state)
 {
 	(void)state;
 	FILE *f = fopen(path, "wb");
@@ -146,29 +147,29 @@ static void old_file_is_read(void **state)
 }
 
 /* The file is cut anywhere, with a checksum that fits or not. */
-static void truncated_records_are_refused(void **state)
+static void truncated_rows_are_refused(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
 	size_t size = pack_row(bytes);
 	for (int old = 0; old < 2; old++) {
 		const unsigned char *whole = old ? old_file : bytes;
-		size_t all = old ? sizeof old_file - 4 : size;
-		for (size_t n = 0; n < all; n++) {
+		size_t whole_size = old ? sizeof old_file - 4 : size;
+		for (size_t n = 0; n < whole_size; n++) {
 			struct old_row f;
 			write_file(whole, n);
-			int rc = old_spool_row(spool, JOB, &f, &e);
+			int rc = old_spool_read_row(spool, JOB, &f, &e);
 			assert_true(rc == -EBADMSG || rc == -EPROTO);
 			assert_int_equal(truncate(path, (off_t)n), 0);
 			assert_refused(-EBADMSG);
 		}
-		write_file(whole, all);
+		write_file(whole, whole_size);
 		assert_row();
 	}
 }
 
 /* Sizes in a file of version 002 that lead out of the file or leave nothing; texts without an end. */
-static void sizes_beyond_bounds(void **state)
+static void sizes_beyond_bounds_are_refused(void **state)
 {
 	(void)state;
 	static const uint64_t sizes[] = {0, 200, 1ull << 32, 1ull << 63, UINT64_MAX, UINT64_MAX - 96};
@@ -187,7 +188,7 @@ static void sizes_beyond_bounds(void **state)
 }
 
 /* Files of a later version are recognised by the version, or by an unknown field. */
-static void of_another_version(void **state)
+static void file_of_a_later_version_is_refused(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
@@ -209,11 +210,11 @@ static void of_another_version(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(comes_back, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(old_file_is_read, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(truncated_records_are_refused, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(sizes_beyond_bounds, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(row_is_read_back, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(row_of_version_002_is_read, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(truncated_rows_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(sizes_beyond_bounds_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(file_of_a_later_version_is_refused, set_up, tear_down),
 	};
 	return cmocka_run_group_tests_name("coordinator/store/test_old_spool", tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@
 
 static struct error e;
 
-static void records_come_back(void **state)
+static void record_is_read_back_from_its_json(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 7,
@@ -41,12 +41,12 @@ static void records_come_back(void **state)
 	strcpy(r.scene_notes, "s.xml:3: \"one\"\ns.xml:4: two");
 	strcpy(r.rel_error_doubt, "the chains are too short to be judged");
 	r.rel_error_about = 0.218;
-	record_take_effects(
+	record_set_effects(
 		&r, json_pack("[{s:s s:b s:s}]", "name", "dispersion", "on", 0, "why", "`glass` has constant eta"));
 	r.stuck = 3;
 	r.longest_stuck = 5210;
 	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
-		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
+		r.strategies[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
 	r.convergence = (struct convergence){
 		CHAINS_DISAGREE,      12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 1U << 19 | 2, 0.25,
 		"chains \"disagree\""};
@@ -87,13 +87,14 @@ static void records_come_back(void **state)
 	assert_true(*r.effects != 0);
 	assert_string_equal(back.effects, r.effects);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
-	assert_memory_equal(back.strategy, r.strategy, sizeof r.strategy);
+	assert_memory_equal(back.strategies, r.strategies, sizeof r.strategies);
 	const struct convergence *a = &back.convergence;
-	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->tiles_flagged == 3 &&
-		    a->energy_flagged == 0.125);
-	assert_true(a->r_hat_median == 1.01 && a->r_hat_worst == 2.5 && a->worst_x == 64 && a->worst_y == 128);
-	assert_true(a->classes_flagged == r.convergence.classes_flagged &&
-		    a->classes_apart == r.convergence.classes_apart && a->stuck_share == 0.25 && back.b == r.b);
+	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->flagged_tiles == 3 &&
+		    a->flagged_energy_share == 0.125);
+	assert_true(a->r_hat_median == 1.01 && a->max_r_hat == 2.5 && a->worst_x == 64 && a->worst_y == 128);
+	assert_true(a->flagged_classes == r.convergence.flagged_classes &&
+		    a->inconsistent_classes == r.convergence.inconsistent_classes && a->stuck_share == 0.25 &&
+		    back.b == r.b);
 	assert_string_equal(a->text, r.convergence.text);
 	assert_memory_equal(&back.classes[7], &r.classes[7], sizeof *r.classes);
 	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) &&
@@ -104,32 +105,32 @@ static void records_come_back(void **state)
 	assert_non_null(strstr(e.text, "the record of job j7 cannot be written: Invalid UTF-8"));
 }
 
-static long until_it_fails; /* allocations of the JSON library before one fails; < 0: none fails */
+static long remaining_allocations; /* allocations of the JSON library before one fails; < 0: none fails */
 
-static void *alloc_until_it_fails(size_t size)
+static void *limited_malloc(size_t size)
 {
-	return until_it_fails-- == 0 ? NULL : malloc(size);
+	return remaining_allocations-- == 0 ? NULL : malloc(size);
 }
 
 /* Each allocation fails in turn: a record is written completely, or not at all. */
-static void whole_or_not(void **state)
+static void record_is_written_completely_or_not_at_all(void **state)
 {
 	(void)state;
 	struct job_record r;
 	char *whole, *text;
-	record_begin(&r, 7, "box", "ann");
+	record_init(&r, 7, "box", "ann");
 	strcpy(r.mixture, "independent=0.1,hslt=0.9");
-	r.convergence.classes_apart = 3;
+	r.convergence.inconsistent_classes = 3;
 	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
-	record_take_effects(&r, json_pack("[{s:s}]", "name", "dispersion"));
+	record_set_effects(&r, json_pack("[{s:s}]", "name", "dispersion"));
 	forecast_add_look(&r.looks, &(struct forecast_look){1e5, 0.1, 0.05, 0.3, 0.4, 20, 0});
 	assert_int_equal(record_to_json(&r, &whole, &e), 0);
-	json_set_alloc_funcs(alloc_until_it_fails, free);
+	json_set_alloc_funcs(limited_malloc, free);
 	unsigned refused = 0;
 	for (long n = 0;; n++) {
-		until_it_fails = n;
+		remaining_allocations = n;
 		int rc = record_to_json(&r, &text, &e);
-		bool over = until_it_fails >= 0;
+		bool over = remaining_allocations >= 0;
 		refused += rc != 0;
 		if (rc == 0) {
 			assert_string_equal(text, whole);
@@ -143,40 +144,40 @@ static void whole_or_not(void **state)
 	mem_free(whole);
 }
 
-static int from_text(const char *text, struct job_record *r)
+static int parse_record(const char *text, struct job_record *r)
 {
 	return record_from_json(text, strlen(text), r, &e);
 }
 
 /* A record of an earlier version, one that somebody extended by hand, and texts that are no records. */
-static void other_records(void **state)
+static void earlier_records_are_read_and_malformed_ones_refused(void **state)
 {
 	(void)state;
 	struct job_record r;
 	char *text;
-	assert_int_equal(from_text("{\"schema\":1,\"id\":7,\"name\":\"a\"}", &r), 0);
+	assert_int_equal(parse_record("{\"schema\":1,\"id\":7,\"name\":\"a\"}", &r), 0);
 	assert_true(*r.mixture == 0 && *r.note == 0 && r.stuck == 0);
-	assert_true(r.convergence.verdict == CHAINS_AGREE && isnan(r.convergence.r_hat_worst) && r.b == 0);
-	assert_int_equal(from_text("{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}", &r), 0);
+	assert_true(r.convergence.verdict == CHAINS_AGREE && isnan(r.convergence.max_r_hat) && r.b == 0);
+	assert_int_equal(parse_record("{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}", &r), 0);
 	assert_true(*r.mixture == 0);
-	assert_int_equal(from_text("{}", &r), -EBADMSG);
-	assert_int_equal(from_text("{\"schema\":2}", &r), -EPROTO);
+	assert_int_equal(parse_record("{}", &r), -EBADMSG);
+	assert_int_equal(parse_record("{\"schema\":2}", &r), -EPROTO);
 	assert_non_null(strstr(e.text, "version 2"));
-	assert_int_equal(from_text("[", &r), -EBADMSG);
-	record_begin(&r, 7, "box", "ann");
+	assert_int_equal(parse_record("[", &r), -EBADMSG);
+	record_init(&r, 7, "box", "ann");
 	assert_true(r.id == 7 && r.rel_error == -1 && r.ended_seen == -1 && !record_is_ended(&r));
 	assert_int_equal(record_to_json(&r, &text, &e), 0);
 	*strstr(text, "box") = 'f';
-	assert_int_equal(from_text(text, &r), -EBADMSG); /* the checksum is wrong */
+	assert_int_equal(parse_record(text, &r), -EBADMSG); /* the checksum is wrong */
 	mem_free(text);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(records_come_back),
-		cmocka_unit_test(other_records),
-		cmocka_unit_test(whole_or_not),
+		cmocka_unit_test(record_is_read_back_from_its_json),
+		cmocka_unit_test(earlier_records_are_read_and_malformed_ones_refused),
+		cmocka_unit_test(record_is_written_completely_or_not_at_all),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

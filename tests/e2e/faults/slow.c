@@ -10,12 +10,12 @@
 ssize_t pread64(int fd, void *bytes, size_t size, off64_t at)
 {
 	char link[64], path[4096];
-	const char *slow = getenv("HSLT_SLOW");
+	const char *delay_us = getenv("HSLT_SLOW");
 	snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
-	ssize_t n = slow ? readlink(link, path, sizeof path - 1) : 0;
+	ssize_t n = delay_us ? readlink(link, path, sizeof path - 1) : 0;
 	path[n > 0 ? n : 0] = 0;
 	if (strstr(path, "/journal."))
-		usleep((useconds_t)atol(slow));
+		usleep((useconds_t)atol(delay_us));
 	return syscall(SYS_pread64, fd, bytes, size, at);
 }
 

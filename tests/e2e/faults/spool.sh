@@ -15,7 +15,7 @@ with open(path, "r+b") as f:
 TEXT
 }
 
-# flip_result JOURNAL SHARE: flips one bit in the body of the first result (a record of kind 1 or 5; JOURNAL_RECORD in
+# flip_result JOURNAL SHARE: flips one bit in the body of the first result (a record of kind 1 or 5; JOURNAL_RECORD_HEAD_SIZE in
 # coordinator/store/journal_file.h) from this share of the journal on, and prints "result"; if there is none, flips one
 # bit anywhere
 flip_result() {

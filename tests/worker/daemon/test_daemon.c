@@ -9,7 +9,7 @@
 #include "worker/daemon/cache.h"
 #include "worker/daemon/thread_pool.h"
 #include "worker/render/fingerprint.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -30,9 +30,9 @@
 
 struct job {
 	struct task task;
-	atomic_int *running, *most, *gate;
-	pthread_t ran_on;
-	int done;
+	atomic_int *running, *max_running, *gate;
+	pthread_t thread;
+	int done_count;
 };
 
 static pthread_t loop_thread;
@@ -40,28 +40,28 @@ static pthread_t loop_thread;
 static void run_job(struct task *t)
 {
 	struct job *j = (struct job *)t;
-	int now = atomic_fetch_add(j->running, 1) + 1, most = atomic_load(j->most);
-	while (now > most && !atomic_compare_exchange_weak(j->most, &most, now))
+	int now = atomic_fetch_add(j->running, 1) + 1, previous_max = atomic_load(j->max_running);
+	while (now > previous_max && !atomic_compare_exchange_weak(j->max_running, &previous_max, now))
 		continue;
 	while (j->gate && !atomic_load(j->gate))
 		usleep(100);
 	usleep(200);
-	j->ran_on = pthread_self();
+	j->thread = pthread_self();
 	atomic_fetch_sub(j->running, 1);
 }
 
 static void count_done(struct task *t)
 {
 	assert_true(pthread_equal(pthread_self(), loop_thread));
-	((struct job *)t)->done++;
+	((struct job *)t)->done_count++;
 }
 
-static void the_pool_runs_tasks(void **state)
+static void pool_runs_tasks_and_returns_them_on_the_loop(void **state)
 {
 	(void)state;
 	enum { JOBS = 100 };
 	static struct job jobs[JOBS];
-	atomic_int running = 0, most = 0, gate = 0;
+	atomic_int running = 0, max_running = 0, gate = 0;
 	uv_loop_t loop;
 	struct thread_pool *c;
 	struct error e;
@@ -69,27 +69,27 @@ static void the_pool_runs_tasks(void **state)
 	assert_int_equal(uv_loop_init(&loop), 0);
 	assert_int_equal(thread_pool_new(&c, &loop, 3, &e), 0);
 	for (int i = 0; i < JOBS; i++) {
-		jobs[i] = (struct job){.task = {.run = run_job, .done = count_done},
+		jobs[i] = (struct job){.task = {.run = run_job, .on_done = count_done},
 				       .running = &running,
-				       .most = &most,
+				       .max_running = &max_running,
 				       .gate = &gate};
 		thread_pool_add(c, &jobs[i].task);
 	}
 	while (atomic_load(&running) < 3)
 		usleep(100);
-	assert_false(thread_pool_take_back(c, &jobs[0].task)); /* it is running */
-	assert_true(thread_pool_take_back(c, &jobs[50].task));
-	assert_true(thread_pool_take_back(c, &jobs[JOBS - 1].task));
-	assert_false(thread_pool_take_back(c, &jobs[50].task));
+	assert_false(thread_pool_remove(c, &jobs[0].task)); /* it is running */
+	assert_true(thread_pool_remove(c, &jobs[50].task));
+	assert_true(thread_pool_remove(c, &jobs[JOBS - 1].task));
+	assert_false(thread_pool_remove(c, &jobs[50].task));
 	assert_int_equal(thread_pool_pending(c), JOBS - 2);
 	thread_pool_add(c, &jobs[50].task); /* behind the others */
 	atomic_store(&gate, 1);
 	while (thread_pool_pending(c))
 		uv_run(&loop, UV_RUN_ONCE);
 	for (int i = 0; i < JOBS; i++)
-		assert_int_equal(jobs[i].done, i != JOBS - 1);
-	assert_false(pthread_equal(jobs[0].ran_on, loop_thread));
-	assert_int_equal(atomic_load(&most), 3);
+		assert_int_equal(jobs[i].done_count, i != JOBS - 1);
+	assert_false(pthread_equal(jobs[0].thread, loop_thread));
+	assert_int_equal(atomic_load(&max_running), 3);
 	thread_pool_close(c);
 	uv_run(&loop, UV_RUN_DEFAULT);
 	assert_int_equal(uv_loop_close(&loop), 0);
@@ -105,29 +105,29 @@ static void workers_share_a_cache_folder(void **state)
 	struct blob_writer *w;
 	struct error e;
 	char path[128];
-	snprintf(path, sizeof path, "%s/deep/er", folder);
+	snprintf(path, sizeof path, "%s/deep/er", temporary_folder);
 	assert_int_equal(cache_open(&a, path, 1000, &e), 0);
 	assert_int_equal(cache_open(&b, path, 1000, &e), 0);
 	assert_int_equal(blob_hash_bytes("abc", 3, &h, &e), 0);
 	assert_int_equal(blob_write_begin(&w, a.blobs, &h, 3, &e), 0);
-	assert_int_equal(blob_write_add(w, "abc", 3, &e), 0);
+	assert_int_equal(blob_write_append(w, "abc", 3, &e), 0);
 	assert_int_equal(blob_write_commit(w, &e), 0);
-	assert_false(blob_has(b.blobs, &h, NULL)); /* each has a slot of its own */
+	assert_false(blob_is_stored(b.blobs, &h, NULL)); /* each has a slot of its own */
 	cache_close(&a);
 	assert_int_equal(cache_open(&c, path, 1000, &e), 0); /* the free slot is used again, with its contents */
-	assert_true(blob_has(c.blobs, &h, NULL));
+	assert_true(blob_is_stored(c.blobs, &h, NULL));
 	cache_close(&b);
 	cache_close(&c);
 }
 
 /* In /tmp any user can create the folder first, with files of the right names and wrong contents. */
-static void a_cache_of_others_is_not_used(void **state)
+static void cache_that_others_may_write_is_refused(void **state)
 {
 	(void)state;
 	struct cache c;
 	struct error e;
 	char base[128], slot[160], lock[160];
-	snprintf(base, sizeof base, "%s/base", folder);
+	snprintf(base, sizeof base, "%s/base", temporary_folder);
 	snprintf(slot, sizeof slot, "%s/slot-0", base);
 	snprintf(lock, sizeof lock, "%s/slot-0.lock", base);
 	assert_int_equal(mkdir(base, 0700), 0);
@@ -156,7 +156,7 @@ static void a_cache_of_others_is_not_used(void **state)
 
 /* ---- job cache ---- */
 
-static void set_info(struct job_cache *b, const char *texts[], size_t count)
+static void set_job_info(struct job_cache *b, const char *texts[], size_t count)
 {
 	Farm__JobInfo info;
 	Farm__Plan plan;
@@ -202,7 +202,7 @@ static void store_text(struct cache *c, const char *text)
 	struct error e;
 	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
 	assert_int_equal(blob_write_begin(&w, c->blobs, &h, strlen(text), &e), 0);
-	assert_int_equal(blob_write_add(w, text, strlen(text), &e), 0);
+	assert_int_equal(blob_write_append(w, text, strlen(text), &e), 0);
 	assert_int_equal(blob_write_commit(w, &e), 0);
 	blob_release(c->blobs, &h);
 }
@@ -212,17 +212,17 @@ static void on_built(struct job_cache *b)
 	assert_true(b->state == JOB_CACHE_READY || b->state == JOB_CACHE_FAILED);
 }
 
-static const bool never = false;
-static unsigned files_read;
+static const bool never_stop = false;
+static unsigned read_count;
 
 static void on_read(struct job_cache *b)
 {
 	(void)b;
-	files_read++;
+	read_count++;
 }
 
 /* Files of an earlier run are read before use, and not on the loop's thread: the damaged file is fetched again. */
-static void files_of_an_earlier_run_are_read(void **state)
+static void files_of_an_earlier_run_are_read_before_use(void **state)
 {
 	(void)state;
 	struct cache cache;
@@ -232,35 +232,36 @@ static void files_of_an_earlier_run_are_read(void **state)
 	char command[200];
 	const char *texts[] = {"<scene>", "second file"};
 	assert_int_equal(uv_loop_init(&loop), 0);
-	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	assert_int_equal(cache_open(&cache, temporary_folder, 1000, &e), 0);
 	store_text(&cache, texts[0]);
 	store_text(&cache, texts[1]);
 	cache_close(&cache);
-	snprintf(command, sizeof command, "for f in $(grep -l second -r %s); do printf damaged >$f; done", folder);
+	snprintf(command, sizeof command, "for f in $(grep -l second -r %s); do printf damaged >$f; done",
+		 temporary_folder);
 	assert_int_equal(system(command), 0);
-	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	assert_int_equal(cache_open(&cache, temporary_folder, 1000, &e), 0);
 	assert_int_equal(job_cache_new(&b, 5, cache.blobs, &e), 0);
-	set_info(b, texts, 2);
-	b->reading.stop = &never;
-	b->reading.done = on_read;
+	set_job_info(b, texts, 2);
+	b->reading.stop_requested = &never_stop;
+	b->reading.on_done = on_read;
 	for (unsigned i = 0; i < 2; i++) {
-		files_read = 0;
-		assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_READS);
-		assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_READS);
-		assert_int_equal(files_read, 0);
+		read_count = 0;
+		assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_BEING_READ);
+		assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_BEING_READ);
+		assert_int_equal(read_count, 0);
 		uv_run(&loop, UV_RUN_DEFAULT);
-		assert_int_equal(files_read, 1);
+		assert_int_equal(read_count, 1);
 	}
-	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
-	assert_true(b->held[0] && !b->held[1]);
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_MISSING);
+	assert_true(b->is_held[0] && !b->is_held[1]);
 	store_text(&cache, texts[1]);
-	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_HAS);
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILES_COMPLETE);
 	job_cache_free(b);
 	assert_int_equal(uv_loop_close(&loop), 0);
 	cache_close(&cache);
 }
 
-static void a_job_cache_holds_what_it_needs(void **state)
+static void job_cache_asks_for_each_missing_file(void **state)
 {
 	(void)state;
 	struct cache cache;
@@ -270,26 +271,26 @@ static void a_job_cache_holds_what_it_needs(void **state)
 	uv_loop_t loop;
 	const char *texts[] = {"<scene>", "second file", "<scene>", ""};
 	struct blob_hash first;
-	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	assert_int_equal(cache_open(&cache, temporary_folder, 1000, &e), 0);
 	assert_int_equal(job_cache_new(&b, 5, cache.blobs, &e), 0);
-	set_info(b, texts, 4);
+	set_job_info(b, texts, 4);
 	assert_int_equal(blob_hash_bytes(texts[0], 7, &first, &e), 0);
 	assert_int_equal(uv_loop_init(&loop), 0);
-	b->reading.stop = &never;
-	b->reading.done = on_read;
-	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
-	assert_true(blob_hash_equal(&b->wanted, &first));
+	b->reading.stop_requested = &never_stop;
+	b->reading.on_done = on_read;
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_MISSING);
+	assert_true(blob_hash_equal(&b->wanted_file, &first));
 	store_text(&cache, texts[0]);
-	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
-	assert_false(blob_hash_equal(&b->wanted, &first));
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_MISSING);
+	assert_false(blob_hash_equal(&b->wanted_file, &first));
 	store_text(&cache, texts[1]);
-	assert_int_equal(job_cache_look(b, &loop),
-			 JOB_CACHE_LACKS); /* the third equals the first; the empty one is missing */
+	assert_int_equal(job_cache_check_files(b, &loop),
+			 JOB_CACHE_FILE_MISSING); /* the third equals the first; the empty one is missing */
 	store_text(&cache, texts[3]);
-	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_HAS);
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILES_COMPLETE);
 	/* The scene is invalid: building it fails with a message. */
 	assert_int_equal(thread_pool_new(&thread_pool, &loop, 1, &e), 0);
-	b->built = on_built;
+	b->on_built = on_built;
 	assert_int_equal(job_cache_build(b, thread_pool, &e), 0);
 	while (b->state == JOB_CACHE_BUILDING)
 		uv_run(&loop, UV_RUN_ONCE);
@@ -304,7 +305,7 @@ static void a_job_cache_holds_what_it_needs(void **state)
 
 /* ---- fingerprint ---- */
 
-static void the_fingerprint_is_stable(void **state)
+static void fingerprint_is_stable(void **state)
 {
 	(void)state;
 	char a[FINGERPRINT_MAX], b[FINGERPRINT_MAX];
@@ -321,12 +322,16 @@ static void the_fingerprint_is_stable(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_pool_runs_tasks),
-		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(a_job_cache_holds_what_it_needs, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read, folder_set_up, folder_tear_down),
-		cmocka_unit_test(the_fingerprint_is_stable),
+		cmocka_unit_test(pool_runs_tasks_and_returns_them_on_the_loop),
+		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(cache_that_others_may_write_is_refused, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(job_cache_asks_for_each_missing_file, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read_before_use, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test(fingerprint_is_stable),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,7 +9,7 @@
 #include "worker/daemon/lease_queue.h"
 #include "worker/daemon/work.h"
 #include "tests/support/failing_memory.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/scripted_coordinator.h"
 #include "tests/support/worlds.h"
 
@@ -24,19 +24,19 @@
 #include <unistd.h>
 
 /* Starts a worker whose rendering process has just been killed by SIGKILL. */
-static void begin_short(void)
+static void start_short_of_memory(void)
 {
 	struct error e;
-	assert_int_equal(work_share(1, &e), 0);
-	work_lose(SIGKILL, clock_seconds());
+	assert_int_equal(work_share_memory(1, &e), 0);
+	work_record_loss(SIGKILL, clock_seconds());
 	coord_start(0);
 }
 
-static void hear_later(uint64_t job, const char *why)
+static void expect_postponed(uint64_t job, const char *why)
 {
-	assert_int_equal(coord_hear_failed(why), job);
-	assert_true(coord.own); /* the failure does not count against the job */
-	assert_true(coord.at->env.message->lease_failed->later);
+	assert_int_equal(coord_expect_lease_failed(why), job);
+	assert_true(coord.failed_own); /* the failure does not count against the job */
+	assert_true(coord.connection->env.message->lease_failed->later);
 }
 
 /* Two scenes that fit into memory only one at a time would kill each rendering process, so that neither job would
@@ -45,86 +45,86 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share(1, &e), 0);
+	assert_int_equal(work_share_memory(1, &e), 0);
 	coord_start(0);
-	coord_grant(1);
-	coord_grant(2);
-	coord_finish();
-	work_lose(SIGSEGV, clock_seconds()); /* the fault of a scene, not of the machine */
+	coord_grant_new_job(1);
+	coord_grant_new_job(2);
+	coord_stop();
+	work_record_loss(SIGSEGV, clock_seconds()); /* the fault of a scene, not of the machine */
 	coord_start(0);
-	coord_grant(1);
-	coord_grant(2);
-	coord_finish();
-	begin_short();
-	coord_grant(1);
-	coord_say_grant(2);
-	hear_later(2, "memory ran short, so it holds one scene at a time, now that of j1");
-	coord_say_revoke(1);
-	coord_grant(2); /* j1 has no lease, so its scene may be dropped */
-	coord_say_grant(1);
-	hear_later(1, "now that of j2");
-	coord_end_job(2);
-	coord_grant(1);
-	coord_finish();
+	coord_grant_new_job(1);
+	coord_grant_new_job(2);
+	coord_stop();
+	start_short_of_memory();
+	coord_grant_new_job(1);
+	coord_send_grant(2);
+	expect_postponed(2, "memory ran short, so it holds one scene at a time, now that of j1");
+	coord_send_revoke(1);
+	coord_grant_new_job(2); /* j1 has no lease, so its scene may be dropped */
+	coord_send_grant(1);
+	expect_postponed(1, "now that of j2");
+	coord_send_job_end(2);
+	coord_grant_new_job(1);
+	coord_stop();
 }
 
 /* The scene in memory must give way however many leases its job is granted: it gets no new ones, and once it is
  * unused the other job's scene is built. */
-static void a_scene_makes_way_for_one_that_waits(void **state)
+static void scene_makes_way_for_a_waiting_one(void **state)
 {
 	(void)state;
-	begin_short();
-	coord_grant(1);
-	coord_say_grant(2);
-	hear_later(2, "now that of j1");
-	coord.agent->turn.since -= 299; /* as if this time had passed */
-	coord_say_revoke(1);
-	coord_say_grant(1);
-	coord_say_grant(2);
-	hear_later(2, "now that of j1");
-	coord.agent->turn.since -= 2;
-	coord_say_revoke(1);
-	coord_say_grant(1);
-	hear_later(1, "this one makes way for another job's");
-	coord_grant(2);
-	coord_say_grant(1);
-	hear_later(1, "now that of j2");
-	coord.agent->turn.since -= 301;
-	coord.agent->turn.asked -= 61; /* j1 has not been granted a lease for this time */
-	coord_say_revoke(2);
-	coord_say_grant(2);
-	coord_say_grant(1);
-	hear_later(1, "now that of j2");
-	coord_finish();
+	start_short_of_memory();
+	coord_grant_new_job(1);
+	coord_send_grant(2);
+	expect_postponed(2, "now that of j1");
+	coord.agent->scene_turn.waiting_since -= 299; /* as if this time had passed */
+	coord_send_revoke(1);
+	coord_send_grant(1);
+	coord_send_grant(2);
+	expect_postponed(2, "now that of j1");
+	coord.agent->scene_turn.waiting_since -= 2;
+	coord_send_revoke(1);
+	coord_send_grant(1);
+	expect_postponed(1, "this one makes way for another job's");
+	coord_grant_new_job(2);
+	coord_send_grant(1);
+	expect_postponed(1, "now that of j2");
+	coord.agent->scene_turn.waiting_since -= 301;
+	coord.agent->scene_turn.last_refused_at -= 61; /* j1 has not been granted a lease for this time */
+	coord_send_revoke(2);
+	coord_send_grant(2);
+	coord_send_grant(1);
+	expect_postponed(1, "now that of j2");
+	coord_stop();
 }
 
 /* The restriction ends after ten minutes; each time memory runs short again within the same time, the next period is
  * twice as long. */
-static void the_restriction_ends(void **state)
+static void restriction_ends_and_doubles_when_repeated(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share(1, &e), 0);
+	assert_int_equal(work_share_memory(1, &e), 0);
 	assert_false(work_memory_was_short(0));
-	work_lose(SIGKILL, 1000);
+	work_record_loss(SIGKILL, 1000);
 	assert_true(work_memory_was_short(1599));
 	assert_false(work_memory_was_short(1601));
-	work_memory_short(1700);
+	work_note_memory_short(1700);
 	assert_true(work_memory_was_short(2899));
 	assert_false(work_memory_was_short(2901));
-	work_memory_short(4101); /* the same time has passed without a shortage: ten minutes */
+	work_note_memory_short(4101); /* the same time has passed without a shortage: ten minutes */
 	assert_true(work_memory_was_short(4700));
-	work_lose(SIGKILL, 4700); /* within the period: it restarts with the same length */
+	work_record_loss(SIGKILL, 4700); /* within the period: it restarts with the same length */
 	assert_true(work_memory_was_short(5299));
 	assert_false(work_memory_was_short(5301));
-	double at = 5300, lasts = 600; /* the last period began at 4700 */
+	double start = 5300, duration = 600; /* the last period began at 4700 */
 	for (int i = 0; i < 8; i++) {
-		lasts = 2 * lasts < 19200 ? 2 * lasts : 19200;
-		work_memory_short(at);
-		at += lasts;
+		duration = 2 * duration < 19200 ? 2 * duration : 19200;
+		work_note_memory_short(start);
+		start += duration;
 	}
-	assert_true(work_memory_was_short(at - 1));
-	assert_false(work_memory_was_short(at + 1));
+	assert_true(work_memory_was_short(start - 1));
+	assert_false(work_memory_was_short(start + 1));
 }
 
 /* After the period, both jobs are accepted again. */
@@ -132,12 +132,12 @@ static void both_scenes_are_accepted_afterwards(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share(1, &e), 0);
-	work_lose(SIGKILL, clock_seconds() - 601);
+	assert_int_equal(work_share_memory(1, &e), 0);
+	work_record_loss(SIGKILL, clock_seconds() - 601);
 	coord_start(0);
-	coord_grant(1);
-	coord_grant(2);
-	coord_finish();
+	coord_grant_new_job(1);
+	coord_grant_new_job(2);
+	coord_stop();
 }
 
 /* A task that keeps the pool's only thread busy until gate_open. */
@@ -150,21 +150,21 @@ static void wait_at_gate(struct task *task)
 }
 
 /* Builds the world of the latest job, while one of the first allocations fails. */
-static void run_out_of_memory(uint64_t job)
+static void build_without_memory(uint64_t job)
 {
-	struct task gate = {.run = wait_at_gate, .done = wait_at_gate /* done: the gate is open by then */};
+	struct task gate = {.run = wait_at_gate, .on_done = wait_at_gate /* done: the gate is open by then */};
 	atomic_store(&gate_open, false);
 	thread_pool_add(coord.agent->thread_pool, &gate);
-	coord_describe(job);
-	if (!blob_has(coord.agent->cache.blobs, &coord.scenes[job - 1].hash, NULL)) {
-		coord_hear_blob_get(&coord.scenes[job - 1], 0);
+	coord_send_job_info(job);
+	if (!blob_is_stored(coord.agent->cache.blobs, &coord.scenes[job - 1].hash, NULL)) {
+		coord_expect_blob_get(&coord.scenes[job - 1], 0);
 		coord_send_piece(&coord.scenes[job - 1], 0);
 	}
 	while (coord.agent->job_caches->job != job || coord.agent->job_caches->state != JOB_CACHE_BUILDING)
 		uv_run(&coord.agent->loop, UV_RUN_NOWAIT);
 	mem_fail_after(20);
 	atomic_store(&gate_open, true);
-	coord_hear_failed("memory");
+	coord_expect_lease_failed("memory");
 	mem_fail_after(-1);
 }
 
@@ -176,92 +176,92 @@ static void compute_first_of_two(void)
 {
 	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
 	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
-	coord_grant(1);
-	coord_describe(1);
-	coord_hear_blob_get(&coord.scenes[0], 0);
+	coord_grant_new_job(1);
+	coord_send_job_info(1);
+	coord_expect_blob_get(&coord.scenes[0], 0);
 	coord_send_piece(&coord.scenes[0], 0);
-	coord_serve_mesh(0, PIECES);
-	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	coord_serve_mesh(0, COORD_MESH_PIECES);
+	assert_int_equal(coord_receive()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
 }
 
 /* A lease of an ended job is still on its thread. Another job is not refused, because the coordinator would offer it
  * again only after 10 s: its files are fetched, and its scene waits. Returns the lease; its thread stops afterwards. */
-static struct lease_task *begin_beside_a_thread(struct job_cache **next)
+static struct lease_task *start_beside_a_running_thread(struct job_cache **next)
 {
-	begin_short();
+	start_short_of_memory();
 	compute_first_of_two();
 	struct lease_task *l = coord.agent->leases;
 	l->state = LEASE_QUEUED; /* as if its thread were still computing it */
-	coord_end_job(1);
-	coord_grant(2);
-	assert_true(l->unwanted);
-	coord_describe(2);
-	coord_hear_blob_get(&coord.scenes[1], 0);
+	coord_send_job_end(1);
+	coord_grant_new_job(2);
+	assert_true(l->is_unwanted);
+	coord_send_job_info(2);
+	coord_expect_blob_get(&coord.scenes[1], 0);
 	coord_send_piece(&coord.scenes[1], 0);
-	while (!(*next = job_cache_find(coord.agent->job_caches, 2))->held || !(*next)->held[0])
+	while (!(*next = job_cache_find(coord.agent->job_caches, 2))->is_held || !(*next)->is_held[0])
 		uv_run(&coord.agent->loop, UV_RUN_NOWAIT);
 	assert_int_equal((*next)->state, JOB_CACHE_FETCHING);
 	return l;
 }
 
-static void a_thread_that_has_yet_to_stop(void **state)
+static void scene_waits_for_a_thread_that_has_yet_to_stop(void **state)
 {
 	struct job_cache *next;
 	(void)state;
-	struct lease_task *l = begin_beside_a_thread(&next);
-	l->task.done(&l->task);
+	struct lease_task *l = start_beside_a_running_thread(&next);
+	l->task.on_done(&l->task);
 	assert_null(job_cache_find(coord.agent->job_caches, 1));
-	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
-	coord_finish();
+	assert_int_equal(coord_receive()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	coord_stop();
 }
 
 /* A worker that leaves has returned the leases of the waiting scene, and must not build it. */
-static void a_leaving_worker_builds_no_more(void **state)
+static void leaving_worker_builds_no_scene(void **state)
 {
 	struct job_cache *next;
 	(void)state;
-	struct lease_task *l = begin_beside_a_thread(&next);
-	coord.agent->leaving = true;
-	lease_queue_leave(coord.agent);
-	l->task.done(&l->task);
+	struct lease_task *l = start_beside_a_running_thread(&next);
+	coord.agent->is_leaving = true;
+	lease_queue_return_unstarted(coord.agent);
+	l->task.on_done(&l->task);
 	assert_null(coord.agent->leases);
 	assert_int_equal(next->state, JOB_CACHE_FETCHING);
-	coord_finish();
+	coord_stop();
 }
 
 /* Like a shortage that kills the process, but the system refuses memory. No job is at fault, whether or not its scene
  * was the only one; if it was not, the worker holds one scene at a time afterwards. */
-static void a_lack_of_memory_is_no_jobs_fault(void **state)
+static void lack_of_memory_is_no_jobs_fault(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share(1, &e), 0);
+	assert_int_equal(work_share_memory(1, &e), 0);
 	coord_start(0);
 	compute_first_of_two();
-	coord_grant(2);
-	run_out_of_memory(2);
-	assert_true(coord.own);
-	coord_say_grant(3);
-	hear_later(3, "now that of j1");
-	coord_end_job(1);
-	coord_grant(2);
-	run_out_of_memory(2);
-	assert_true(coord.own);
-	coord_finish();
+	coord_grant_new_job(2);
+	build_without_memory(2);
+	assert_true(coord.failed_own);
+	coord_send_grant(3);
+	expect_postponed(3, "now that of j1");
+	coord_send_job_end(1);
+	coord_grant_new_job(2);
+	build_without_memory(2);
+	assert_true(coord.failed_own);
+	coord_stop();
 }
 
-#define TEST(f) cmocka_unit_test_setup_teardown(f, folder_set_up, folder_tear_down)
+#define TEST(f) cmocka_unit_test_setup_teardown(f, temporary_folder_set_up, temporary_folder_tear_down)
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		TEST(one_scene_at_a_time_where_memory_was_short),
-		TEST(a_scene_makes_way_for_one_that_waits),
-		TEST(the_restriction_ends),
+		TEST(scene_makes_way_for_a_waiting_one),
+		TEST(restriction_ends_and_doubles_when_repeated),
 		TEST(both_scenes_are_accepted_afterwards),
-		TEST(a_thread_that_has_yet_to_stop),
-		TEST(a_leaving_worker_builds_no_more),
-		TEST(a_lack_of_memory_is_no_jobs_fault),
+		TEST(scene_waits_for_a_thread_that_has_yet_to_stop),
+		TEST(leaving_worker_builds_no_scene),
+		TEST(lack_of_memory_is_no_jobs_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

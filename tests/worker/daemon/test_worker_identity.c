@@ -19,9 +19,9 @@ static struct worker_identity begin_identity(const char *name)
 {
 	struct worker_identity l;
 	struct error e;
-	assert_int_equal(worker_identity_begin(&l, folder, name, &e), 0);
-	assert_int_equal(strlen(l.home), WORKER_IDENTITY_HOME - 1);
-	assert_int_equal(strspn(l.home, "0123456789abcdef"), WORKER_IDENTITY_HOME - 1);
+	assert_int_equal(worker_identity_count_start(&l, folder, name, &e), 0);
+	assert_int_equal(strlen(l.home), WORKER_IDENTITY_HOME_SIZE - 1);
+	assert_int_equal(strspn(l.home, "0123456789abcdef"), WORKER_IDENTITY_HOME_SIZE - 1);
 	return l;
 }
 
@@ -48,7 +48,7 @@ static void starts_are_counted(void **state)
 	assert_string_not_equal(begin_identity("b").home, first.home);
 }
 
-static void a_damaged_identity_is_replaced(void **state)
+static void damaged_identity_is_replaced(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {"",
@@ -70,7 +70,7 @@ static void a_damaged_identity_is_replaced(void **state)
 	assert_int_equal(begin_identity("c").restarts, 42);
 }
 
-static int fail_when_full(int fd)
+static int fail_fsync(int fd)
 {
 	(void)fd;
 	errno = ENOSPC;
@@ -78,16 +78,16 @@ static int fail_when_full(int fd)
 }
 
 /* With a full disk the start is not counted, and the file remains unchanged. */
-static void disk_full(void **state)
+static void full_disk_leaves_the_identity_unchanged(void **state)
 {
 	(void)state;
 	struct disk bad = disk_system;
 	struct worker_identity before = begin_identity("d"), l;
 	struct error e;
-	bad.fsync = fail_when_full;
-	disk_use(&bad);
-	int rc = worker_identity_begin(&l, folder, "d", &e);
-	disk_use(NULL);
+	bad.fsync = fail_fsync;
+	disk_set_calls(&bad);
+	int rc = worker_identity_count_start(&l, folder, "d", &e);
+	disk_set_calls(NULL);
 	assert_int_equal(rc, -ENOSPC);
 	assert_string_equal(l.home, "");
 	l = begin_identity("d");
@@ -95,13 +95,13 @@ static void disk_full(void **state)
 	assert_string_equal(l.home, before.home);
 }
 
-static int begin(void **state)
+static int set_up(void **state)
 {
 	(void)state;
 	return mkdtemp(folder) ? 0 : -1;
 }
 
-static int end(void **state)
+static int tear_down(void **state)
 {
 	(void)state;
 	char command[64];
@@ -112,7 +112,7 @@ static int end(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(starts_are_counted),
-					   cmocka_unit_test(a_damaged_identity_is_replaced),
-					   cmocka_unit_test(disk_full)};
-	return cmocka_run_group_tests(tests, begin, end);
+					   cmocka_unit_test(damaged_identity_is_replaced),
+					   cmocka_unit_test(full_disk_leaves_the_identity_unchanged)};
+	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -16,7 +16,7 @@ static const char *canonical(const char *text)
 {
 	static char out[PLAN_ACCURACY_MAX];
 	struct error e = {""};
-	if (render_settings_canonical(text, out, &e))
+	if (accuracy_settings_canonicalize(text, out, &e))
 		fail_msg("'%s': %s", text ? text : "NULL", e.text);
 	return out;
 }
@@ -48,7 +48,7 @@ static void test_all_at_once(void **state)
 	struct accuracy_settings a, b;
 	size_t used = 0;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
-		double value = k->least + (k->greatest - k->least) * 1.23456789e-5;
+		double value = k->min + (k->max - k->min) * 1.23456789e-5;
 		if (k->kind == SETTING_REAL)
 			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%.17g", i ? "," : "", k->name,
 						 value);
@@ -59,13 +59,13 @@ static void test_all_at_once(void **state)
 									     : "1000");
 	}
 	assert_int_equal(accuracy_settings_read(all, &a, NULL), 0);
-	assert_int_equal(render_settings_canonical(all, once, NULL), 0);
+	assert_int_equal(accuracy_settings_canonicalize(all, once, NULL), 0);
 	assert_int_equal(accuracy_settings_read(once, &b, NULL), 0);
 	assert_memory_equal(&a, &b, sizeof a);
-	assert_int_equal(render_settings_canonical(once, twice, NULL), 0);
+	assert_int_equal(accuracy_settings_canonicalize(once, twice, NULL), 0);
 	assert_memory_equal(once, twice, sizeof once); /* the bytes after the text are zero as well */
 	assert_true(strlen(once) + 8 < sizeof once);
-	assert_true(plan_text_ok(once, sizeof once));
+	assert_true(plan_text_is_valid(once, sizeof once));
 	size_t entries = 1;
 	for (const char *at = once; *at; at++)
 		entries += *at == ',';
@@ -80,9 +80,9 @@ static void test_list(void **state)
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		char value[40], entry[80];
-		assert_true(k->standard >= k->least && k->standard <= k->greatest);
+		assert_true(k->default_value >= k->min && k->default_value <= k->max);
 		assert_true(strlen(k->summary) > 20);
-		accuracy_settings_value(&accuracy_settings_default, i, value, sizeof value);
+		accuracy_settings_print_value(&accuracy_settings_default, i, value, sizeof value);
 		snprintf(entry, sizeof entry, "%s=%s", k->name, value);
 		assert_string_equal(canonical(entry), "");
 		bool has_default = false;
@@ -100,7 +100,7 @@ static void refused(const char *text, const char *reason)
 {
 	char out[PLAN_ACCURACY_MAX];
 	struct error e = {""};
-	assert_int_equal(render_settings_canonical(text, out, &e), -EINVAL);
+	assert_int_equal(accuracy_settings_canonicalize(text, out, &e), -EINVAL);
 	if (!strstr(e.text, reason))
 		fail_msg("'%s': \"%s\" does not say \"%s\"", text, e.text, reason);
 }
@@ -143,18 +143,18 @@ static void test_walk_limits(void **state)
 	assert_int_equal(
 		accuracy_settings_read("tolerance=1e-5,iterations=7,least-step=.5,reverse-tolerance=.25", &k, NULL), 0);
 	struct walk_limits l = walk_limits_of(&k);
-	assert_int_equal(l.iterations, 7);
-	assert_true(l.tolerance == 1e-5 && l.least_step == 0.5 && l.back == 0.25 && l.scale == 1);
+	assert_int_equal(l.max_iterations, 7);
+	assert_true(l.tolerance == 1e-5 && l.min_step == 0.5 && l.reverse_tolerance == 0.25 && l.tolerance_scale == 1);
 }
 
 /* Returns the BSDF of a world's only shape. */
 static const struct bsdf *material(const char *accuracy, const char *bsdf, struct world **w)
 {
 	worlds_accuracy = accuracy;
-	*w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>",
-			   bsdf);
+	*w = world_from_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>",
+			     bsdf);
 	worlds_accuracy = NULL;
-	return &(*w)->bsdfs[(*w)->parts[0].bsdf];
+	return &(*w)->bsdfs[(*w)->shape_bindings[0].bsdf];
 }
 
 static void test_roughness(void **state)
@@ -168,14 +168,14 @@ static void test_roughness(void **state)
 	for (size_t i = 0; i < sizeof rough / sizeof *rough; i++) {
 		struct world *w;
 		const struct bsdf *b = material("roughness=0.05", rough[i], &w);
-		assert_true(b->has_smooth && !b->has_delta && b->alpha == 0.05);
+		assert_true(b->has_smooth && !b->has_delta && b->min_alpha == 0.05);
 		assert_true(w->effects.glossy && !w->effects.specular);
 		world_free(w);
 		b = material("roughness=0.051", rough[i], &w);
-		assert_true(!b->has_smooth && b->has_delta && b->alpha == 0);
+		assert_true(!b->has_smooth && b->has_delta && b->min_alpha == 0);
 		assert_true(!w->effects.glossy && w->effects.specular);
 		const struct wavelengths wl = wavelengths_sample(0.3);
-		const struct bsdf_point p = {.where = {.u = 0.5, .v = 0.5}, .w = &wl};
+		const struct bsdf_point p = {.texture_point = {.u = 0.5, .v = 0.5}, .wavelengths = &wl};
 		vec3 wo = {0, 0.6, 0.8}, wi;
 		double chance;
 		spectrum f = bsdf_eval_delta(b, &p, wo, BSDF_REFLECT, &wi, &chance);
@@ -199,7 +199,7 @@ static void test_tessellation(void **state)
 		struct render_summary summary;
 		worlds_accuracy = cases[i].accuracy;
 		/* clang-format off */
-		struct world *w = world_of_text(8, 8,
+		struct world *w = world_from_text(8, 8,
 			SENSOR("0,0,3", "0,0,0")
 			"<shape type='sphere'>"
 				"<texture type='checkerboard' name='displacement'/>"
@@ -219,7 +219,7 @@ static void test_lease_and_world(void **state)
 {
 	(void)state;
 	worlds_accuracy = "tolerance=1e-05";
-	struct world *w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<shape type='sphere'/>");
+	struct world *w = world_from_text(8, 8, SENSOR("0,0,3", "0,0,0") "<shape type='sphere'/>");
 	worlds_accuracy = NULL;
 	struct plan_request r = {.integrator = "path",
 				 .kind = PLAN_SAMPLES,
@@ -233,7 +233,7 @@ static void test_lease_and_world(void **state)
 	for (int same = 0; same < 2; same++) {
 		struct plan p;
 		struct error e = {""};
-		enum lease_end end;
+		enum lease_outcome end;
 		struct batch b;
 		snprintf(r.accuracy, sizeof r.accuracy, "%s", same ? "tolerance=1e-05" : "");
 		assert_int_equal(plan_make(&r, &p, &e), 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The integrator that is chosen for scenes whose light is known to be easy or hard to find, and the length of the
  * pilot. The rule itself is tested in test_choose_rule.c. */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
 #include "worker/render/choose.h"
@@ -37,7 +37,7 @@ static void choose_for(const struct world *w, uint64_t seed, uint64_t spp, struc
 static struct world *without_refraction(const char *folder, const char *file)
 {
 	worlds_effects = "-refracted-shadows";
-	struct world *w = world_of_own_scene(folder, file, 160, 90);
+	struct world *w = world_from_own_scene(folder, file, 160, 90);
 	worlds_effects = NULL;
 	return w;
 }
@@ -49,7 +49,7 @@ static bool chooses_chains(struct world *w, uint64_t seed)
 	struct plan_request r;
 	struct render_choice c;
 	choose_for(w, seed, SPP, &r, &c);
-	const struct render_integrator *i = render_integrator_find(r.integrator);
+	const struct integrator_properties *i = render_integrator_find(r.integrator);
 	assert_non_null(i);
 	assert_int_equal(r.kind, i->kind);
 	assert_int_equal(i->has_mutations, *r.mixture != 0);
@@ -62,7 +62,7 @@ static bool chooses_chains(struct world *w, uint64_t seed)
 static void an_open_room_needs_no_chains(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
 	world_free(w);
@@ -72,7 +72,7 @@ static void an_open_room_needs_no_chains(void **state)
 static void samples_that_are_all_alike_have_no_variance(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		SENSOR("0,0,5",
 		       "0,0,0") "<emitter type='constant'><float name='radiance' value='1'/></emitter><shape type='sphere'>"
@@ -80,7 +80,7 @@ static void samples_that_are_all_alike_have_no_variance(void **state)
 	struct plan_request r;
 	struct render_choice c;
 	choose_for(w, 1, SPP, &r, &c);
-	assert_true(c.path.cost < 0.1 && c.path.tail > 2);
+	assert_true(c.path.cost < 0.1 && c.path.tail_index > 2);
 	assert_string_equal(r.integrator, "path");
 	world_free(w);
 }
@@ -89,7 +89,7 @@ static void samples_that_are_all_alike_have_no_variance(void **state)
 static void fog_is_not_merged(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		SENSOR("0,0,5",
 		       "0,0,0") "<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>"
@@ -100,7 +100,8 @@ static void fog_is_not_merged(void **state)
 	struct render_choice c;
 	choose_for(w, 1, SPP, &r, &c);
 	assert_string_equal(r.integrator, "erpt4");
-	assert_true(c.misses && c.focuses && c.merged.share == 0 && c.merged.seen == 0);
+	assert_true(c.path_misses_light && c.has_narrow_lobes && c.merging.rare_share == 0 &&
+		    c.merging.seen_share == 0);
 	world_free(w);
 }
 
@@ -114,7 +115,7 @@ static void clouds_focus_nothing(void **state)
 					    "<shape type='sphere'><float name='radius' value='.3'/>"
 					    "<bsdf type='dielectric'/></shape>"};
 	for (int i = 0; i < 3; i++) {
-		struct world *w = world_of_text(
+		struct world *w = world_from_text(
 			32, 32,
 			SENSOR("0,0,5",
 			       "0,0,0") "<emitter type='constant'/><shape type='sphere'><bsdf type='null'/><medium "
@@ -123,8 +124,8 @@ static void clouds_focus_nothing(void **state)
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, 1, SPP, &r, &c);
-		assert_int_equal(c.focuses, i > 0);
-		assert_int_equal(c.refracts, i == 2);
+		assert_int_equal(c.has_narrow_lobes, i > 0);
+		assert_int_equal(c.transmits, i == 2);
 		assert_string_equal(r.integrator, i == 0 ? "path" : "erpt4");
 		world_free(w);
 	}
@@ -136,7 +137,7 @@ static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 	struct plan_request r;
 	struct render_choice c;
 	choose_for(w, seed, SPP, &r, &c);
-	return c.merged.share > 0.03 && c.settled && strcmp(r.integrator, "erpt") == 0;
+	return c.merging.rare_share > 0.03 && c.is_settled && strcmp(r.integrator, "erpt") == 0;
 }
 
 /* The lamp is far brighter than the map's cells around it, but every sample of its pixel finds it. */
@@ -144,7 +145,7 @@ static void a_lamp_in_view_is_not_rare_light(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(48, 48,
+	struct world *w = world_from_text(48, 48,
 		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>"
 		SENSOR("0,0,4", "0,0,0")
 		"<shape type='cube'>"
@@ -171,7 +172,7 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 	(void)state;
 	double rare = 0;
 	/* clang-format off */
-	struct world *w = world_of_text(160, 90,
+	struct world *w = world_from_text(160, 90,
 		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>"
 		SENSOR("0,0,4", "0,0,0")
 		"<shape type='cube'>"
@@ -202,7 +203,7 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 		struct render_choice c;
 		choose_for(w, seed, SPP, &r, &c);
 		assert_string_not_equal(r.integrator, "hslt");
-		rare += c.bdpt.rare / SEEDS;
+		rare += c.bdpt.rare_share / SEEDS;
 	}
 	assert_true(rare < 0.05); /* 0.003; 0.15 if splats were not compared with their pixels */
 	world_free(w);
@@ -212,13 +213,13 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("../bench/scenes", "effects-glass.xml", 160, 90);
+	struct world *w = world_from_own_scene("../bench/scenes", "effects-glass.xml", 160, 90);
 	int times = 0;
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, seed, SPP, &r, &c);
-		assert_true(c.path.tail < 2);
+		assert_true(c.path.tail_index < 2);
 		times += strcmp(r.integrator, "erpt4") == 0;
 	}
 	assert_true(times >= SEEDS / 2); /* 78 % over other seeds */
@@ -234,7 +235,7 @@ static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 		assert_true(chooses_chains(w, seed));
 	world_free(w);
 	/* Refracted connections find this light. */
-	w = world_of_own_scene("bulb", "scene.xml", 160, 90);
+	w = world_from_own_scene("bulb", "scene.xml", 160, 90);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
 	world_free(w);
@@ -250,7 +251,7 @@ static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, seeds[i], 8, &r, &c);
-		assert_true(c.misses && isinf(c.path.cost));
+		assert_true(c.path_misses_light && isinf(c.path.cost));
 		assert_string_equal(r.integrator, "erpt");
 	}
 	world_free(w);
@@ -273,7 +274,7 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(48, 48,
+	struct world *w = world_from_text(48, 48,
 		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>"
 		SENSOR("0,2,6", "0,0,0")
 		"<shape type='rectangle'>"
@@ -297,8 +298,8 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 		struct render_choice c;
 		choose_for(w, seed, 16, &r, &c);
 		assert_int_equal(strncmp(r.integrator, "erpt", 4), 0);
-		c.misses = c.focuses = c.refracts = false;
-		would += strcmp(render_choice_of(&c), "path") == 0;
+		c.path_misses_light = c.has_narrow_lobes = c.transmits = false;
+		would += strcmp(render_choice_integrator(&c), "path") == 0;
 	}
 	assert_true(would >= SEEDS - 1);
 	world_free(w);
@@ -308,15 +309,15 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 static void path_is_not_chosen_where_glass_may_focus_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("../bench/scenes", "pool.xml", 160, 90);
+	struct world *w = world_from_own_scene("../bench/scenes", "pool.xml", 160, 90);
 	int clean = 0;
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, seed, 8, &r, &c);
-		assert_true(c.focuses);
+		assert_true(c.has_narrow_lobes);
 		assert_string_not_equal(r.integrator, "path");
-		clean += c.path.tail >= 2.1;
+		clean += c.path.tail_index >= 2.1;
 	}
 	assert_true(clean >= SEEDS / 2);
 	world_free(w);
@@ -335,7 +336,7 @@ static void light_through_water_begins_chains(void **state)
 static void light_that_few_samples_find_begins_chains(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("../bench/scenes", "torus.xml", 160, 90);
+	struct world *w = world_from_own_scene("../bench/scenes", "torus.xml", 160, 90);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_true(merging_finds_rare_light(w, seed));
 	world_free(w);
@@ -345,7 +346,7 @@ static void light_that_few_samples_find_begins_chains(void **state)
 static void light_that_is_found_by_luck_needs_chains(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("../bench/scenes", "pane.xml", 160, 90);
+	struct world *w = world_from_own_scene("../bench/scenes", "pane.xml", 160, 90);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_true(chooses_chains(w, seed));
 	world_free(w);
@@ -355,10 +356,10 @@ static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 {
 	(void)state;
 	struct world *w =
-		world_of_text(16, 16,
-			      "<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
-				      "0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
-			      5);
+		world_from_text(16, 16,
+				"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
+					"0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
+				5);
 	assert_true(chooses_chains(w, 0));
 	world_free(w);
 }
@@ -369,18 +370,19 @@ static void the_pilot_of_hours_is_bounded(void **state)
 {
 	(void)state;
 	struct world *w =
-		world_of_text(16, 16,
-			      "<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
-				      "0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
-			      2);
+		world_from_text(16, 16,
+				"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
+					"0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
+				2);
 	static const struct {
 		uint64_t spp, samples;
 	} of[] = {{1 << 17, 1 << 18}, {1 << 18, 1 << 18}, {1 << 20, 1 << 19}, {1ull << 40, 1 << 20}};
-	for (size_t i = 0; i < (test_scaled() ? 1 : sizeof of / sizeof *of); i++) {
+	for (size_t i = 0; i < (test_is_scaled() ? 1 : sizeof of / sizeof *of); i++) {
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, 0, of[i].spp, &r, &c);
-		assert_int_equal(c.samples, 4 * of[i].samples); /* two maps, as the first is black, path, and bdpt */
+		assert_int_equal(c.sample_count,
+				 4 * of[i].samples); /* two maps, as the first is black, path, and bdpt */
 	}
 	world_free(w);
 }
@@ -388,7 +390,7 @@ static void the_pilot_of_hours_is_bounded(void **state)
 static void the_same_request_gives_the_same_choice(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r[2];
 	struct render_choice c[2];
 	choose_for(w, 7, 16, &r[0], &c[0]);
@@ -404,7 +406,7 @@ static void the_same_request_gives_the_same_choice(void **state)
 static void a_crop_is_rendered_as_the_whole_is(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	struct plan_request whole = {.integrator = RENDER_INTEGRATOR_DEFAULT,
 				     .width = 60,
 				     .height = 50,
@@ -428,13 +430,13 @@ static void a_crop_is_rendered_as_the_whole_is(void **state)
 static void a_short_render_has_a_brief_pilot(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r;
 	struct render_choice c;
 	choose_for(w, 1, 2, &r, &c);
-	assert_true(c.brief);
+	assert_true(c.is_brief);
 	choose_for(w, 1, 400, &r, &c);
-	assert_false(c.brief);
+	assert_false(c.is_brief);
 	world_free(w);
 }
 
@@ -442,7 +444,7 @@ static void a_short_render_has_a_brief_pilot(void **state)
 static void the_pilot_is_a_small_part_of_the_render(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	static const struct {
 		uint64_t spp, least; /* least: samples of each kind */
 	} of[] = {{1, 1 << 12}, {50, 1 << 12}, {100, 1 << 13}, {200, 1 << 14}, {500, 1 << 14}, {3000, 1 << 16}};
@@ -451,7 +453,7 @@ static void the_pilot_is_a_small_part_of_the_render(void **state)
 		struct render_choice c;
 		choose_for(w, 3, of[i].spp, &r, &c);
 		double all = 62.0 * 52.0 * (double)of[i].spp;
-		assert_in_range(c.samples, 2 * of[i].least, 3 * of[i].least);
+		assert_in_range(c.sample_count, 2 * of[i].least, 3 * of[i].least);
 		if (of[i].spp > 1)
 			assert_true((double)of[i].least < all / 22); /* the power of two nearest to 1/32 */
 	}
@@ -462,7 +464,7 @@ static void the_pilot_is_a_small_part_of_the_render(void **state)
 static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	static const struct {
 		double seconds, target;
 		uint64_t spp, samples; /* spp: per pixel; samples: of the pilot, each kind */
@@ -481,7 +483,7 @@ static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
 					 .target_error = of[i].target};
 		if (render_choose(w, &r, &c, &e))
 			fail_msg("%s", e.text);
-		assert_in_range(c.samples, 2 * of[i].samples, 3 * of[i].samples);
+		assert_in_range(c.sample_count, 2 * of[i].samples, 3 * of[i].samples);
 	}
 	world_free(w);
 }
@@ -489,7 +491,7 @@ static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
 static void what_cannot_be_rendered_is_said(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r = {.integrator = RENDER_INTEGRATOR_DEFAULT,
 				 .width = 60,
 				 .height = 50,

@@ -88,12 +88,13 @@ static void the_rule(void **state)
 		const double *p = cases[i].path, *b = cases[i].bdpt;
 		struct render_choice c = {.path = {p[0], p[1], p[2], p[3], p[4], p[5]},
 					  .bdpt = {b[0], b[1], b[2], b[3], b[4], b[5]},
-					  .misses = cases[i].scene == MISSES,
-					  .focuses = cases[i].scene != FLAT};
-		assert_string_equal(render_choice_of(&c), cases[i].name);
+					  .path_misses_light = cases[i].scene == MISSES,
+					  .has_narrow_lobes = cases[i].scene != FLAT};
+		assert_string_equal(render_choice_integrator(&c), cases[i].name);
 		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
-		c.media_shine = true; /* emitting media: the next best */
-		assert_string_equal(render_choice_of(&c), strcmp(cases[i].name, "hslt") ? cases[i].name : "erpt");
+		c.media_emit = true; /* emitting media: the next best */
+		assert_string_equal(render_choice_integrator(&c),
+				    strcmp(cases[i].name, "hslt") ? cases[i].name : "erpt");
 	}
 }
 
@@ -102,15 +103,15 @@ static void the_rule(void **state)
 static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 {
 	(void)state;
-	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
-	assert_string_equal(render_choice_of(&c), "bdpt8");
-	c.refracts = true;
-	assert_string_equal(render_choice_of(&c), "erpt4");
-	c.refracts = false;
-	c.brief = true;
-	assert_string_equal(render_choice_of(&c), "erpt4");
-	c.focuses = false;
-	assert_string_equal(render_choice_of(&c), "path");
+	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .has_narrow_lobes = true};
+	assert_string_equal(render_choice_integrator(&c), "bdpt8");
+	c.transmits = true;
+	assert_string_equal(render_choice_integrator(&c), "erpt4");
+	c.transmits = false;
+	c.is_brief = true;
+	assert_string_equal(render_choice_integrator(&c), "erpt4");
+	c.has_narrow_lobes = false;
+	assert_string_equal(render_choice_integrator(&c), "path");
 }
 
 /* A point light and a mirror ball in a room: one sample in four with a light sub-path suffices for the little light
@@ -118,42 +119,45 @@ static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 static void little_that_path_misses_needs_few_light_paths(void **state)
 {
 	(void)state;
-	const struct render_choice easy = {
-		.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .found = 0.98, .misses = true, .focuses = true};
+	const struct render_choice easy = {.path = {1, 0, 4, 4, 1, 0},
+					   .bdpt = {2, 0, 3, 3, 1, 0},
+					   .found_fraction = 0.98,
+					   .path_misses_light = true,
+					   .has_narrow_lobes = true};
 	struct render_choice c = easy;
-	assert_string_equal(render_choice_of(&c), "erpt4");
-	c.found = 0.85; /* more light is missed */
-	assert_string_equal(render_choice_of(&c), "erpt");
+	assert_string_equal(render_choice_integrator(&c), "erpt4");
+	c.found_fraction = 0.85; /* more light is missed */
+	assert_string_equal(render_choice_integrator(&c), "erpt");
 	c = easy;
-	c.bdpt.tail = 1.9; /* the found light is uneven */
-	assert_string_equal(render_choice_of(&c), "erpt");
+	c.bdpt.tail_index = 1.9; /* the found light is uneven */
+	assert_string_equal(render_choice_integrator(&c), "erpt");
 	c = easy;
-	c.bdpt.most = 0.04; /* one of its samples is a firefly */
-	assert_string_equal(render_choice_of(&c), "erpt");
+	c.bdpt.largest_share = 0.04; /* one of its samples is a firefly */
+	assert_string_equal(render_choice_integrator(&c), "erpt");
 	c = easy;
 	c.path.cost = 2.1; /* all of the light is as costly */
-	assert_string_equal(render_choice_of(&c), "erpt");
+	assert_string_equal(render_choice_integrator(&c), "erpt");
 }
 
 /* The shares decide, whatever the other figures say; a share as small as in scenes where bdpt is the best does not. */
 static void light_that_is_rare_by_merging_needs_chains(void **state)
 {
 	(void)state;
-	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
+	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .has_narrow_lobes = true};
 	for (int i = 0; i < 2; i++) {
-		c.merged.share = 0.008;
-		assert_string_equal(render_choice_of(&c), i ? "erpt" : "bdpt8");
+		c.merging.rare_share = 0.008;
+		assert_string_equal(render_choice_integrator(&c), i ? "erpt" : "bdpt8");
 		assert_int_equal(render_choice_is_settled(&c), i);
-		c.merged.share = 0.05;
-		assert_string_equal(render_choice_of(&c), "erpt");
+		c.merging.rare_share = 0.05;
+		assert_string_equal(render_choice_integrator(&c), "erpt");
 		assert_true(render_choice_is_settled(&c));
-		c.path.extreme = 0.9;
-		assert_string_equal(render_choice_of(&c), "hslt");
-		c.path.extreme = 4;
-		c.misses = true;
-		assert_string_equal(render_choice_of(&c), "hslt");
-		c.misses = false;
-		c.path.tail = 1.5;
+		c.path.extreme_tail_index = 0.9;
+		assert_string_equal(render_choice_integrator(&c), "hslt");
+		c.path.extreme_tail_index = 4;
+		c.path_misses_light = true;
+		assert_string_equal(render_choice_integrator(&c), "hslt");
+		c.path_misses_light = false;
+		c.path.tail_index = 1.5;
 	}
 }
 
@@ -172,12 +176,12 @@ static void light_that_photons_see_is_not_rare(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct render_choice c = {.path = {1, 0.9, 0.5, 0.5, 1, 0},
 					  .bdpt = {2, cases[i].bdpt_rare, 0.9, 0.8, 1, 0},
-					  .merged = {cases[i].share, cases[i].seen},
-					  .focuses = true};
-		assert_string_equal(render_choice_of(&c), cases[i].name);
-		c.bdpt = (struct render_found){2, 0, 3, 3, 1, 0};
-		c.misses = c.dark = true;
-		assert_string_equal(render_choice_of(&c),
+					  .merging = {cases[i].share, cases[i].seen},
+					  .has_narrow_lobes = true};
+		assert_string_equal(render_choice_integrator(&c), cases[i].name);
+		c.bdpt = (struct render_measurement){2, 0, 3, 3, 1, 0};
+		c.path_misses_light = c.path_is_dark = true;
+		assert_string_equal(render_choice_integrator(&c),
 				    cases[i].share < 0.01 && cases[i].seen > 0.5 ? "erpt" : "hslt");
 	}
 }
@@ -192,7 +196,7 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 			.path = {1, 0.02, 1.9, 0.9, 1, 0},
 			.bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27 % 3], 1, 0}};
 		assert_true(render_choice_is_settled(&c));
-		assert_string_equal(render_choice_of(&c), "erpt");
+		assert_string_equal(render_choice_integrator(&c), "erpt");
 	}
 }
 
@@ -207,13 +211,13 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 	} of[] = {
 		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
 		{"bdpt8",
-		 {.path = {1, 0, 4, 4, 0, 0}, .focuses = true},
+		 {.path = {1, 0, 4, 4, 0, 0}, .has_narrow_lobes = true},
 		 "one sample in eight also starts at the lamps"},
 		{"erpt4", {.path = {1, 0, 1.2, 2, 0.3, 0}}, "one sample in four also starts at the lamps"},
-		{"erpt4", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "a little that they cannot find"},
+		{"erpt4", {.path = {1, 0, 4, 4, 0, 0}, .path_misses_light = true}, "a little that they cannot find"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
-		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
-		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
+		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .is_settled = true}, "leave fireflies"},
+		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .path_misses_light = true}, "cannot find all light"},
 		{"hslt", {.path = {INFINITY, 0, 1, 1, 1, 0}}, "next to no light"},
 		{"hslt", {.path = {1, 0.9, 0.5, 0.5, 1, 0}}, "few, very bright paths"},
 	};

@@ -96,7 +96,7 @@ static int by_number(const void *a, const void *b)
 static struct world *lit_world(void)
 {
 	/* clang-format off */
-	return world_of_text(24, 24,
+	return world_from_text(24, 24,
 		SENSOR("0,1,5", "0,0.5,0")
 		"<shape type='rectangle'>"
 			"<transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform>"
@@ -114,7 +114,7 @@ static struct world *lit_world(void)
 	/* clang-format on */
 }
 
-static struct plan plan_of(const struct world *w, const struct render_integrator *i)
+static struct plan plan_of(const struct world *w, const struct integrator_properties *i)
 {
 	bool chains = i->kind == PLAN_CHAINS;
 	struct plan p = {.kind = i->kind,
@@ -136,7 +136,7 @@ static struct plan plan_of(const struct world *w, const struct render_integrator
 	struct error e = {""};
 	snprintf(p.integrator, sizeof p.integrator, "%s", i->name);
 	world_summary(w, &summary);
-	if (i->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+	if (i->has_mutations && render_canonical_mutations(NULL, &summary, p.mutations, &e))
 		fail_msg("%s", e.text);
 	if (plan_check(&p, &e))
 		fail_msg("%s", e.text);
@@ -153,18 +153,18 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 	uint64_t seeds[GROUPS][CHAINS / GROUPS];
 	struct brightness *map;
 	noted.owner = GROUPS;
-	assert_int_equal(render_map_new(w, p, &map, NULL), 0);
+	assert_int_equal(render_brightness_map_new(w, p, &map, NULL), 0);
 	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
 		noted.owner = i / PARTS;
 		struct batch b =
-			lease_done(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
+			leases_run(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
 		look(user, &b);
 		batch_fini(&b);
 	}
 	for (uint32_t g = 0; g < GROUPS && p->kind == PLAN_CHAINS; g++)
-		bootstrap_seeds(s, g, seeds[g]);
+		bootstrap_draw_seeds(s, g, seeds[g]);
 	for (uint32_t i = 0; i < ROUNDS * GROUPS * PARTS; i++) {
 		uint32_t lease = i % (GROUPS * PARTS), group = lease / PARTS, part = lease % PARTS;
 		struct lease_input in = {.map = map};
@@ -176,14 +176,14 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 						  .states = before[lease].states};
 		noted.owner = group;
 		struct batch b =
-			lease_done(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
+			leases_run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
 		look(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
 	}
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++)
 		batch_fini(&before[i]);
-	render_map_free(map);
+	render_brightness_map_free(map);
 	bootstrap_free(s);
 }
 
@@ -262,7 +262,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		if (render_integrator_at(i)->kind != PLAN_CHAINS)
 			continue;
 		struct plan p = plan_of(w, render_integrator_at(i));
-		struct batch boot = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+		struct batch boot = leases_run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
 		uint64_t first = plan_bootstrap_range(&p, 1, 0).begin, n = 0, looks = 0;
 		while (!(boot.weights[n] > 0))
 			n++;
@@ -275,7 +275,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		record_numbers(true);
-		boot = lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+		boot = leases_run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
 				  &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&boot);
 		for (size_t k = 0; k < noted.count; k++) {
@@ -292,7 +292,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 static struct world *closed_room(void)
 {
 	/* clang-format off */
-	return world_of_text(24, 24,
+	return world_from_text(24, 24,
 		SENSOR("0,0,2.5", "0,0,0")
 		"<shape type='cube'>"
 			"<transform name='to_world'><scale value='3'/></transform>"
@@ -331,7 +331,7 @@ static void a_start_is_the_sample_again(void **state)
 	(void)state;
 	enum { SAMPLES = 64 };
 	static bool before[SAMPLES][BLOCKS_MOST], after[BLOCKS_MOST];
-	const struct render_integrator *hslt = NULL;
+	const struct integrator_properties *hslt = NULL;
 	for (size_t i = 0; render_integrator_at(i); i++)
 		if (render_integrator_at(i)->has_mutations)
 			hslt = render_integrator_at(i);
@@ -342,7 +342,7 @@ static void a_start_is_the_sample_again(void **state)
 	uint64_t first = plan_bootstrap_range(&p, 1, 0).begin;
 	size_t longest = 0, lit = 0;
 	record_numbers(true);
-	struct batch boot = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+	struct batch boot = leases_run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
 	for (uint64_t n = 0; n < SAMPLES; n++) {
 		size_t asked = blocks_of(first + n, before[n]);
 		longest = asked > longest ? asked : longest;
@@ -355,7 +355,7 @@ static void a_start_is_the_sample_again(void **state)
 		size_t extra = 0;
 		record_numbers(true);
 		struct batch b =
-			lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+			leases_run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
 				   &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&b);
 		blocks_of(first + n, after);
@@ -364,7 +364,7 @@ static void a_start_is_the_sample_again(void **state)
 			assert_true(!before[n][k] || after[k]);
 			extra += after[k] && !before[n][k];
 		}
-		assert_int_equal(extra, SAMPLER_BLOCK / 4);
+		assert_int_equal(extra, SAMPLER_BLOCK_SIZE / 4);
 		lit++;
 	}
 	batch_fini(&boot);
@@ -377,10 +377,10 @@ static void a_start_is_the_sample_again(void **state)
 static void groups_resample_by_themselves(void **state)
 {
 	(void)state;
-	struct plan p = {.seed = 3, .groups = PLAN_MAX_GROUPS};
+	struct plan p = {.seed = 3, .groups = PLAN_GROUPS_MAX};
 	for (uint32_t g = 0; g < p.groups; g++)
 		for (uint32_t h = 0; h < g; h++)
-			assert_true(plan_resample_u(&p, g) != plan_resample_u(&p, h));
+			assert_true(plan_resample_offset(&p, g) != plan_resample_offset(&p, h));
 }
 
 struct counted {
@@ -404,7 +404,7 @@ static void count(void *user, const struct batch *b)
 	c->samples += b->counters[COUNT_SAMPLES];
 	c->independent += b->counters[COUNT_INDEPENDENT];
 	if (b->strategy_count)
-		c->proposed += b->strategy[c->strategy][STRATEGY_PROPOSED];
+		c->proposed += b->strategies[c->strategy][STRATEGY_PROPOSED];
 }
 
 /* About half of the samples are dark (fewer if emitters are connected to the lens), and must be counted: all of them
@@ -420,7 +420,7 @@ static void zeros_are_counted(void **state)
 		struct mixture m;
 		if (p.mutations[0]) {
 			assert_int_equal(mixture_parse(p.mutations, &m, NULL), 0);
-			c.strategy = m.independent;
+			c.strategy = m.independent_index;
 		}
 		run_all(w, &p, count, &c);
 		double share = (double)c.independent / (double)c.samples;
@@ -469,11 +469,11 @@ static void each_group_has_its_own_b(void **state)
 		b.independent_sum = (double)weights[i / PARTS];
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
 	}
-	bootstrap_merge(s, &r);
+	bootstrap_compute_b(s, &r);
 	for (uint32_t g = 0; g < GROUPS; g++) {
 		uint64_t seeds[CHAINS / GROUPS];
 		assert_true(r.b[g] == (1 << g) / 16.0);
-		bootstrap_seeds(s, g, seeds);
+		bootstrap_draw_seeds(s, g, seeds);
 		for (size_t k = 0; k < CHAINS / GROUPS; k++)
 			assert_true(seeds[k] == plan_bootstrap_range(&p, g, 0).begin + g); /* the only one with light */
 	}

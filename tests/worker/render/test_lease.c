@@ -25,7 +25,7 @@ enum { PARTS = 2, GROUPS = 2, CHAINS = 8 };
 static struct world *small_world(const char *filter)
 {
 	/* clang-format off */
-	return world_of_text(80, 70,
+	return world_from_text(80, 70,
 		"<sensor type='perspective'>"
 			"<float name='fov' value='50'/>"
 			"<transform name='to_world'><lookat origin='0,1,5' target='0,0.5,0' up='0,1,0'/></transform>"
@@ -50,7 +50,7 @@ static struct world *small_world(const char *filter)
 
 static struct plan plan_of(const struct world *w, const char *integrator)
 {
-	const struct render_integrator *i = render_integrator_find(integrator);
+	const struct integrator_properties *i = render_integrator_find(integrator);
 	struct plan p = {.kind = i->kind,
 			 .width = w->settings.width,
 			 .height = w->settings.height,
@@ -70,7 +70,8 @@ static struct plan plan_of(const struct world *w, const char *integrator)
 	struct render_summary summary;
 	struct error e = {""};
 	world_summary(w, &summary);
-	if (render_integrator_find(integrator)->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+	if (render_integrator_find(integrator)->has_mutations &&
+	    render_canonical_mutations(NULL, &summary, p.mutations, &e))
 		fail_msg("%s", e.text);
 	if (plan_check(&p, &e))
 		fail_msg("%s", e.text);
@@ -106,7 +107,7 @@ static struct lease_key make_key(enum lease_kind kind, uint32_t group, uint32_t 
 /* Finds seeds that carry light, for one lease of chains. */
 static void find_seeds(const struct world *w, const struct plan *p, uint32_t group, uint64_t *seeds, uint32_t count)
 {
-	struct batch b = lease_done(w, p, make_key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
+	struct batch b = leases_run(w, p, make_key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
 	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
 	uint32_t n = 0;
 	for (uint64_t i = 0; i < b.weight_count && n < count; i++)
@@ -127,9 +128,9 @@ static void test_any_order(void **state)
 		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
 		struct batch b[GROUPS * PARTS];
 		for (uint32_t i = 0; i < GROUPS * PARTS; i++)
-			b[i] = lease_done(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			b[i] = leases_run(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 		for (uint32_t i = GROUPS * PARTS; i-- > 0;) {
-			struct batch again = lease_done(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			struct batch again = leases_run(w, &p, make_key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 			assert_same(&b[i], &again);
 			batch_fini(&again);
 			batch_fini(&b[i]);
@@ -150,14 +151,14 @@ static void test_chains(void **state)
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
-		struct batch a = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in),
-			     b = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in);
+		struct batch a = leases_run(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in),
+			     b = leases_run(w, &p, make_key(LEASE_RENDER, 1, 1, 0), &in);
 		assert_same(&a, &b);
 		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
 		struct lease_input next = {.chain_count = 2, .states = a.states},
 				   copy = {.chain_count = 2, .states = b.states};
-		struct batch c = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &next),
-			     d = lease_done(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &copy);
+		struct batch c = leases_run(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &next),
+			     d = leases_run(w, &p, make_key(LEASE_RENDER, 1, 1, 1), &copy);
 		assert_same(&c, &d);
 		batch_fini(&a);
 		batch_fini(&b);
@@ -168,14 +169,14 @@ static void test_chains(void **state)
 }
 
 /* Light so weak that contributions are denormal or zero, and light as strong as a scene may have: every lease gives a
- * batch that passes its checks (lease_done() verifies them), with each integrator. */
+ * batch that passes its checks (leases_run() verifies them), with each integrator. */
 static void test_extreme_light(void **state)
 {
 	(void)state;
 	const char *radiance[] = {"1e-320", "1e-306", "1e-293", "1e-290", "1e-160", "1e30"};
 	for (size_t n = 0; n < sizeof radiance / sizeof *radiance; n++) {
 		/* clang-format off */
-		struct world *w = world_of_text(16, 16,
+		struct world *w = world_from_text(16, 16,
 			SENSOR("0,0,5", "0,0,0")
 			"<shape type='sphere'><bsdf type='diffuse'/></shape>"
 			"<shape type='cube'>"
@@ -194,9 +195,9 @@ static void test_extreme_light(void **state)
 			struct lease_input in = {.chain_count = 2, .seeds = seeds};
 			bool chains = p.kind == PLAN_CHAINS;
 			p.bootstrap = 4096;
-			struct batch a = lease_done(w, &p, make_key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
+			struct batch a = leases_run(w, &p, make_key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
 			batch_fini(&a);
-			struct batch b = lease_done(w, &p, make_key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
+			struct batch b = leases_run(w, &p, make_key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
 			batch_fini(&b);
 		}
 		world_free(w);
@@ -207,7 +208,7 @@ static int end_of(const struct world *w, const struct plan *p, struct lease_key 
 {
 	struct batch b;
 	struct error e = {""};
-	enum lease_end end;
+	enum lease_outcome end;
 	int rc = render_lease(w, p, &k, in, NULL, &end, &b, &e);
 	assert_true(rc == 0 || e.text[0]);
 	batch_fini(&b);
@@ -223,7 +224,7 @@ static void test_refused(void **state)
 	find_seeds(w, &p, 0, seeds, 3);
 	struct lease_key k0 = make_key(LEASE_RENDER, 0, 0, 0), k1 = make_key(LEASE_RENDER, 0, 0, 1);
 	struct lease_input in = {.chain_count = 2, .seeds = seeds};
-	struct batch b = lease_done(w, &p, k0, &in);
+	struct batch b = leases_run(w, &p, k0, &in);
 	/* Wrong counts, and no input at all. */
 	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
 	for (uint32_t n = 0; n < 4; n++)
@@ -234,9 +235,9 @@ static void test_refused(void **state)
 	/* States: of another chain, truncated, too long, random bytes. */
 	struct chain_state s[2] = {b.states[1], b.states[0]};
 	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = s}), -EILSEQ);
-	struct dice d = dice_of("hostile states");
+	struct dice d = dice_for_test("hostile states");
 	size_t good = 0;
-	for (size_t i = 0; i < dice_count(300); i++) {
+	for (size_t i = 0; i < dice_scaled_count(300); i++) {
 		uint8_t *bytes = malloc(b.states[0].size + 64);
 		uint32_t size = b.states[0].size;
 		memset(bytes, 0, size + 64);
@@ -260,7 +261,7 @@ static void test_refused(void **state)
 	}
 	print_message("%zu of the noisy states are states\n", good);
 	/* Dark seeds: such a chain searches for light. */
-	struct batch boot = lease_done(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
+	struct batch boot = leases_run(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
 			assert_int_equal(
@@ -286,14 +287,15 @@ static void test_refused(void **state)
 	other = p;
 	other.max_depth = 0;
 	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
-	other.max_depth = PATH_MAX_EDGES + 1;
+	other.max_depth = PATH_EDGES_MAX + 1;
 	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
 	batch_fini(&b);
 	world_free(w);
 	/* A scene with scattering media. */
-	w = world_of_text(8, 8,
-			  SENSOR("0,0,5", "0,0,0") "<emitter type='constant'/><shape type='sphere'><bsdf type='null'/>"
-						   "<medium type='homogeneous' name='interior'/></shape>");
+	w = world_from_text(
+		8, 8,
+		SENSOR("0,0,5", "0,0,0") "<emitter type='constant'/><shape type='sphere'><bsdf type='null'/>"
+					 "<medium type='homogeneous' name='interior'/></shape>");
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		p = plan_of(w, render_integrator_at(i)->name);
 		assert_int_equal(end_of(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL), 0);
@@ -316,9 +318,9 @@ static void test_invalid_operation(void **state)
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
-			struct batch good = lease_done(w, &p, k, &in), b;
+			struct batch good = leases_run(w, &p, k, &in), b;
 			struct error e = {""};
-			enum lease_end end;
+			enum lease_outcome end;
 			w->camera.center_x = INFINITY;
 			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
 			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") &&
@@ -331,7 +333,7 @@ static void test_invalid_operation(void **state)
 			assert_true(strstr(e.text, where));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
 			w->camera.center_x = center;
-			struct batch again = lease_done(w, &p, k, &in);
+			struct batch again = leases_run(w, &p, k, &in);
 			assert_same(&good, &again);
 			batch_fini(&good);
 			batch_fini(&again);
@@ -353,7 +355,7 @@ static void test_stop(void **state)
 		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			atomic_bool stop = true;
-			enum lease_end end = LEASE_DONE;
+			enum lease_outcome end = LEASE_DONE;
 			struct batch b;
 			struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
 			assert_int_equal(
@@ -391,7 +393,7 @@ static void test_ticks(void **state)
 			struct lease_key k = make_key((enum lease_kind)kind, 1, 0, 0);
 			atomic_store(&ticks, 0);
 			liveness_counter = &ticks;
-			struct batch b = lease_done(w, &p, k, p.kind == PLAN_CHAINS ? &in : NULL);
+			struct batch b = leases_run(w, &p, k, p.kind == PLAN_CHAINS ? &in : NULL);
 			liveness_counter = NULL;
 			assert_true(b.counters[COUNT_SAMPLES] >= TICK);
 			assert_true(atomic_load(&ticks) >= b.counters[COUNT_SAMPLES] / TICK);
@@ -407,7 +409,7 @@ static float *film_of(const struct world *w, const struct plan *p)
 	double *sum = calloc((size_t)p->width * p->height * 3, sizeof *sum);
 	for (uint32_t g = 0; g < p->groups; g++)
 		for (uint32_t part = 0; part < p->parts; part++) {
-			struct batch b = lease_done(w, p, make_key(LEASE_RENDER, g, part, 0), NULL);
+			struct batch b = leases_run(w, p, make_key(LEASE_RENDER, g, part, 0), NULL);
 			for (uint32_t t = 0; t < b.tile_count; t++)
 				for (uint32_t i = 0; i < b.tiles[t].width * b.tiles[t].height * 3; i++) {
 					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width,
@@ -466,7 +468,7 @@ static void test_borders(void **state)
 	(void)state;
 	const char *filters[] = {"box", "tent", "gaussian"};
 	for (int f = 0; f < 3; f++) {
-		struct world *w = world_of_text(
+		struct world *w = world_from_text(
 			24, 20,
 			"<sensor type='perspective'><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
 			"<emitter type='constant'><float name='radiance' value='2'/></emitter>",
@@ -512,7 +514,7 @@ static void test_no_memory(void **state)
 			for (long i = 0;; i++) {
 				struct error e = {""};
 				struct batch b;
-				enum lease_end end;
+				enum lease_outcome end;
 				struct lease_key k = make_key((enum lease_kind)kind, 0, 0, 0);
 				mem_fail_after(i);
 				int rc =

@@ -12,7 +12,7 @@
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
 #include "tests/support/leases.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
@@ -68,23 +68,25 @@ static void check_around(struct path_context *c, struct full_path *x, unsigned f
 {
 	static struct ensemble around;
 	struct sampler_random s;
-	const double u[3] = {dice_throw(d), 0, 0};
-	unsigned class = path_class_whole(x);
+	const double u[3] = {dice_uniform(d), 0, 0};
+	unsigned class = full_path_class(x);
 	sampler_random_init(&s, 17, RNG_CHAIN, index, 1);
 	for (unsigned i = 0; i <= x->edges; i++) { /* clear the vertices of other paths */
 		memset(&c->camera[i].x.p, 0, sizeof c->camera[i].x.p);
 		memset(&c->light[i].x.p, 0, sizeof c->light[i].x.p);
 	}
-	ensemble_around(c, &s.base, x, u, &around);
-	static struct classes classes;
+	ensemble_draw_containing(c, &s.base, x, u, &around);
+	static struct path_classes classes;
 	static struct path_sample unused;
 	for (uint32_t i = 0; i < around.count; i++) {
-		const struct candidate *a = &around.of[i];
-		unsigned passed = a->s > 0 ? full_path_passed(c, x, a->s) : 0;
-		if (a->edges != x->edges || a->passed != passed || a->s == from || !is_made(c, x, a->s))
+		const struct candidate *a = &around.candidates[i];
+		unsigned passed = a->s > 0 ? full_path_passed_count(c, x, a->s) : 0;
+		if (a->edges != x->edges || a->passed_count != passed || a->s == from || !is_made(c, x, a->s))
 			continue;
-		classes_begin(&classes, c, x->edges + 1 - a->s, a->s, &unused);
-		assert_int_equal(classes_joined(&classes, a->s, x->edges + 1 - a->s - a->passed, a->passed), class);
+		path_classes_begin(&classes, c, x->edges + 1 - a->s, a->s, &unused);
+		assert_int_equal(
+			path_classes_of_joint(&classes, a->s, x->edges + 1 - a->s - a->passed_count, a->passed_count),
+			class);
 		seen->again++;
 		seen->techniques |= 1u << (a->s < 31 ? a->s : 31);
 	}
@@ -95,52 +97,53 @@ static void check_techniques(const struct world *w, const char *name)
 	static struct path_context c;
 	static struct ensemble e;
 	static struct path_sample sample, unused;
-	static struct classes classes;
+	static struct path_classes classes;
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	struct seen seen = {0, 0, 0, 0};
-	starts_context(&c, w, 1, STARTS_MAX_EDGES, counters);
-	const struct ensemble_lengths all = ensemble_all_lengths(&c);
-	for (uint64_t index = 0; index < dice_count(3000); index++) {
+	starts_init_context(&c, w, 1, STARTS_EDGES_MAX, counters);
+	const struct ensemble_lengths all = ensemble_max_lengths(&c);
+	for (uint64_t index = 0; index < dice_scaled_count(3000); index++) {
 		struct sampler_random s;
 		struct full_path x;
 		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
-		path_trace_both_ways(&c, &s.base, &sample);
+		path_trace_bidirectional(&c, &s.base, &sample);
 		double by_class[PATH_CLASSES] = {0}, sum = 0;
 		for (unsigned k = 0; k < PATH_CLASSES; k++)
-			sum += sample.classes >> k & 1 ? sample.of_class[k] : 0;
+			sum += sample.class_mask >> k & 1 ? sample.class_intensity[k] : 0;
 		assert_true(fabs(sum - sample.intensity) <= 1e-12 * sum);
 		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
 		ensemble_draw(&c, &s.base, &all, &e);
 		unsigned camera = 1, light = 0;
 		for (uint32_t i = 0; i < e.count; i++) {
-			unsigned t = e.of[i].edges + 1 - e.of[i].s - e.of[i].passed;
+			unsigned t = e.candidates[i].edges + 1 - e.candidates[i].s - e.candidates[i].passed_count;
 			camera = t > camera ? t : camera;
-			light = e.of[i].s > light ? e.of[i].s : light;
+			light = e.candidates[i].s > light ? e.candidates[i].s : light;
 		}
-		classes_begin(&classes, &c, camera, light > 1 ? light : 0, &unused);
+		path_classes_begin(&classes, &c, camera, light > 1 ? light : 0, &unused);
 		for (uint32_t i = 0; i < e.count; i++) {
-			const struct candidate *a = &e.of[i];
-			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s - a->passed, a->passed);
+			const struct candidate *a = &e.candidates[i];
+			unsigned class = path_classes_of_joint(&classes, a->s, a->edges + 1 - a->s - a->passed_count,
+							       a->passed_count);
 			by_class[class] += a->intensity;
-			if (!full_path_from_subpaths(&c, a->s, a->passed, a->edges, &x))
+			if (!full_path_from_subpaths(&c, a->s, a->passed_count, a->edges, &x))
 				continue; /* on the very border of the film */
-			assert_int_equal(path_class_whole(&x), class);
+			assert_int_equal(full_path_class(&x), class);
 			seen.paths++;
 			seen.classes |= 1u << class;
 		}
 		for (unsigned k = 0; k < PATH_CLASSES; k++)
-			assert_true(fabs(by_class[k] - (sample.classes >> k & 1 ? sample.of_class[k] : 0)) <=
+			assert_true(fabs(by_class[k] - (sample.class_mask >> k & 1 ? sample.class_intensity[k] : 0)) <=
 				    1e-12 * sum);
 		if (e.count > 0) {
-			const struct candidate *a = &e.of[dice_below(&d, e.count)];
-			if (full_path_from_subpaths(&c, a->s, a->passed, a->edges, &x))
+			const struct candidate *a = &e.candidates[dice_below(&d, e.count)];
+			if (full_path_from_subpaths(&c, a->s, a->passed_count, a->edges, &x))
 				check_around(&c, &x, a->s, index, &d, &seen);
 		}
 	}
 	print_message("%s: %llu paths, %llu by another technique, techniques %#x, classes %#x\n", name,
 		      (unsigned long long)seen.paths, (unsigned long long)seen.again, seen.techniques, seen.classes);
-	assert_true(seen.again > dice_count(100));
+	assert_true(seen.again > dice_scaled_count(100));
 }
 
 static void techniques_agree(void **state)
@@ -167,7 +170,7 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 			 .seed = stats_seed(test),
 			 .groups = GROUPS,
 			 .parts = 1,
-			 .bootstrap = GROUPS * dice_count(6144),
+			 .bootstrap = GROUPS * dice_scaled_count(6144),
 			 .epoch = 1,
 			 .rounds = 1,
 			 .min_depth = 1,
@@ -176,7 +179,7 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 	p.kind = render_integrator_find(integrator)->kind;
 	world_summary(w, &summary);
 	if (render_integrator_find(integrator)->has_mutations)
-		assert_int_equal(render_mutations(NULL, &summary, p.mutations, NULL), 0);
+		assert_int_equal(render_canonical_mutations(NULL, &summary, p.mutations, NULL), 0);
 	return p;
 }
 
@@ -186,7 +189,7 @@ static void sample_classes(const struct world *w, const char *integrator, const 
 {
 	struct plan p = make_plan(w, integrator, test);
 	for (uint32_t g = 0; g < GROUPS; g++) {
-		struct batch b = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
+		struct batch b = leases_run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
 		double sum = 0;
 		for (int k = 0; k < PATH_CLASSES; k++) {
 			mean[k][g] = b.classes[k] / (double)b.weight_count;
@@ -211,7 +214,7 @@ static void check_class(const char *test, unsigned class, double share, double d
 static void end_judging(const char *test, double least, double most)
 {
 	print_message("%s: finds a class that differs by %.1f %%\n", test, 100 * least);
-	assert_true(dice_count(1000) < 1000 || (least > 0 && least < most));
+	assert_true(dice_scaled_count(1000) < 1000 || (least > 0 && least < most));
 }
 
 static void samples_agree(void **state)
@@ -221,7 +224,7 @@ static void samples_agree(void **state)
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		static double a[PATH_CLASSES][GROUPS], b[PATH_CLASSES][GROUPS];
 		char test[64];
-		struct world *w = room_of(of[i]);
+		struct world *w = room_build_named(of[i]);
 		double all = 0, least = 0;
 		snprintf(test, sizeof test, "%s, path and bdpt", of[i]);
 		sample_classes(w, "path", of[i], a);
@@ -253,15 +256,15 @@ static struct canvas *run_chains(const struct world *w, const struct plan *p,
 	assert_int_equal(bootstrap_new(&s, p, &e), 0);
 	assert_int_equal(canvas_new(&c, p, -32, NULL, &e), 0);
 	for (uint32_t g = 0; g < p->groups; g++) {
-		struct batch b = lease_done(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
+		struct batch b = leases_run(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, &e), 0);
 		batch_fini(&b);
 	}
-	bootstrap_to_canvas(s, c);
+	bootstrap_add_to_canvas(s, c);
 	for (uint32_t g = 0; g < p->groups; g++) {
 		struct lease_input in = {.chain_count = chains, .seeds = seeds};
-		bootstrap_seeds(s, g, seeds);
-		struct batch b = lease_done(w, p, (struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in);
+		bootstrap_draw_seeds(s, g, seeds);
+		struct batch b = leases_run(w, p, (struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in);
 		if (seen)
 			seen(p, &b);
 		assert_int_equal(canvas_add(c, &b, &e), 0);
@@ -275,15 +278,15 @@ static struct canvas *run_chains(const struct world *w, const struct plan *p,
 static void check_chains(const char *room, const char *integrator, uint64_t steps)
 {
 	char test[64];
-	struct world *w = room_of(room);
+	struct world *w = room_build_named(room);
 	double all = 0, least = 0;
 	snprintf(test, sizeof test, "%s, chains of %s", room, integrator);
 	struct plan p = make_plan(w, integrator, test);
 	p.chains = GROUPS * 32;
-	p.epoch = dice_count(steps);
+	p.epoch = dice_scaled_count(steps);
 	struct canvas *c = run_chains(w, &p, NULL);
 	struct canvas_image img;
-	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 	for (int k = 0; k < PATH_CLASSES; k++)
 		all += img.classes[k].bootstrap;
 	for (unsigned k = 0; k < PATH_CLASSES; k++) {
@@ -303,7 +306,7 @@ static void chains_agree(void **state)
 {
 	(void)state;
 	static const char *const of[] = {"glass", "prism"};
-	for (size_t i = 0; i < (test_full() ? 2 : 1); i++) {
+	for (size_t i = 0; i < (test_is_full() ? 2 : 1); i++) {
 		check_chains(of[i], "pssmlt", 500);
 		check_chains(of[i], "hslt", 2500);
 	}
@@ -315,7 +318,7 @@ static void chains_agree(void **state)
  * first moment. */
 static void film_agrees(const struct plan *p, const struct batch *b)
 {
-	uint32_t tiles = batch_film_tiles(p), sequences = batch_sequences(p),
+	uint32_t tiles = batch_film_tile_count(p), sequences = batch_sequence_count(p),
 		 across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, next = 0;
 	double time = 0, classes = 0;
 	for (uint32_t t = 0; t < tiles; t++) {
@@ -346,7 +349,7 @@ static void moments_are_the_films(void **state)
 	(void)state;
 	static const char *const integrators[] = {"pssmlt", "hslt"};
 	/* clang-format off */
-	struct world *w = world_of_text(200, 150,
+	struct world *w = world_from_text(200, 150,
 		SENSOR("0,0.2,1.9", "0,-0.3,-1")
 		"<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
 		"<shape type='sphere'>"
@@ -372,15 +375,15 @@ static void moments_are_the_films(void **state)
 		p.crop_height = 100;
 		p.border = 25;
 		p.chains = GROUPS * 4;
-		p.bootstrap = GROUPS * dice_count(4096);
-		p.epoch = dice_count(2000);
+		p.bootstrap = GROUPS * dice_scaled_count(4096);
+		p.epoch = dice_scaled_count(2000);
 		p.groups = GROUPS;
 		struct world moved = *w; /* a border wider than the filter needs, so that chains leave the crop */
 		moved.settings.border = p.border;
 		struct canvas *c = run_chains(&moved, &p, film_agrees);
-		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		float sum = 0;
-		for (uint32_t t = 0; t < batch_film_tiles(&p); t++) {
+		for (uint32_t t = 0; t < batch_film_tile_count(&p); t++) {
 			print_message("%s: tile %u: R %.3f error %.3f share %.3f\n", integrators[i], t,
 				      (double)img.r_hat[t], (double)img.tile_error[t], (double)img.tile_share[t]);
 			assert_true(img.r_hat[t] > 0.99f &&

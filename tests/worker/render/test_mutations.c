@@ -13,13 +13,13 @@ static void the_canonical_spelling_stays(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {NULL, "", "hslt", "hslt=0.9,independent=0.1", "independent,hslt=2e-1"};
-	struct render_summary summary = {.brightest = 1};
+	struct render_summary summary = {.brightness_bound = 1};
 	struct error e;
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		char once[PLAN_MUTATIONS_MAX], twice[PLAN_MUTATIONS_MAX];
-		assert_int_equal(render_mutations(texts[i], &summary, once, &e), 0);
+		assert_int_equal(render_canonical_mutations(texts[i], &summary, once, &e), 0);
 		assert_true(plan_strategy_count(once) >= 0);
-		assert_int_equal(render_mutations(once, &summary, twice, &e), 0);
+		assert_int_equal(render_canonical_mutations(once, &summary, twice, &e), 0);
 		assert_memory_equal(once, twice, sizeof once); /* the bytes after the text are zero as well */
 	}
 }
@@ -46,16 +46,16 @@ static void other_texts_are_refused(void **state)
 					    "Hslt",
 					    "hslt\n",
 					    "hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1"};
-	struct render_summary summary = {.brightest = 1};
+	struct render_summary summary = {.brightness_bound = 1};
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		char canonical[PLAN_MUTATIONS_MAX];
 		struct error e = {""};
-		assert_int_equal(render_mutations(texts[i], &summary, canonical, &e), -EINVAL);
+		assert_int_equal(render_canonical_mutations(texts[i], &summary, canonical, &e), -EINVAL);
 		assert_true(strlen(e.text) > 10);
 	}
 	char longest[PLAN_MUTATIONS_MAX + 1] = "", canonical[PLAN_MUTATIONS_MAX];
 	memset(longest, 'a', PLAN_MUTATIONS_MAX);
-	assert_int_equal(render_mutations(longest, &summary, canonical, NULL), -EINVAL);
+	assert_int_equal(render_canonical_mutations(longest, &summary, canonical, NULL), -EINVAL);
 }
 
 int main(void)

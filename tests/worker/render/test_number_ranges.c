@@ -6,7 +6,7 @@
  * process of its own.
  */
 #include "tests/support/measured_file.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/scene_trial.h"
 #include "worker/render/render.h"
 #include "worker/render/plugin/plugin.h"
@@ -143,9 +143,9 @@ static int try_value(const struct plugin_decl *d, const struct param *p, enum va
 					    {"m.obj", obj, sizeof obj - 1},
 					    {"m.ply", ply, sizeof ply - 1},
 					    {"m.vol", vol, sizeof vol - 1},
-					    measured_files()[3],
+					    measured_file_all()[3],
 					    {NULL, NULL, 0}};
-	return scene_trial(files, said, size);
+	return scene_trial_run(files, said, size);
 }
 
 static void check_inside(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
@@ -207,7 +207,7 @@ static void check_param(const struct plugin_decl *d, const struct param *p, stru
 			check_inside(d, p, t, sqrt(fmax(p->min, 1e-30)) * sqrt(p->max), c);
 		void (*check)(const struct plugin_decl *, const struct param *, enum value_type, double,
 			      struct counts *) =
-			(p->types & VALUE_CLIPPED) && t != VALUE_SPECTRUM ? check_inside : check_beyond;
+			(p->types & VALUE_CLAMPED) && t != VALUE_SPECTRUM ? check_inside : check_beyond;
 		check(d, p, t, next_number(t, p->max, INFINITY), c);
 		check(d, p, t, next_number(t, p->min, -INFINITY), c);
 	}
@@ -227,7 +227,7 @@ static void test_ranges(void **state)
 		seen[seen_count++] = d->params;
 		for (const struct param *p = d->params; p && p->name && !again; p++)
 			if (p->status == PARAM_UNDERSTOOD && (p->types & numeric) &&
-			    (!test_scaled() || numbers++ % 4 == 0))
+			    (!test_is_scaled() || numbers++ % 4 == 0))
 				check_param(d, p, &c);
 	}
 	print_message("%zu numbers, %zu trials: %zu rendered, %zu refused by another rule, %zu bad\n", c.params,

@@ -26,27 +26,27 @@ static double share_of(struct world *w, uint64_t seed)
 				  .window = {0, 0, WIDTH, HEIGHT},
 				  .min_depth = 1,
 				  .max_depth = 8,
-				  .roulette = PATH_ROULETTE,
-				  .unclassed = true,
+				  .max_survival = PATH_SURVIVAL_MAX,
+				  .skips_classes = true,
 				  .counters = counters};
-	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, BRIGHTNESS_A_CELL, &e), 0);
+	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, BRIGHTNESS_SAMPLES_PER_CELL, &e), 0);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		struct sampler_random s;
 		sampler_random_init(&s, seed, RNG_TEST, i, 0);
 		path_trace(&c, &s.base, &sample);
 		brightness_add_sample(&map, &sample);
 	}
-	brightness_settle(&map, SAMPLES);
-	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &found), 0);
+	brightness_compute_scales(&map, SAMPLES);
+	assert_int_equal(rare_light_estimate(&c, &map, seed, 0, MERGED, &found), 0);
 	brightness_fini(&map);
-	return found.share;
+	return found.rare_share;
 }
 
 /* The share must lie within these bounds for each seed; the shares in the scene's own table (README of tests/bench)
  * keep a distance from them of half as much again or more. */
 static void expect_share(const char *folder, const char *file, double least, double most)
 {
-	struct world *w = world_of_own_scene(folder, file, WIDTH, HEIGHT);
+	struct world *w = world_from_own_scene(folder, file, WIDTH, HEIGHT);
 	for (uint64_t seed = 0; seed < 3; seed++) {
 		double share = share_of(w, seed);
 		printf("%s: %.4f\n", file, share);

@@ -5,7 +5,7 @@
  * quarter of its time, even in a room that hardly loses light. Rays are counted, not seconds.
  */
 #include "tests/support/leases.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/render/local.h"
 #include "worker/render/rays.h"
@@ -27,13 +27,13 @@ enum { NAMES = sizeof names / sizeof *names };
 /* Under sanitizers, only hslt of the five integrators is tested. */
 static int next(void)
 {
-	return test_scaled() ? NAMES : 1;
+	return test_is_scaled() ? NAMES : 1;
 }
 
 /* A sphere around the camera that emits light and reflects 99 %, so that paths hardly end. */
 static struct world *bright_sphere(void)
 {
-	return world_of_text(
+	return world_from_text(
 		SIZE, SIZE,
 		"<integrator type='path'><integer name='max_depth' value='-1'/></integrator>" SENSOR(
 			"0,0,0.3",
@@ -45,12 +45,12 @@ static struct world *bright_sphere(void)
 
 static struct world *dull_room(void)
 {
-	return world_of_own_scene("box", "box.xml", SIZE, SIZE);
+	return world_from_own_scene("box", "box.xml", SIZE, SIZE);
 }
 
 static struct plan_request request_of(const struct world *w, const char *integrator)
 {
-	const struct render_integrator *i = render_integrator_find(integrator);
+	const struct integrator_properties *i = render_integrator_find(integrator);
 	struct plan_request r = {.kind = i->kind,
 				 .width = w->settings.width,
 				 .height = w->settings.height,
@@ -62,7 +62,7 @@ static struct plan_request request_of(const struct world *w, const char *integra
 	struct error e = {""};
 	snprintf(r.integrator, sizeof r.integrator, "%s", integrator);
 	world_summary(w, &summary);
-	if (i->has_mutations && render_mutations(NULL, &summary, r.mixture, &e))
+	if (i->has_mutations && render_canonical_mutations(NULL, &summary, r.mixture, &e))
 		fail_msg("%s", e.text);
 	return r;
 }
@@ -87,7 +87,7 @@ static struct plan make_plan(const struct plan_request *r)
 
 static double rays_of(const struct batch *b)
 {
-	return (double)batch_rays(b->counters);
+	return (double)batch_ray_count(b->counters);
 }
 
 static double bootstrap_rays(const struct world *w, const struct plan *p)
@@ -96,7 +96,7 @@ static double bootstrap_rays(const struct world *w, const struct plan *p)
 	for (uint32_t group = 0; group < p->groups; group++)
 		for (uint32_t part = 0; part < p->parts; part++) {
 			const struct lease_key k = {.kind = LEASE_BOOTSTRAP, .group = group, .part = part};
-			struct batch b = lease_done(w, p, k, NULL);
+			struct batch b = leases_run(w, p, k, NULL);
 			sum += rays_of(&b);
 			batch_fini(&b);
 		}
@@ -131,7 +131,7 @@ static void the_pilot_counts_what_a_render_takes(void **state)
 	static const atomic_bool never;
 	for (int i = 0; i < 2 * NAMES; i++) {
 		const struct world *w = worlds[i % 2];
-		if (i / 2 % next() || (test_scaled() && i % 2 == 0)) /* sanitized: the dull room alone */
+		if (i / 2 % next() || (test_is_scaled() && i % 2 == 0)) /* sanitized: the dull room alone */
 			continue;
 		struct plan_request r = request_of(w, names[i / 2]);
 		struct plan_rays rays = count(w, &r), again = count(w, &r);
@@ -147,8 +147,8 @@ static void the_pilot_counts_what_a_render_takes(void **state)
 		if (local_run(&run, &e))
 			fail_msg("%s", e.text);
 		struct canvas_counts all;
-		canvas_counts(run.canvas, false, &all);
-		double step = (double)batch_rays(all.counters) / (double)all.counters[COUNT_SAMPLES],
+		canvas_sum_counts(run.canvas, false, &all);
+		double step = (double)batch_ray_count(all.counters) / (double)all.counters[COUNT_SAMPLES],
 		       bootstrap = bootstrap_rays(w, &p) / (double)p.bootstrap;
 		print_message("%s: %.1f of %.1f rays a bootstrap sample, %.2f of %.2f a step\n", names[i / 2],
 			      rays.bootstrap, bootstrap, rays.step, step);

@@ -6,7 +6,7 @@
  * program is the source of tests/fuzz/numbers.sh: test_scene_numbers --write FOLDER FIRST COUNT writes the scenes
  * FIRST ... FIRST + COUNT - 1 as FOLDER/N/scene.xml with their files, and prints the changes on stdout.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/scene_numbers.h"
 #include "tests/support/scene_trial.h"
 
@@ -45,7 +45,7 @@ static void make_mutant(struct mutant *m, uint64_t index)
 {
 	char name[64];
 	snprintf(name, sizeof name, "scene numbers %llu", (unsigned long long)index);
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	const char *scene = scenes[index % SCENES];
 	bool in_mesh = dice_below(&d, 12) == 0;
 	*m = (struct mutant){.files = {{scene, NULL, 0}, {"wedge.obj", NULL, 0}, {"sky.hdr", NULL, 0}}};
@@ -73,7 +73,7 @@ static void try_mutant(uint64_t index, struct counts *c)
 	struct mutant m;
 	char text[2048];
 	make_mutant(&m, index);
-	int end = scene_trial(m.files, text, sizeof text);
+	int end = scene_trial_run(m.files, text, sizeof text);
 	c->refused += end == TRIAL_REFUSED;
 	c->rendered += end == TRIAL_RENDERED;
 	if (end != TRIAL_REFUSED && end != TRIAL_RENDERED) {
@@ -89,7 +89,8 @@ static void test_numbers(void **state)
 	(void)state;
 	struct counts c = {0};
 	const char *many = getenv("HSLT_TEST_NUMBERS"), *first = getenv("HSLT_TEST_NUMBERS_FIRST");
-	size_t count = many ? strtoul(many, NULL, 10) : dice_count(COUNT), begin = first ? strtoul(first, NULL, 10) : 0;
+	size_t count = many ? strtoul(many, NULL, 10) : dice_scaled_count(COUNT),
+	       begin = first ? strtoul(first, NULL, 10) : 0;
 	for (size_t i = begin; i < begin + count; i++)
 		try_mutant(i, &c);
 	print_message("%zu scenes: %zu refused with their place, %zu rendered, %zu neither\n", count, c.refused,
@@ -106,7 +107,7 @@ static void test_found(void **state)
 	(void)state;
 	static const uint64_t found[] = {1242, 1973, 3566, 4203, 4335, 5255, 5613, 5852, 5880, 20328, 20445, 67413939};
 	struct counts c = {0};
-	for (size_t i = 0; i < sizeof found / sizeof *found; i += test_scaled() ? 4 : 1)
+	for (size_t i = 0; i < sizeof found / sizeof *found; i += test_is_scaled() ? 4 : 1)
 		try_mutant(found[i], &c);
 	assert_int_equal(c.bad, 0);
 }

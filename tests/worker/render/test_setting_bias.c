@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Settings that must not cause bias, one at a time: mutations leave bdpt's distribution of paths unchanged
- * (tests/support/stationary.h), and images with fewer wavelengths equal those with four (tests/support/agree.h).
+ * (tests/support/stationary.h), and images with fewer wavelengths equal those with four (tests/support/agreement.h).
  *
  * Level: 1e-6 per case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability
  * is printed and is at most 2 %. A tolerance as wide as the lobes is found to cause bias. About 25 s of CPU time.
  */
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stationary.h"
 #include "tests/worker/render/mutation/scenes.h"
 
@@ -47,7 +47,7 @@ static const struct setting_case cases[] = {
 
 static void run_case(const struct setting_case *c, struct stationary_result *r)
 {
-	struct stationary_how how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_SOUND};
+	struct stationary_options how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_NO_FAULT};
 	char name[96];
 	snprintf(name, sizeof name, "%s %s", c->scene, c->accuracy);
 	worlds_accuracy = c->accuracy;
@@ -59,8 +59,8 @@ static void run_case(const struct setting_case *c, struct stationary_result *r)
 	print_message(
 		"%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n",
 		c->accuracy, c->scene, c->edges, c->mutation, 100 * (double)r->accepted / (double)r->proposals,
-		100 * r->least_block, 100 * r->least_other, r->p, r->worst >= 0 ? stationary_function(r->worst) : "",
-		r->seconds, r->failure);
+		100 * r->detectable_block_bias, 100 * r->detectable_other_bias, r->p,
+		r->worst_function >= 0 ? stationary_function_name(r->worst_function) : "", r->cpu_seconds, r->failure);
 }
 
 static void test_stationary(void **state)
@@ -70,7 +70,7 @@ static void test_stationary(void **state)
 	unsigned wrong = 0;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		run_case(&cases[i], &r);
-		wrong += !stationary_holds(&r) || !r.accepted || (!test_scaled() && r.least_block > 0.02);
+		wrong += !stationary_passes(&r) || !r.accepted || (!test_is_scaled() && r.detectable_block_bias > 0.02);
 	}
 	assert_int_equal(wrong, 0);
 }
@@ -80,30 +80,30 @@ static void test_bias_is_found(void **state)
 	(void)state;
 	static struct stationary_result r;
 	run_case(&(struct setting_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
-	assert_true(test_scaled() || !stationary_holds(&r));
+	assert_true(test_is_scaled() || !stationary_passes(&r));
 }
 
 /* Almost all of the noise comes from drawing wavelengths. */
 static void test_wavelengths(void **state)
 {
 	(void)state;
-	static struct agree_image image[3];
+	static struct agreement_image image[3];
 	static const char *const accuracy[] = {"", "wavelengths=1", "wavelengths=2"};
 	for (int i = 0; i < 3; i++) {
 		worlds_accuracy = accuracy[i];
-		struct world *w = world_of_text(
+		struct world *w = world_from_text(
 			8, 8,
 			"<integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR(
 				"0,1,5", "0,-0.2,0") PLATE("-1", DIFFUSE("0.4,0.6,0.7"))
 				BALL("0,-0.2,0", "0.8",
 				     METAL("0.4")) "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
 		worlds_accuracy = NULL;
-		struct agree_side how = {"path", 5 << 14, 64, 0, 0};
-		agree_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &how, &image[i]);
+		struct agreement_options how = {"path", 5 << 14, 64, 0, 0};
+		agreement_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &how, &image[i]);
 		world_free(w);
 	}
-	agree_check("1 wavelength against 4", &image[1], &image[0]);
-	agree_check("2 wavelengths against 4", &image[2], &image[0]);
+	agreement_check("1 wavelength against 4", &image[1], &image[0]);
+	agreement_check("2 wavelengths against 4", &image[2], &image[0]);
 }
 
 int main(void)

@@ -5,7 +5,7 @@
  * `path` misses all light of a lamp in glass. The independent check is a render: the light missing in a short render
  * by path is the difference to bdpt.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 #include "worker/render/halfvec/refract.h"
 #include "worker/render/path/integrate_bdpt.h"
@@ -35,12 +35,13 @@ static void begin(struct looking *l, const struct world *w, uint64_t seed)
 					   .window = {0, 0, WIDTH, HEIGHT},
 					   .min_depth = 1,
 					   .max_depth = DEPTH,
-					   .roulette = PATH_ROULETTE,
+					   .max_survival = PATH_SURVIVAL_MAX,
 					   .refract = halfvec_refract,
-					   .unclassed = true,
+					   .skips_classes = true,
 					   .counters = l->counters};
-	assert_int_equal(
-		brightness_of_samples(&l->map, &l->context, path_trace_candidates, seed, RNG_TEST, 0, SAMPLES, &e), 0);
+	assert_int_equal(brightness_init_from_samples(&l->map, &l->context, path_trace_candidates, seed, RNG_TEST, 0,
+						      SAMPLES, &e),
+			 0);
 }
 
 /* Returns the mean contribution relative to the brightness at its position, without contributions brighter than usual
@@ -53,7 +54,7 @@ static double mean_of(struct looking *l, path_tracer *trace, uint64_t seed, uint
 		struct sampler_random s;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
 		trace(&l->context, &s.base, &sample);
-		for (uint32_t k = 0; k < sample.count; k++) {
+		for (uint32_t k = 0; k < sample.splat_count; k++) {
 			const struct splat *p = &sample.splats[k];
 			double y = (p->xyz[0] + p->xyz[1] + p->xyz[2]) * brightness_scale(&l->map, p->x, p->y);
 			sum += y < 1 << 12 ? y : 0;
@@ -67,24 +68,26 @@ static void what_path_lacks(void **state)
 	(void)state;
 	const uint64_t drawn = (1u << 17) / test_scale();
 	static struct looking l;
-	struct world *w = world_of_own_scene("bulb", "scene.xml", WIDTH, HEIGHT);
+	struct world *w = world_from_own_scene("bulb", "scene.xml", WIDTH, HEIGHT);
 	begin(&l, w, 0);
-	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_both_ways, 11, drawn),
+	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_bidirectional, 11, drawn),
 	       lacks = 1 - path / both;
-	for (uint64_t seed = 0; seed < (test_scaled() ? 1 : 3); seed++) {
+	for (uint64_t seed = 0; seed < (test_is_scaled() ? 1 : 3); seed++) {
 		struct plan_unseen by_path, by_bdpt;
-		assert_int_equal(unseen_light(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
-		assert_int_equal(unseen_light(&l.context, &l.map, 1, seed, 0, SAMPLES, &by_bdpt), 0);
+		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
+		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 1, seed, 0, SAMPLES, &by_bdpt), 0);
 		printf("path lacks %.2f %% of the light; unseen by 64 samples: root mean square %.2f %%, by bdpt %.2f %%\n",
-		       100 * lacks, 100 * sqrt(by_path.at[3]), 100 * sqrt(by_bdpt.at[3]));
+		       100 * lacks, 100 * sqrt(by_path.mean_squares[3]), 100 * sqrt(by_bdpt.mean_squares[3]));
 		/* The light lies on a third of the image. */
-		assert_true(test_scaled() || (sqrt(by_path.at[3]) > 0.7 * lacks && sqrt(by_path.at[3]) < 3 * lacks));
-		assert_true(by_bdpt.at[3] < 0.02 * by_path.at[3]);
-		for (int i = 1; i < PLAN_UNSEEN; i++)
-			assert_true(by_path.at[i] <= by_path.at[i - 1]);
-		assert_true(by_path.at[PLAN_UNSEEN - 1] < 0.01 * by_path.at[3]); /* 7 billion samples find it */
+		assert_true(test_is_scaled() ||
+			    (sqrt(by_path.mean_squares[3]) > 0.7 * lacks && sqrt(by_path.mean_squares[3]) < 3 * lacks));
+		assert_true(by_bdpt.mean_squares[3] < 0.02 * by_path.mean_squares[3]);
+		for (int i = 1; i < PLAN_UNSEEN_COUNT; i++)
+			assert_true(by_path.mean_squares[i] <= by_path.mean_squares[i - 1]);
+		assert_true(by_path.mean_squares[PLAN_UNSEEN_COUNT - 1] <
+			    0.01 * by_path.mean_squares[3]); /* 7 billion samples find it */
 	}
-	assert_true(test_scaled() || (lacks > 0.01 && lacks < 0.04));
+	assert_true(test_is_scaled() || (lacks > 0.01 && lacks < 0.04));
 	brightness_fini(&l.map);
 	world_free(w);
 }
@@ -113,20 +116,21 @@ static void what_path_lacks_in_fog(void **state)
 	(void)state;
 	const uint64_t drawn = (1u << 17) / test_scale();
 	static struct looking l;
-	struct world *w = world_of_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
+	struct world *w = world_from_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
 	assert_true(w->effects.scattering);
 	begin(&l, w, 0);
-	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_both_ways, 11, drawn),
+	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_bidirectional, 11, drawn),
 	       lacks = (both - path) / path;
-	for (uint64_t seed = 0; seed < (test_scaled() ? 1 : 3); seed++) {
+	for (uint64_t seed = 0; seed < (test_is_scaled() ? 1 : 3); seed++) {
 		struct plan_unseen by_path, by_bdpt;
-		assert_int_equal(unseen_light(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
-		assert_int_equal(unseen_light(&l.context, &l.map, 1, seed, 0, SAMPLES, &by_bdpt), 0);
+		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
+		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 1, seed, 0, SAMPLES, &by_bdpt), 0);
 		double share = lacks / (1 + lacks);
 		printf("in fog path lacks %.1f %% of the light; unseen by 64 samples: root mean square %.1f %%, by bdpt %.2f %%\n",
-		       100 * share, 100 * sqrt(by_path.at[3]), 100 * sqrt(by_bdpt.at[3]));
-		assert_true(test_scaled() || (sqrt(by_path.at[3]) > 0.5 * share && sqrt(by_path.at[3]) < 2 * share));
-		assert_true(by_bdpt.at[3] < 0.02 * by_path.at[3]);
+		       100 * share, 100 * sqrt(by_path.mean_squares[3]), 100 * sqrt(by_bdpt.mean_squares[3]));
+		assert_true(test_is_scaled() ||
+			    (sqrt(by_path.mean_squares[3]) > 0.5 * share && sqrt(by_path.mean_squares[3]) < 2 * share));
+		assert_true(by_bdpt.mean_squares[3] < 0.02 * by_path.mean_squares[3]);
 	}
 	brightness_fini(&l.map);
 	world_free(w);
@@ -147,15 +151,15 @@ static double unseen_of(const struct world *w, struct plan_request r)
 	assert_int_equal(render_unseen_light(w, &r, &e), 0);
 	assert_int_equal(render_unseen_light(w, &again, &e), 0);
 	assert_memory_equal(&r, &again, sizeof r);
-	return r.unseen.at[3];
+	return r.unseen.mean_squares[3];
 }
 
 static void light_unseen_by_a_request(void **state)
 {
 	(void)state;
 	struct error e;
-	struct world *bulb = world_of_own_scene("bulb", "scene.xml", WIDTH, HEIGHT),
-		     *box = world_of_own_scene("box", "box.xml", WIDTH, HEIGHT);
+	struct world *bulb = world_from_own_scene("bulb", "scene.xml", WIDTH, HEIGHT),
+		     *box = world_from_own_scene("box", "box.xml", WIDTH, HEIGHT);
 	double path = unseen_of(bulb, request_of("path", PLAN_SAMPLES));
 	assert_true(path > 5e-5);
 	assert_true(unseen_of(bulb, request_of("erpt", PLAN_SAMPLES)) < 0.1 * path);
@@ -170,7 +174,7 @@ static void light_unseen_by_a_request(void **state)
 	struct plan_request none = request_of("path", PLAN_SAMPLES);
 	none.width = 0;
 	assert_int_equal(render_unseen_light(bulb, &none, &e), -EINVAL);
-	struct world *fog = world_of_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
+	struct world *fog = world_from_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
 	assert_true(unseen_of(fog, request_of("path", PLAN_SAMPLES)) > 1e-3);
 	world_free(bulb);
 	world_free(box);

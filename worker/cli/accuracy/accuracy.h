@@ -2,7 +2,7 @@
 /*
  * hslt-accuracy measures what accuracy costs in time: it renders settings that differ from a default in one value each,
  * alternately, and compares them. Its parts: accuracy_design chooses the settings, accuracy_run renders them,
- * accuracy_judge computes the figures, accuracy_csv and accuracy_html write the reports.
+ * accuracy_judge computes the figures, accuracy_write_csv and accuracy_write_html write the reports.
  */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_H
 #define WORKER_CLI_ACCURACY_ACCURACY_H

@@ -62,8 +62,8 @@ static void put_row(struct text_file *p, const struct accuracy_context *x, size_
 	const struct accuracy_setting *s = &x->design->settings[i];
 	const struct accuracy_figures *f = &j->figures[i];
 	char name[96];
-	bool reference = i == ACCURACY_REFERENCE, front = f->beaten_by == i;
-	accuracy_name(s, name, sizeof name);
+	bool reference = i == ACCURACY_REFERENCE, front = f->dominated_by == i;
+	accuracy_setting_name(s, name, sizeof name);
 	text_file_field(p, name);
 	text_file_put(p, ",");
 	text_file_field(p, s->parameter);
@@ -79,28 +79,28 @@ static void put_row(struct text_file *p, const struct accuracy_context *x, size_
 	text_file_field(p, s->accuracy);
 	text_file_put(p, ",%llu,%llu", (unsigned long long)f->mutations, (unsigned long long)f->rounds);
 	put_number(p, f->cpu_seconds);
-	put_interval(p, f->cost);
+	put_interval(p, f->mutation_us);
 	put_number(p, f->acceptance);
 	put_number(p, f->failed_walks);
-	put_number(p, f->rays);
+	put_number(p, f->rays_per_mutation);
 	put_interval(p, f->equal_mutations);
 	put_interval(p, f->equal_time);
 	put_interval(p, f->bias_mean);
-	put_interval(p, f->bias_block);
-	text_file_put(p, ",%u,%u", f->block % j->across, f->block / j->across);
-	put_number(p, f->bias_seen);
-	put_number(p, f->bias_bound);
+	put_interval(p, f->bias_worst_block);
+	text_file_put(p, ",%u,%u", f->worst_block % j->blocks_across, f->worst_block / j->blocks_across);
+	put_number(p, f->bias_lower_joint);
+	put_number(p, f->bias_upper);
 	text_file_put(p, reference ? ",," : ",%d,", front);
 	if (!front) {
-		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
+		accuracy_setting_name(&x->design->settings[f->dominated_by], name, sizeof name);
 		text_file_field(p, name);
 	}
 	text_file_put(p, "\n");
 }
 
-int accuracy_csv(const struct accuracy_context *x, const char *path, struct error *e)
+int accuracy_write_csv(const struct accuracy_context *x, const char *path, struct error *e)
 {
-	struct text_file p = {.full = false};
+	struct text_file p = {.has_failed = false};
 	for (size_t i = 0; accuracy_columns[i].name; i++)
 		text_file_put(&p, "%s%s", i ? "," : "", accuracy_columns[i].name);
 	text_file_put(&p, "\n");

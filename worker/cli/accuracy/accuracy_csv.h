@@ -11,6 +11,6 @@ struct accuracy_column {
 };
 extern const struct accuracy_column accuracy_columns[]; /* ends with a row whose name is NULL */
 
-int accuracy_csv(const struct accuracy_context *x, const char *path, struct error *e);
+int accuracy_write_csv(const struct accuracy_context *x, const char *path, struct error *e);
 
 #endif

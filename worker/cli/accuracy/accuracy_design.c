@@ -21,11 +21,11 @@
  * are the finest values of their sweeps. */
 static const struct {
 	const char *parameter, *value;
-} careful[] = {{"tolerance", "1e-06"},
-	       {"iterations", "30"},
-	       {"reverse-tolerance", "1e-05"},
-	       {"roughness", "0"},
-	       {"tessellation", "2"}};
+} reference_values[] = {{"tolerance", "1e-06"},
+			{"iterations", "30"},
+			{"reverse-tolerance", "1e-05"},
+			{"roughness", "0"},
+			{"tessellation", "2"}};
 
 /* Settings that belong together and are tried as one. */
 static const struct {
@@ -39,11 +39,11 @@ static const struct {
 #define PRESET "preset"
 
 struct planner {
-	struct accuracy_design *d;
+	struct accuracy_design *design;
 	const struct plan_request *base;
 	const struct render_summary *scene;
-	const struct render_integrator *integrator;
-	const char *only;
+	const struct integrator_properties *integrator;
+	const char *parameters;
 	struct error *e;
 };
 
@@ -56,7 +56,7 @@ static bool is_listed(const char *list, const char *name)
 	return list == NULL;
 }
 
-static const struct render_setting *setting_find(const char *name)
+static const struct render_setting *find_setting(const char *name)
 {
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++)
@@ -65,20 +65,20 @@ static const struct render_setting *setting_find(const char *name)
 	return NULL;
 }
 
-static void leave_out(struct planner *p, const char *parameter, const char *why)
+static void skip_parameter(struct planner *p, const char *parameter, const char *reason)
 {
-	if (p->d->left_out_count == ACCURACY_SWEEPS)
+	if (p->design->skipped_count == ACCURACY_SWEEPS_MAX)
 		return;
-	struct accuracy_left_out *l = &p->d->left_out[p->d->left_out_count++];
+	struct accuracy_skipped *l = &p->design->skipped[p->design->skipped_count++];
 	text_copy(l->parameter, sizeof l->parameter, parameter);
-	text_copy(l->why, sizeof l->why, why);
+	text_copy(l->reason, sizeof l->reason, reason);
 }
 
 static struct accuracy_sweep *new_sweep(struct planner *p, const char *parameter, const char *summary)
 {
-	if (p->d->sweep_count == ACCURACY_SWEEPS)
+	if (p->design->sweep_count == ACCURACY_SWEEPS_MAX)
 		return NULL;
-	struct accuracy_sweep *s = &p->d->sweeps[p->d->sweep_count++];
+	struct accuracy_sweep *s = &p->design->sweeps[p->design->sweep_count++];
 	*s = (struct accuracy_sweep){.summary = summary};
 	text_copy(s->parameter, sizeof s->parameter, parameter);
 	return s;
@@ -87,11 +87,11 @@ static struct accuracy_sweep *new_sweep(struct planner *p, const char *parameter
 /* Adds a setting that equals the default except for what the caller changes; NULL: the table is full. */
 static struct accuracy_setting *new_setting(struct planner *p, const char *parameter, const char *value)
 {
-	struct accuracy_design *d = p->d;
-	if (d->count == ACCURACY_SETTINGS)
+	struct accuracy_design *d = p->design;
+	if (d->count == ACCURACY_SETTINGS_MAX)
 		return NULL;
 	struct accuracy_setting *s = &d->settings[d->count++];
-	*s = (struct accuracy_setting){.share = 1, .max_depth = p->base->max_depth};
+	*s = (struct accuracy_setting){.time_share = 1, .max_depth = p->base->max_depth};
 	text_copy(s->parameter, sizeof s->parameter, parameter);
 	text_copy(s->value, sizeof s->value, value);
 	text_copy(s->accuracy, sizeof s->accuracy, p->base->accuracy);
@@ -103,16 +103,16 @@ static struct accuracy_setting *new_setting(struct planner *p, const char *param
  * value. Returns false if the sweep is full. */
 static bool add_value(struct accuracy_sweep *s, const char *value, size_t setting)
 {
-	if (s->count == ACCURACY_VALUES)
+	if (s->count == ACCURACY_VALUES_MAX)
 		return false;
-	text_copy(s->value[s->count], sizeof s->value[0], value);
-	s->setting[s->count++] = setting;
+	text_copy(s->values[s->count], sizeof s->values[0], value);
+	s->setting_indices[s->count++] = setting;
 	return true;
 }
 
 static struct accuracy_setting *add_swept_setting(struct planner *p, struct accuracy_sweep *s, const char *value)
 {
-	if (!add_value(s, value, p->d->count))
+	if (!add_value(s, value, p->design->count))
 		return NULL;
 	struct accuracy_setting *setting = new_setting(p, s->parameter, value);
 	if (!setting)
@@ -121,12 +121,12 @@ static struct accuracy_setting *add_swept_setting(struct planner *p, struct accu
 }
 
 /* Sets one value in the settings `base`. Returns false if it is the base's value already, or is invalid. */
-static bool with_setting(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
+static bool set_value(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
 {
 	char text[2 * PLAN_ACCURACY_MAX];
 	struct error e;
 	snprintf(text, sizeof text, "%s%s%s=%s", base, *base ? "," : "", name, value);
-	return render_settings_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
+	return accuracy_settings_canonicalize(text, out, &e) == 0 && strcmp(out, base) != 0;
 }
 
 /* Returns why a setting of the renderer has no effect in this scene; NULL if it has one. */
@@ -134,32 +134,32 @@ static const char *why_no_effect(const struct planner *p, const struct render_se
 {
 	if (!k->sweep[0])
 		return "it determines what is rendered, not how accurately";
-	if (k->place == SETTING_CHAINS && !p->integrator->has_mutations)
+	if (k->scope == SETTING_CHAINS && !p->integrator->has_mutations)
 		return "the integrator has no strategies that walk";
-	if (strcmp(k->name, "tessellation") == 0 && !render_effect_on(p->scene, "displacement"))
+	if (strcmp(k->name, "tessellation") == 0 && !render_effect_is_on(p->scene, "displacement"))
 		return "no shape is displaced";
-	if (strcmp(k->name, "roughness") == 0 && !render_effect_on(p->scene, "glossy"))
+	if (strcmp(k->name, "roughness") == 0 && !render_effect_is_on(p->scene, "glossy"))
 		return "no material has a rough lobe of finite width";
-	if (strcmp(k->name, "wavelengths") == 0 && !render_effect_on(p->scene, "colour"))
+	if (strcmp(k->name, "wavelengths") == 0 && !render_effect_is_on(p->scene, "colour"))
 		return "nothing varies with wavelength";
 	return NULL;
 }
 
 static void sweep_setting(struct planner *p, const struct render_setting *k)
 {
-	struct accuracy_settings now;
+	struct accuracy_settings current;
 	char standard[32];
 	size_t index = 0;
 	while (render_setting_at(index) != k)
 		index++;
-	if (accuracy_settings_read(p->base->accuracy, &now, NULL))
+	if (accuracy_settings_read(p->base->accuracy, &current, NULL))
 		return;
-	accuracy_settings_value(&now, index, standard, sizeof standard);
+	accuracy_settings_print_value(&current, index, standard, sizeof standard);
 	struct accuracy_sweep *s = new_sweep(p, k->name, k->summary);
 	bool placed = false;
 	for (size_t i = 0; s && k->sweep[i]; i++) {
 		char accuracy[PLAN_ACCURACY_MAX];
-		if (!with_setting(p->base->accuracy, k->name, k->sweep[i], accuracy)) {
+		if (!set_value(p->base->accuracy, k->name, k->sweep[i], accuracy)) {
 			placed |= add_value(s, standard, ACCURACY_DEFAULT);
 			continue;
 		}
@@ -167,7 +167,7 @@ static void sweep_setting(struct planner *p, const struct render_setting *k)
 		if (!setting)
 			continue;
 		memcpy(setting->accuracy, accuracy, sizeof accuracy);
-		setting->other_image = k->place == SETTING_WORLD;
+		setting->changes_image = k->scope == SETTING_WORLD;
 	}
 	if (s && !placed)
 		add_value(s, standard, ACCURACY_DEFAULT);
@@ -184,21 +184,21 @@ static void sweep_depth(struct planner *p)
 		if (!setting)
 			continue;
 		setting->max_depth = depths[i];
-		setting->other_image = true;
+		setting->changes_image = true;
 	}
 	snprintf(value, sizeof value, "%u", p->base->max_depth);
 	if (s)
 		add_value(s, value, ACCURACY_DEFAULT);
 }
 
-struct entry {
+struct weighted_strategy {
 	char name[32];
 	double weight;
 	bool independent;
 };
 
 /* Reads a canonical mixture, which has NAME=WEIGHT for each strategy. Returns the number of strategies. */
-static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIES])
+static int read_entries(const char *mixture, struct weighted_strategy entry[PLAN_STRATEGIES_MAX])
 {
 	int n = plan_strategy_count(mixture);
 	const char *at = mixture;
@@ -213,53 +213,54 @@ static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIE
 	return n;
 }
 
-static bool print_entries(struct planner *p, const struct entry *entry, int n, char out[PLAN_MUTATIONS_MAX])
+static bool print_entries(struct planner *p, const struct weighted_strategy *entry, int n, char out[PLAN_MUTATIONS_MAX])
 {
 	char text[PLAN_MUTATIONS_MAX];
 	struct text t = {text, sizeof text};
 	struct error e;
 	for (int i = 0, k = 0; i < n; i++)
 		if (entry[i].weight > 0)
-			text_put(&t, "%s%s=%.4g", k++ ? "," : "", entry[i].name, entry[i].weight);
-	return t.left > 1 && render_mutations(text, p->scene, out, &e) == 0;
+			text_appendf(&t, "%s%s=%.4g", k++ ? "," : "", entry[i].name, entry[i].weight);
+	return t.remaining > 1 && render_canonical_mutations(text, p->scene, out, &e) == 0;
 }
 
-static double independent_share(const struct entry *entry, int n)
+static double independent_share(const struct weighted_strategy *entry, int n)
 {
-	double all = 0, independent = 0;
+	double total = 0, independent = 0;
 	for (int i = 0; i < n; i++) {
-		all += entry[i].weight;
+		total += entry[i].weight;
 		independent += entry[i].independent ? entry[i].weight : 0;
 	}
-	return all > 0 ? independent / all : 0;
+	return total > 0 ? independent / total : 0;
 }
 
-static void sweep_share(struct planner *p)
+static void sweep_independent_share(struct planner *p)
 {
 	static const double shares[] = {0.01, 0.03, 0.06, 0.2, 0.4, 0.7};
-	struct entry base[PLAN_MAX_STRATEGIES];
-	int n = entries_of(p->base->mixture, base);
-	double now = independent_share(base, n);
+	struct weighted_strategy base[PLAN_STRATEGIES_MAX];
+	int n = read_entries(p->base->mixture, base);
+	double current = independent_share(base, n);
 	char value[48];
-	if (!(now > 0 && now < 1)) {
-		leave_out(p, SHARE, "the mixture has no other proposals, or none that are independent");
+	if (!(current > 0 && current < 1)) {
+		skip_parameter(p, SHARE, "the mixture has no other proposals, or none that are independent");
 		return;
 	}
 	struct accuracy_sweep *s =
 		new_sweep(p, SHARE, "Share of independent proposals, which find new light and estimate the brightness");
 	bool placed = false;
 	for (size_t k = 0; s && k < sizeof shares / sizeof *shares; k++) {
-		struct entry changed[PLAN_MAX_STRATEGIES];
+		struct weighted_strategy changed[PLAN_STRATEGIES_MAX];
 		char mixture[PLAN_MUTATIONS_MAX];
-		if (fabs(log(shares[k] / now)) < 0.2)
+		if (fabs(log(shares[k] / current)) < 0.2)
 			continue;
-		if (!placed && now < shares[k]) {
-			snprintf(value, sizeof value, "%.2g", now);
+		if (!placed && current < shares[k]) {
+			snprintf(value, sizeof value, "%.2g", current);
 			placed = add_value(s, value, ACCURACY_DEFAULT);
 		}
 		for (int i = 0; i < n; i++) {
 			changed[i] = base[i];
-			changed[i].weight *= base[i].independent ? shares[k] / now : (1 - shares[k]) / (1 - now);
+			changed[i].weight *=
+				base[i].independent ? shares[k] / current : (1 - shares[k]) / (1 - current);
 		}
 		snprintf(value, sizeof value, "%.2g", shares[k]);
 		struct accuracy_setting *setting =
@@ -267,16 +268,16 @@ static void sweep_share(struct planner *p)
 		if (setting)
 			memcpy(setting->mixture, mixture, sizeof mixture);
 	}
-	snprintf(value, sizeof value, "%.2g", now);
+	snprintf(value, sizeof value, "%.2g", current);
 	if (s && !placed)
 		add_value(s, value, ACCURACY_DEFAULT);
 }
 
-static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struct entry *entry, int n,
+static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struct weighted_strategy *entry, int n,
 			const char *value)
 {
 	char mixture[PLAN_MUTATIONS_MAX];
-	if (n > PLAN_MAX_STRATEGIES || !print_entries(p, entry, n, mixture) || strcmp(mixture, p->base->mixture) == 0)
+	if (n > PLAN_STRATEGIES_MAX || !print_entries(p, entry, n, mixture) || strcmp(mixture, p->base->mixture) == 0)
 		return;
 	struct accuracy_setting *setting = add_swept_setting(p, s, value);
 	if (setting)
@@ -287,8 +288,8 @@ static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struc
  * added, for each that is absent and has an effect in this scene. */
 static void sweep_mixture(struct planner *p)
 {
-	struct entry base[PLAN_MAX_STRATEGIES], changed[PLAN_MAX_STRATEGIES + 1];
-	int n = entries_of(p->base->mixture, base);
+	struct weighted_strategy base[PLAN_STRATEGIES_MAX], changed[PLAN_STRATEGIES_MAX + 1];
+	int n = read_entries(p->base->mixture, base);
 	const char *name, *summary;
 	char value[48];
 	struct accuracy_sweep *s = new_sweep(
@@ -308,15 +309,15 @@ static void sweep_mixture(struct planner *p)
 			try_mixture(p, s, changed, n, value);
 	}
 	for (size_t k = 0; (name = render_mutation_at(k, &summary)) != NULL; k++) {
-		bool here = strcmp(name, "independent") == 0 ||
-			    (strcmp(name, "wavelength") == 0 && !render_effect_on(p->scene, "colour")) ||
-			    (strcmp(name, "lens") == 0 && !render_effect_on(p->scene, "aperture"));
+		bool is_excluded = strcmp(name, "independent") == 0 ||
+				   (strcmp(name, "wavelength") == 0 && !render_effect_is_on(p->scene, "colour")) ||
+				   (strcmp(name, "lens") == 0 && !render_effect_is_on(p->scene, "aperture"));
 		for (int i = 0; i < n; i++)
-			here |= strcmp(base[i].name, name) == 0;
-		if (here)
+			is_excluded |= strcmp(base[i].name, name) == 0;
+		if (is_excluded)
 			continue;
 		memcpy(changed, base, sizeof base);
-		changed[n] = (struct entry){.weight = 0.2 * total};
+		changed[n] = (struct weighted_strategy){.weight = 0.2 * total};
 		text_copy(changed[n].name, sizeof changed[n].name, name);
 		snprintf(value, sizeof value, "with %.31s", name);
 		try_mixture(p, s, changed, n + 1, value);
@@ -330,7 +331,7 @@ static void sweep_presets(struct planner *p)
 		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
 		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "",
 			 presets[i].accuracy);
-		struct accuracy_setting *setting = render_settings_canonical(text, accuracy, p->e) == 0
+		struct accuracy_setting *setting = accuracy_settings_canonicalize(text, accuracy, p->e) == 0
 							   ? add_swept_setting(p, s, presets[i].name)
 							   : NULL;
 		if (setting)
@@ -338,21 +339,22 @@ static void sweep_presets(struct planner *p)
 	}
 	if (s) {
 		add_value(s, "default", ACCURACY_DEFAULT);
-		struct accuracy_setting *same = add_swept_setting(p, s, "careful");
-		if (same)
-			memcpy(same->accuracy, p->d->settings[ACCURACY_REFERENCE].accuracy, sizeof same->accuracy);
+		struct accuracy_setting *reference = add_swept_setting(p, s, "careful");
+		if (reference)
+			memcpy(reference->accuracy, p->design->settings[ACCURACY_REFERENCE].accuracy,
+			       sizeof reference->accuracy);
 	}
 }
 
 static void add_reference(struct planner *p)
 {
 	struct accuracy_setting *s = new_setting(p, "reference", "");
-	s->share = ACCURACY_REFERENCE_SHARE;
-	for (size_t i = 0; i < sizeof careful / sizeof *careful; i++) {
-		const struct render_setting *k = setting_find(careful[i].parameter);
+	s->time_share = ACCURACY_REFERENCE_SHARE;
+	for (size_t i = 0; i < sizeof reference_values / sizeof *reference_values; i++) {
+		const struct render_setting *k = find_setting(reference_values[i].parameter);
 		char accuracy[PLAN_ACCURACY_MAX];
 		if (k && !why_no_effect(p, k) &&
-		    with_setting(s->accuracy, careful[i].parameter, careful[i].value, accuracy))
+		    set_value(s->accuracy, reference_values[i].parameter, reference_values[i].value, accuracy))
 			memcpy(s->accuracy, accuracy, sizeof accuracy);
 	}
 }
@@ -360,40 +362,40 @@ static void add_reference(struct planner *p)
 /* Returns the i-th name that --parameters accepts; NULL after the last. */
 static const char *parameter_at(size_t i)
 {
-	static const char *const own[] = {DEPTH, SHARE, MIXTURE, PRESET};
-	enum { OWN = sizeof own / sizeof *own };
+	static const char *const extra_names[] = {DEPTH, SHARE, MIXTURE, PRESET};
+	enum { OWN = sizeof extra_names / sizeof *extra_names };
 	const struct render_setting *k = i < OWN ? NULL : render_setting_at(i - OWN);
-	return i < OWN ? own[i] : k ? k->name : NULL;
+	return i < OWN ? extra_names[i] : k ? k->name : NULL;
 }
 
-static int check_only(struct planner *p)
+static int check_parameters(struct planner *p)
 {
-	char name[32], hint[128], known[300];
-	const char *one;
-	for (const char *at = p->only; at && *at;) {
+	char name[32], hint[128], names[300];
+	const char *parameter;
+	for (const char *at = p->parameters; at && *at;) {
 		size_t n = strcspn(at, ",");
 		struct spelling s = {.wanted = name};
 		bool found = false;
-		*known = 0;
+		*names = 0;
 		snprintf(name, sizeof name, "%.*s", (int)(n < sizeof name ? n : sizeof name - 1), at);
-		for (size_t i = 0; (one = parameter_at(i)) != NULL; i++) {
-			found |= strcmp(name, one) == 0;
-			spelling_offer(&s, one);
-			spelling_list(known, sizeof known, one);
+		for (size_t i = 0; (parameter = parameter_at(i)) != NULL; i++) {
+			found |= strcmp(name, parameter) == 0;
+			spelling_offer(&s, parameter);
+			spelling_append_to_list(names, sizeof names, parameter);
 		}
 		if (!found)
 			return error_set(p->e, EINVAL, "there is no parameter '%s'%s; there are %s", name,
-					 spelling_hint(&s, hint, sizeof hint), known);
+					 spelling_hint(&s, hint, sizeof hint), names);
 		at += n + (at[n] == ',');
 	}
 	return 0;
 }
 
-int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
-		    const char *only, struct error *e)
+int accuracy_make_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
+			 const char *parameters, struct error *e)
 {
-	struct planner p = {d, base, scene, render_integrator_find(base->integrator), only, e};
-	int rc = check_only(&p);
+	struct planner p = {d, base, scene, render_integrator_find(base->integrator), parameters, e};
+	int rc = check_parameters(&p);
 	if (rc)
 		return rc;
 	*d = (struct accuracy_design){.count = 0};
@@ -401,32 +403,32 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 	add_reference(&p);
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
-		const char *why = why_no_effect(&p, k);
-		if (!is_listed(only, k->name))
+		const char *reason = why_no_effect(&p, k);
+		if (!is_listed(parameters, k->name))
 			continue;
-		if (why)
-			leave_out(&p, k->name, why);
+		if (reason)
+			skip_parameter(&p, k->name, reason);
 		else
 			sweep_setting(&p, k);
 	}
-	if (is_listed(only, DEPTH))
+	if (is_listed(parameters, DEPTH))
 		sweep_depth(&p);
 	if (!p.integrator->has_mutations) {
-		leave_out(&p, SHARE, "the integrator has no mixture of strategies");
-		leave_out(&p, MIXTURE, "the integrator has no mixture of strategies");
+		skip_parameter(&p, SHARE, "the integrator has no mixture of strategies");
+		skip_parameter(&p, MIXTURE, "the integrator has no mixture of strategies");
 		return 0;
 	}
-	if (is_listed(only, SHARE))
-		sweep_share(&p);
-	if (is_listed(only, MIXTURE))
+	if (is_listed(parameters, SHARE))
+		sweep_independent_share(&p);
+	if (is_listed(parameters, MIXTURE))
 		sweep_mixture(&p);
-	if (is_listed(only, PRESET))
+	if (is_listed(parameters, PRESET))
 		sweep_presets(&p);
 	return 0;
 }
 
-void accuracy_name(const struct accuracy_setting *s, char *text, size_t size)
+void accuracy_setting_name(const struct accuracy_setting *s, char *text, size_t size)
 {
 	struct text t = {text, size};
-	text_put(&t, "%s%s%s", s->parameter, *s->value ? " " : "", s->value);
+	text_appendf(&t, "%s%s%s", s->parameter, *s->value ? " " : "", s->value);
 }

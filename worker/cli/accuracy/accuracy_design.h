@@ -8,15 +8,15 @@
 #include "common/plan/plan.h"
 #include "worker/render/render.h"
 
-enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12 };
+enum { ACCURACY_SETTINGS_MAX = 96, ACCURACY_SWEEPS_MAX = 24, ACCURACY_VALUES_MAX = 12 };
 
 /* How much longer the reference is rendered than each other setting. */
 #define ACCURACY_REFERENCE_SHARE 4.0
 
 struct accuracy_setting {
 	char parameter[32], value[48]; /* what differs from the default; "default" or "reference", with no value */
-	double share;		       /* of the time, relative to the others' shares */
-	bool other_image;	       /* the setting is known to change the image, if only by little */
+	double time_share;	       /* of the time, relative to the others' shares */
+	bool changes_image;	       /* the setting is known to change the image, if only by little */
 	uint32_t max_depth;
 	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX]; /* canonical, for the plan */
 };
@@ -26,20 +26,20 @@ struct accuracy_sweep {
 	char parameter[32];
 	const char *summary;
 	size_t count;
-	size_t setting[ACCURACY_VALUES]; /* [count]: index of the setting with this value */
-	char value[ACCURACY_VALUES][48]; /* [count] */
+	size_t setting_indices[ACCURACY_VALUES_MAX]; /* [count]: index of the setting with this value */
+	char values[ACCURACY_VALUES_MAX][48];	     /* [count] */
 };
 
 /* A parameter that is not varied, with the reason. */
-struct accuracy_left_out {
-	char parameter[32], why[160];
+struct accuracy_skipped {
+	char parameter[32], reason[160];
 };
 
 struct accuracy_design {
-	size_t count, sweep_count, left_out_count;
-	struct accuracy_setting settings[ACCURACY_SETTINGS];
-	struct accuracy_sweep sweeps[ACCURACY_SWEEPS];
-	struct accuracy_left_out left_out[ACCURACY_SWEEPS];
+	size_t count, sweep_count, skipped_count;
+	struct accuracy_setting settings[ACCURACY_SETTINGS_MAX];
+	struct accuracy_sweep sweeps[ACCURACY_SWEEPS_MAX];
+	struct accuracy_skipped skipped[ACCURACY_SWEEPS_MAX];
 };
 
 /* Indices of the first two settings. The reference has accurate values and is rendered longer. */
@@ -47,10 +47,10 @@ enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
 /* Makes the design for a scene. base: complete; its settings are the default. only: the parameters to vary, as
  * "NAME,NAME"; NULL: all. Returns -EINVAL with a sentence if one of them does not exist. */
-int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
-		    const char *only, struct error *e);
+int accuracy_make_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
+			 const char *only, struct error *e);
 
 /* Writes the name of a setting, such as "tolerance 0.01" or "default". */
-void accuracy_name(const struct accuracy_setting *s, char *text, size_t size);
+void accuracy_setting_name(const struct accuracy_setting *s, char *text, size_t size);
 
 #endif

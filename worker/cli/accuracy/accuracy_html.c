@@ -36,15 +36,16 @@ static const char style[] =
 	".answer{background:#f4f4f4;padding:.6em 1em;border-left:4px solid #0072b2}"
 	"code{font-size:13px;overflow-wrap:anywhere}";
 
-static void paragraph(struct text_file *p, const char *text)
+static void put_paragraph(struct text_file *p, const char *text)
 {
 	text_file_put(p, "<p>");
 	text_file_escaped(p, text);
 	text_file_put(p, "</p>\n");
 }
 
-/* Appends a cell such as "12.3 (11.9 to 12.8)", in percent. sign: print + or -; seen: mark it as significant. */
-static void cell(struct text_file *p, struct interval x, bool sign, bool seen)
+/* Appends a cell such as "12.3 (11.9 to 12.8)", in percent. sign: print + or -; is_significant: mark it as significant.
+ */
+static void put_interval_cell(struct text_file *p, struct interval x, bool sign, bool is_significant)
 {
 	if (!isfinite(x.value))
 		text_file_put(p, "<td>&#8211;</td>");
@@ -52,10 +53,10 @@ static void cell(struct text_file *p, struct interval x, bool sign, bool seen)
 		text_file_put(p,
 			      sign ? "<td%s>%+.3g <span class=\"note\">(%+.3g to %+.3g)</span></td>"
 				   : "<td%s>%.3g <span class=\"note\">(%.3g to %.3g)</span></td>",
-			      seen ? " class=\"seen\"" : "", 100 * x.value, 100 * x.low, 100 * x.high);
+			      is_significant ? " class=\"seen\"" : "", 100 * x.value, 100 * x.low, 100 * x.high);
 }
 
-static void failed_cell(struct text_file *p, const struct accuracy_figures *f)
+static void put_failed_walks_cell(struct text_file *p, const struct accuracy_figures *f)
 {
 	if (isfinite(f->failed_walks))
 		text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
@@ -63,28 +64,28 @@ static void failed_cell(struct text_file *p, const struct accuracy_figures *f)
 		text_file_put(p, "<td>&#8211;</td>");
 }
 
-static void name_cell(struct text_file *p, const struct accuracy_context *x, size_t i)
+static void put_name_cell(struct text_file *p, const struct accuracy_context *x, size_t i)
 {
 	char name[96];
-	accuracy_name(&x->design->settings[i], name, sizeof name);
+	accuracy_setting_name(&x->design->settings[i], name, sizeof name);
 	text_file_put(p, "<td class=\"t\">");
 	text_file_escaped(p, name);
 	text_file_put(p, "</td>");
 }
 
-static void row_begin(struct text_file *p, const struct accuracy_context *x, size_t i)
+static void begin_row(struct text_file *p, const struct accuracy_context *x, size_t i)
 {
-	bool front = x->judgement->figures[i].beaten_by == i && i != ACCURACY_REFERENCE;
+	bool front = x->judgement->figures[i].dominated_by == i && i != ACCURACY_REFERENCE;
 	text_file_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
 }
 
 /* Appends the summary: how the default compares with the others. */
-static void put_answer(struct text_file *p, const struct accuracy_context *x)
+static void put_verdict(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_figures *f = x->judgement->figures, *d = &f[ACCURACY_DEFAULT];
 	char name[96];
 	text_file_put(p, "<div class=\"answer\">");
-	if (x->judgement->thin)
+	if (x->judgement->is_unreliable)
 		text_file_put(
 			p,
 			"<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than "
@@ -92,13 +93,13 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 			"what follows may be chance. Give it more minutes (--budget), a smaller film (--size) or fewer "
 			"parameters (--parameters).</p>");
 	text_file_put(p, "<p>");
-	if (d->beaten_by == ACCURACY_DEFAULT) {
+	if (d->dominated_by == ACCURACY_DEFAULT) {
 		text_file_put(
 			p, "<b>The default lies on the front</b>: no other setting has surely less error at equal time "
 			   "without a sign of more bias, or surely less bias without surely more error.");
 	} else {
-		const struct accuracy_figures *b = &f[d->beaten_by];
-		accuracy_name(&x->design->settings[d->beaten_by], name, sizeof name);
+		const struct accuracy_figures *b = &f[d->dominated_by];
+		accuracy_setting_name(&x->design->settings[d->dominated_by], name, sizeof name);
 		text_file_put(p, "<b>The default does not lie on the front</b>: <b>");
 		text_file_escaped(p, name);
 		text_file_put(
@@ -108,17 +109,17 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 			100 * b->equal_time.value, 100 * b->equal_time.low, 100 * b->equal_time.high,
 			100 * d->equal_time.value, 100 * d->equal_time.low, 100 * d->equal_time.high,
 			d->equal_time.value * d->equal_time.value / (b->equal_time.value * b->equal_time.value),
-			100 * b->bias_bound, b->bias_seen > 0 ? "" : ", none was seen");
+			100 * b->bias_upper, b->bias_lower_joint > 0 ? "" : ", none was seen");
 	}
 	text_file_put(p, "</p>");
 	size_t biased = 0;
 	for (size_t i = 0; i < x->design->count; i++) {
-		if (!(f[i].bias_seen > 0) || i == ACCURACY_REFERENCE)
+		if (!(f[i].bias_lower_joint > 0) || i == ACCURACY_REFERENCE)
 			continue;
-		accuracy_name(&x->design->settings[i], name, sizeof name);
+		accuracy_setting_name(&x->design->settings[i], name, sizeof name);
 		text_file_put(p, biased++ ? ", " : "<p>Settings whose bias was seen: ");
 		text_file_escaped(p, name);
-		text_file_put(p, " (at least %.2g %%)", 100 * f[i].bias_seen);
+		text_file_put(p, " (at least %.2g %%)", 100 * f[i].bias_lower_joint);
 	}
 	text_file_put(p, biased ? ".</p>" : "<p>No bias was seen in any setting.</p>");
 	if (isfinite(d->bias_mean.value))
@@ -126,7 +127,7 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 			p,
 			"<p>Against the reference the default's mean differs by %+.2g %% (%+.2g to %+.2g); its bias, of "
 			"the mean or of any block, is at most %.2g %%.</p>",
-			100 * d->bias_mean.value, 100 * d->bias_mean.low, 100 * d->bias_mean.high, 100 * d->bias_bound);
+			100 * d->bias_mean.value, 100 * d->bias_mean.low, 100 * d->bias_mean.high, 100 * d->bias_upper);
 	text_file_put(p, "</div>\n");
 }
 
@@ -138,7 +139,7 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 	unsigned char *bytes = mem_alloc(pixels, 3), *png = NULL;
 	if (!bytes)
 		return error_set(e, ENOMEM, "no memory for the picture");
-	tonemap(planes, pixels, 0, bytes);
+	tonemap_image(planes, pixels, 0, bytes);
 	int rc = picture_encode_png(bytes, j->width, j->height, &png, &size, e);
 	mem_free(bytes);
 	if (rc)
@@ -152,14 +153,14 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 	return 0;
 }
 
-static void write_fact(struct text_file *p, const char *name, const char *text)
+static void put_fact(struct text_file *p, const char *name, const char *text)
 {
 	text_file_put(p, "<tr><td class=\"t\">%s</td><td class=\"t\">", name);
 	text_file_escaped(p, text);
 	text_file_put(p, "</td></tr>\n");
 }
 
-static void machine(char *text, size_t size, unsigned threads)
+static void describe_machine(char *text, size_t size, unsigned threads)
 {
 	char line[256], model[160] = "unknown processor";
 	FILE *f = fopen("/proc/cpuinfo", "re");
@@ -175,39 +176,39 @@ static void put_facts(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_run *r = x->run;
 	const struct plan *plan = &r->jobs[ACCURACY_DEFAULT].plan;
-	char text[PLAN_TEXT];
+	char text[PLAN_TEXT_MAX];
 	time_t now = time(NULL);
 	struct tm utc;
 	text_file_put(p, "<table>\n");
-	write_fact(p, "Scene", x->scene);
+	put_fact(p, "Scene", x->scene);
 	snprintf(text, sizeof text, "%s, %u x %u pixels, paths of at most %u edges", plan->integrator, plan->crop_width,
 		 plan->crop_height, plan->max_depth);
-	write_fact(p, "Rendered by", text);
-	write_fact(p, "Mixture", *plan->mutations ? plan->mutations : "none");
-	write_fact(p, "Settings changed", *plan->accuracy ? plan->accuracy : "none: the renderer's defaults");
+	put_fact(p, "Rendered by", text);
+	put_fact(p, "Mixture", *plan->mutations ? plan->mutations : "none");
+	put_fact(p, "Settings changed", *plan->accuracy ? plan->accuracy : "none: the renderer's defaults");
 	plan_describe(plan, text, sizeof text);
-	write_fact(p, "Plan of the default", text);
+	put_fact(p, "Plan of the default", text);
 	snprintf(text, sizeof text,
 		 "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that",
 		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: the figures so far)" : "",
 		 x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds, ACCURACY_REFERENCE_SHARE);
-	write_fact(p, "Run", text);
+	put_fact(p, "Run", text);
 	snprintf(text, sizeof text, "rendered carefully: %s",
 		 *x->design->settings[ACCURACY_REFERENCE].accuracy ? x->design->settings[ACCURACY_REFERENCE].accuracy
 								   : "as the default, but longer");
-	write_fact(p, "Reference for the bias", x->reference ? x->reference : text);
-	machine(text, sizeof text, r->threads);
-	write_fact(p, "Machine", text);
+	put_fact(p, "Reference for the bias", x->reference ? x->reference : text);
+	describe_machine(text, sizeof text, r->threads);
+	put_fact(p, "Machine", text);
 	if (gmtime_r(&now, &utc) &&
 	    strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC, hslt-accuracy " HSLT_VERSION, &utc))
-		write_fact(p, "Made", text);
+		put_fact(p, "Made", text);
 	text_file_put(p, "</table>\n");
 }
 
 static void put_guide(struct text_file *p, const struct accuracy_context *x)
 {
 	text_file_put(p, "<h2>How to read this</h2>\n");
-	paragraph(
+	put_paragraph(
 		p,
 		"Each setting differs from the default in one parameter (presets: in several). All were rendered in "
 		"turns, a round of each after the other, so that whatever else the machine did affects all of them alike.");
@@ -219,23 +220,25 @@ static void put_guide(struct text_file *p, const struct accuracy_context *x)
 		"the squared brightness, from the spread between independent groups of chains; the %g %% of the pixels "
 		"with the greatest errors are left out, because a single pixel can dominate the error and say nothing "
 		"about the setting. Half the error takes four times the time.</p>\n",
-		x->judgement->at_cpu_seconds, (unsigned long long)x->judgement->at_mutations, 100 * ACCURACY_TRIM);
+		x->judgement->default_cpu_seconds, (unsigned long long)x->judgement->default_mutations,
+		100 * ACCURACY_TRIM);
 	text_file_put(
 		p,
 		"<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, "
 		"and the block of the image (of %u x %u) that differs most surely. Figures in parentheses are 95 %% "
 		"intervals. A bias counts as seen when chance cannot explain it, although all blocks of all settings were tested.</p>\n",
-		x->judgement->across, x->judgement->down);
-	paragraph(
+		x->judgement->blocks_across, x->judgement->blocks_down);
+	put_paragraph(
 		p,
 		"A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal "
 		"time without a sign of more bias, and none is free of a bias that was seen in it without surely more "
 		"error. \"Surely\" means beyond the intervals, which are widened for the number of settings; a setting whose bias is known "
 		"much less well, or whose own interval of the bias excludes 0, beats nothing by speed. max-depth, "
 		"roughness and tessellation change the image by design: they beat nothing, but may lie on the front as trade-offs.");
-	if (!x->judgement->file)
-		paragraph(p, "The reference is the careful preset, rendered longer, so a bias that it shares cannot be "
-			     "seen here; --reference FILE takes an image of another integrator instead.");
+	if (!x->judgement->has_reference_file)
+		put_paragraph(
+			p, "The reference is the careful preset, rendered longer, so a bias that it shares cannot be "
+			   "seen here; --reference FILE takes an image of another integrator instead.");
 }
 
 static void put_summary(struct text_file *p, const struct accuracy_context *x)
@@ -252,19 +255,20 @@ static void put_summary(struct text_file *p, const struct accuracy_context *x)
 		double times = f->equal_time.value / j->figures[ACCURACY_DEFAULT].equal_time.value;
 		if (i == ACCURACY_REFERENCE)
 			continue;
-		row_begin(p, x, i);
-		name_cell(p, x, i);
-		cell(p, f->equal_time, false, false);
+		begin_row(p, x, i);
+		put_name_cell(p, x, i);
+		put_interval_cell(p, f->equal_time, false, false);
 		text_file_put(p, "<td>x %.2f</td>", times * times);
-		struct interval none = {NAN, NAN, NAN};
-		cell(p, f->bias_mean, true, f->bias_seen > 0);
-		cell(p, j->across * j->down == 1 ? none : f->bias_block, true, f->bias_seen > 0);
-		if (f->beaten_by == i) {
+		struct interval not_shown = {NAN, NAN, NAN};
+		put_interval_cell(p, f->bias_mean, true, f->bias_lower_joint > 0);
+		put_interval_cell(p, j->blocks_across * j->blocks_down == 1 ? not_shown : f->bias_worst_block, true,
+				  f->bias_lower_joint > 0);
+		if (f->dominated_by == i) {
 			text_file_put(p, "<td class=\"t\">on the front%s</td></tr>\n",
-				      f->bias_seen > 0 ? ", biased" : "");
+				      f->bias_lower_joint > 0 ? ", biased" : "");
 			continue;
 		}
-		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
+		accuracy_setting_name(&x->design->settings[f->dominated_by], name, sizeof name);
 		text_file_put(p, "<td class=\"t\">beaten by ");
 		text_file_escaped(p, name);
 		text_file_put(p, "</td></tr>\n");
@@ -281,15 +285,15 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 		"<th>error at equal mutations, %%</th></tr>\n");
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &x->judgement->figures[i];
-		row_begin(p, x, i);
-		name_cell(p, x, i);
+		begin_row(p, x, i);
+		put_name_cell(p, x, i);
 		text_file_put(p, "<td>%llu</td><td>%.3g <span class=\"note\">(%.3g to %.3g)</span></td><td>%.3g</td>",
-			      (unsigned long long)f->mutations, f->cost.value, f->cost.low, f->cost.high,
-			      100 * f->acceptance);
-		failed_cell(p, f);
-		text_file_put(p, "<td>%.3g</td>", f->rays);
-		struct interval none = {NAN, NAN, NAN};
-		cell(p, i == ACCURACY_REFERENCE ? none : f->equal_mutations, false, false);
+			      (unsigned long long)f->mutations, f->mutation_us.value, f->mutation_us.low,
+			      f->mutation_us.high, 100 * f->acceptance);
+		put_failed_walks_cell(p, f);
+		text_file_put(p, "<td>%.3g</td>", f->rays_per_mutation);
+		struct interval not_shown = {NAN, NAN, NAN};
+		put_interval_cell(p, i == ACCURACY_REFERENCE ? not_shown : f->equal_mutations, false, false);
 		text_file_put(p, "</tr>\n");
 	}
 	text_file_put(p,
@@ -304,48 +308,48 @@ static void put_sweep(struct text_file *p, const struct accuracy_context *x, con
 	text_file_put(p, "</h3>\n");
 	char text[300];
 	snprintf(text, sizeof text, "%s.", s->summary);
-	paragraph(p, text);
+	put_paragraph(p, text);
 	accuracy_plot_sweep(p, x, s);
 	text_file_put(
 		p,
 		"<table>\n<tr><th class=\"t\">value</th><th>&#181;s per mutation</th><th>accepted, %%</th><th>failed walks, %%</th>"
 		"<th>error at equal time, %%</th><th>bias of the mean, %%</th><th>of the worst block, %%</th></tr>\n");
 	for (size_t k = 0; k < s->count; k++) {
-		size_t i = s->setting[k];
+		size_t i = s->setting_indices[k];
 		const struct accuracy_figures *f = &x->judgement->figures[i];
-		struct interval none = {NAN, NAN, NAN};
-		row_begin(p, x, i);
+		struct interval not_shown = {NAN, NAN, NAN};
+		begin_row(p, x, i);
 		text_file_put(p, "<td class=\"t\">");
-		text_file_escaped(p, s->value[k]);
+		text_file_escaped(p, s->values[k]);
 		text_file_put(p, "%s</td><td>%.3g</td><td>%.3g</td>",
-			      i == ACCURACY_DEFAULT && strcmp(s->value[k], "default") != 0 ? " (default)" : "",
-			      f->cost.value, 100 * f->acceptance);
-		failed_cell(p, f);
-		cell(p, f->equal_time, false, false);
-		cell(p, f->bias_mean, true, f->bias_seen > 0);
-		cell(p, x->judgement->across == 1 ? none : f->bias_block, true, f->bias_seen > 0);
+			      i == ACCURACY_DEFAULT && strcmp(s->values[k], "default") != 0 ? " (default)" : "",
+			      f->mutation_us.value, 100 * f->acceptance);
+		put_failed_walks_cell(p, f);
+		put_interval_cell(p, f->equal_time, false, false);
+		put_interval_cell(p, f->bias_mean, true, f->bias_lower_joint > 0);
+		put_interval_cell(p, x->judgement->blocks_across == 1 ? not_shown : f->bias_worst_block, true,
+				  f->bias_lower_joint > 0);
 		text_file_put(p, "</tr>\n");
 	}
 	text_file_put(p, "</table>\n");
 }
 
-static void put_rest(struct text_file *p, const struct accuracy_context *x)
+static void put_appendix(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_design *d = x->design;
-	if (d->left_out_count)
+	if (d->skipped_count)
 		text_file_put(p, "<h2>Left out</h2>\n<table>\n<tr><th class=\"t\">parameter</th>"
 				 "<th class=\"t\">why it does nothing here</th></tr>\n");
-	for (size_t i = 0; i < d->left_out_count; i++)
-		write_fact(p, d->left_out[i].parameter, d->left_out[i].why);
-	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->left_out_count ? "</table>\n" : "");
+	for (size_t i = 0; i < d->skipped_count; i++)
+		put_fact(p, d->skipped[i].parameter, d->skipped[i].reason);
+	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->skipped_count ? "</table>\n" : "");
 	for (size_t i = 0; accuracy_columns[i].name; i++)
-		write_fact(p, accuracy_columns[i].name,
-			   *accuracy_columns[i].meaning ? accuracy_columns[i].meaning
-							: "upper end of the same interval");
+		put_fact(p, accuracy_columns[i].name,
+			 *accuracy_columns[i].meaning ? accuracy_columns[i].meaning : "upper end of the same interval");
 	text_file_put(p, "</table>\n");
 }
 
-static int put_all(struct text_file *p, const struct accuracy_context *x, struct error *e)
+static int put_page(struct text_file *p, const struct accuracy_context *x, struct error *e)
 {
 	text_file_put(p, "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head>"
 			 "<meta charset=\"utf-8\"/><title>What accuracy costs: ");
@@ -353,7 +357,7 @@ static int put_all(struct text_file *p, const struct accuracy_context *x, struct
 	text_file_put(p, "</title><style>%s</style></head>\n<body>\n<h1>What accuracy costs in time: ", style);
 	text_file_escaped(p, x->scene);
 	text_file_put(p, "</h1>\n");
-	put_answer(p, x);
+	put_verdict(p, x);
 	int rc = put_picture(p, x, e);
 	if (rc)
 		return rc;
@@ -366,15 +370,15 @@ static int put_all(struct text_file *p, const struct accuracy_context *x, struct
 	for (size_t i = 0; i < x->design->sweep_count; i++)
 		put_sweep(p, x, &x->design->sweeps[i]);
 	put_mutations(p, x);
-	put_rest(p, x);
+	put_appendix(p, x);
 	text_file_put(p, "</body></html>\n");
 	return 0;
 }
 
-int accuracy_html(const struct accuracy_context *x, const char *path, struct error *e)
+int accuracy_write_html(const struct accuracy_context *x, const char *path, struct error *e)
 {
-	struct text_file p = {.full = false};
-	int rc = put_all(&p, x, e);
+	struct text_file p = {.has_failed = false};
+	int rc = put_page(&p, x, e);
 	if (!rc)
 		rc = text_file_write(&p, path, e);
 	text_file_fini(&p);

@@ -6,6 +6,6 @@
 #include "worker/cli/accuracy/accuracy.h"
 
 /* Writes the report as one XHTML file. If gnuplot is not installed, the report says so in place of the plots. */
-int accuracy_html(const struct accuracy_context *x, const char *path, struct error *e);
+int accuracy_write_html(const struct accuracy_context *x, const char *path, struct error *e);
 
 #endif

@@ -21,38 +21,38 @@
 #define LEVEL 0.05
 
 struct judge {
-	const struct accuracy_run *r;
+	const struct accuracy_run *run;
 	struct accuracy_judgement *out;
-	double *mean;	 /* [pixels * 3]: the mean image of all settings */
-	double *weight;	 /* [pixels * 3], for one setting at a time */
-	double *worst;	 /* [2][pixels]: errors of the pixels of one setting, and the same sorted */
-	double *rel_mse; /* [settings] */
-	double *degrees; /* [settings]: degrees of freedom of rel_mse */
-	double *blocks;	 /* [settings][groups][cells]: means over the blocks, and over the image */
+	double *mean_image;   /* [pixels * 3]: the mean image of all settings */
+	double *weight;	      /* [pixels * 3], for one setting at a time */
+	double *pixel_errors; /* [2][pixels]: errors of the pixels of one setting, and the same sorted */
+	double *rel_mse;      /* [settings] */
+	double *degrees;      /* [settings]: degrees of freedom of rel_mse */
+	double *blocks;	      /* [settings][groups][cells]: means over the blocks, and over the image */
 	size_t cells, groups;
 };
 
-static const struct accuracy_job *job(const struct judge *j, size_t i)
+static const struct accuracy_job *get_job(const struct judge *j, size_t i)
 {
-	return &j->r->jobs[i];
+	return &j->run->jobs[i];
 }
 
 /* Returns the interval of x, given the standard deviation of its logarithm. */
 static struct interval interval_around(double x, double log_sd)
 {
-	double factor = exp(stats_t(LEVEL, 1e9) * log_sd);
+	double factor = exp(stats_t_quantile(LEVEL, 1e9) * log_sd);
 	return (struct interval){x, x / factor, x * factor};
 }
 
-static int take_mean(struct judge *j, struct error *e)
+static int compute_mean_image(struct judge *j, struct error *e)
 {
-	size_t n = j->r->design->count, values = (size_t)j->out->width * j->out->height * 3;
+	size_t n = j->run->design->count, values = (size_t)j->out->width * j->out->height * 3;
 	for (size_t i = 0; i < n; i++) {
 		struct canvas_image img;
-		if (canvas_image(job(j, i)->run.canvas, false, &img, e))
+		if (canvas_image_init(get_job(j, i)->run.canvas, false, &img, e))
 			return -ENOMEM;
 		for (size_t k = 0; k < values; k++)
-			j->mean[k] += (double)img.rgb[k] / (double)n;
+			j->mean_image[k] += (double)img.rgb[k] / (double)n;
 		/* The report shows the reference, which has the least noise. */
 		for (size_t k = 0; i == ACCURACY_REFERENCE && k < values; k++)
 			j->out->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
@@ -61,49 +61,50 @@ static int take_mean(struct judge *j, struct error *e)
 	return 0;
 }
 
-static void take_counts(struct accuracy_figures *f, const struct canvas_counts *n)
+static void compute_rates(struct accuracy_figures *f, const struct canvas_counts *n)
 {
 	static const enum strategy_counter failures[] = {STRATEGY_FAIL_SINGULAR, STRATEGY_FAIL_DIVERGED,
 							 STRATEGY_FAIL_ITERATIONS, STRATEGY_FAIL_REVERSE};
 	uint64_t walks = 0, failed = 0;
 	for (int k = 0; k < BATCH_STRATEGIES; k++) {
-		walks += n->strategy[k][STRATEGY_WALKS];
+		walks += n->strategies[k][STRATEGY_WALKS];
 		for (size_t i = 0; i < sizeof failures / sizeof *failures; i++)
-			failed += n->strategy[k][failures[i]];
+			failed += n->strategies[k][failures[i]];
 	}
 	double samples = (double)n->counters[COUNT_SAMPLES];
 	f->acceptance = (double)n->counters[COUNT_ACCEPTED] / samples;
-	f->rays = ((double)n->counters[COUNT_RAYS_CLOSEST] + (double)n->counters[COUNT_RAYS_SHADOW]) / samples;
+	f->rays_per_mutation =
+		((double)n->counters[COUNT_RAYS_CLOSEST] + (double)n->counters[COUNT_RAYS_SHADOW]) / samples;
 	f->failed_walks = walks ? (double)failed / (double)walks : NAN;
 }
 
 /* Computes the weights of the errors of one setting: 1 / (B^2 + (0.01 m)^2), B the mean image of all settings and m its
  * mean, divided by the number of values; 0 for the pixels with the largest errors. */
-static void weigh(struct judge *j, const float *error)
+static void compute_weights(struct judge *j, const float *error)
 {
-	size_t pixels = (size_t)j->out->width * j->out->height, left = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
+	size_t pixels = (size_t)j->out->width * j->out->height, trimmed = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
 	double m = 0;
 	for (size_t k = 0; k < 3 * pixels; k++)
-		m += j->mean[k] / (double)(3 * pixels);
+		m += j->mean_image[k] / (double)(3 * pixels);
 	for (size_t i = 0; i < pixels; i++) {
 		double sum = 0;
 		for (size_t k = 3 * i; k < 3 * i + 3; k++) {
-			j->weight[k] = 1 / (j->mean[k] * j->mean[k] + 1e-4 * m * m);
+			j->weight[k] = 1 / (j->mean_image[k] * j->mean_image[k] + 1e-4 * m * m);
 			sum += j->weight[k] * (double)error[k] * (double)error[k];
 		}
-		j->worst[i] = sum;
+		j->pixel_errors[i] = sum;
 	}
-	double *sorted = j->worst + pixels;
-	memcpy(sorted, j->worst, pixels * sizeof *sorted);
-	qsort(sorted, pixels, sizeof *sorted, double_compare);
-	double most = sorted[left < pixels ? pixels - 1 - left : 0];
+	double *sorted = j->pixel_errors + pixels;
+	memcpy(sorted, j->pixel_errors, pixels * sizeof *sorted);
+	qsort(sorted, pixels, sizeof *sorted, compare_doubles);
+	double threshold = sorted[trimmed < pixels ? pixels - 1 - trimmed : 0];
 	for (size_t k = 0; k < 3 * pixels; k++)
-		j->weight[k] = j->worst[k / 3] > most ? 0 : j->weight[k] / (double)(3 * pixels);
+		j->weight[k] = j->pixel_errors[k / 3] > threshold ? 0 : j->weight[k] / (double)(3 * pixels);
 }
 
 /* Returns the degrees of freedom of the chi-square distribution that is spread like the groups' distances
  * (Satterthwaite 1946). */
-static double degrees_of(const double *distance, size_t groups, double mean)
+static double degrees_of_freedom(const double *distance, size_t groups, double mean)
 {
 	double n = (double)groups, square = 0;
 	for (size_t g = 0; g < groups; g++)
@@ -112,32 +113,32 @@ static double degrees_of(const double *distance, size_t groups, double mean)
 	return spread > 0 ? fmax(2 * (n - 1) / spread, 1) : 1e9;
 }
 
-static int take_error(struct judge *j, size_t i, struct error *e)
+static int compute_error(struct judge *j, size_t i, struct error *e)
 {
 	struct accuracy_figures *f = &j->out->figures[i];
 	struct canvas_image img;
-	double distance[PLAN_MAX_GROUPS], mean = 0;
-	if (canvas_image(job(j, i)->run.canvas, false, &img, e))
+	double distance[PLAN_GROUPS_MAX], mean = 0;
+	if (canvas_image_init(get_job(j, i)->run.canvas, false, &img, e))
 		return -ENOMEM;
-	weigh(j, img.error);
-	canvas_group_distances(job(j, i)->run.canvas, j->weight, distance);
+	compute_weights(j, img.error);
+	canvas_group_distances(get_job(j, i)->run.canvas, j->weight, distance);
 	for (size_t g = 0; g < j->groups; g++)
 		mean += distance[g] / (double)j->groups;
 	j->rel_mse[i] = mean / (double)(j->groups - 1);
-	j->degrees[i] = mean > 0 ? degrees_of(distance, j->groups, mean) : 1;
-	f->mutations = img.rounds * plan_round_mutations(&job(j, i)->plan);
+	j->degrees[i] = mean > 0 ? degrees_of_freedom(distance, j->groups, mean) : 1;
+	f->mutations = img.rounds * plan_round_mutations(&get_job(j, i)->plan);
 	f->rounds = img.rounds;
-	f->cpu_seconds = job(j, i)->cpu;
-	take_counts(f, &img.counts);
+	f->cpu_seconds = get_job(j, i)->cpu_seconds;
+	compute_rates(f, &img.counts);
 	canvas_image_fini(&img);
 	return 0;
 }
 
-static void take_cost(struct judge *j, size_t i)
+static void compute_cost(struct judge *j, size_t i)
 {
-	struct accuracy_job *b = &j->r->jobs[i];
-	struct interval c = stats_median(b->cost, b->cost_count);
-	j->out->figures[i].cost = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
+	struct accuracy_job *b = &j->run->jobs[i];
+	struct interval c = stats_median(b->costs, b->cost_count);
+	j->out->figures[i].mutation_us = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
 }
 
 /* Converts the errors of all settings to the default's number of mutations, and to its CPU time: errors are inversely
@@ -146,24 +147,26 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 {
 	struct accuracy_judgement *o = j->out;
 	const struct accuracy_figures *d = &o->figures[ACCURACY_DEFAULT];
-	o->at_mutations = d->mutations;
-	o->at_cpu_seconds = 1e-6 * d->cost.value * (double)d->mutations;
-	for (size_t i = 0; i < j->r->design->count; i++) {
+	o->default_mutations = d->mutations;
+	o->default_cpu_seconds = 1e-6 * d->mutation_us.value * (double)d->mutations;
+	for (size_t i = 0; i < j->run->design->count; i++) {
 		struct accuracy_figures *f = &o->figures[i];
 		double sd = sqrt(0.5 / j->degrees[i]), cost_sd = 0;
-		if (f->cost.low > 0)
-			cost_sd = 0.5 * log(f->cost.high / f->cost.low) / (2 * stats_t(LEVEL, 1e9));
-		double at_once = sqrt(j->rel_mse[i] * (double)f->mutations);
-		f->equal_mutations = interval_around(at_once / sqrt((double)o->at_mutations), sd);
-		f->equal_time =
-			interval_around(at_once * sqrt(1e-6 * f->cost.value / o->at_cpu_seconds), hypot(sd, cost_sd));
+		if (f->mutation_us.low > 0)
+			cost_sd = 0.5 * log(f->mutation_us.high / f->mutation_us.low) /
+				  (2 * stats_t_quantile(LEVEL, 1e9));
+		double error_per_root_mutation = sqrt(j->rel_mse[i] * (double)f->mutations);
+		f->equal_mutations = interval_around(error_per_root_mutation / sqrt((double)o->default_mutations), sd);
+		f->equal_time = interval_around(error_per_root_mutation *
+							sqrt(1e-6 * f->mutation_us.value / o->default_cpu_seconds),
+						hypot(sd, cost_sd));
 		points[i].log_error = log(f->equal_time.value);
 		points[i].log_sd = hypot(sd, cost_sd);
 	}
 }
 
 /* Returns the mean of X + Y + Z over a block of an image from a file, which counts as exact. */
-static double block_of(const struct picture *p, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
+static double block_mean(const struct picture *p, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	/* X+Y+Z of Rec. 709's red, green and blue */
 	static const double weight[3] = {0.644463186, 1.191920259, 1.202916555};
@@ -175,95 +178,96 @@ static double block_of(const struct picture *p, uint32_t x0, uint32_t x1, uint32
 	return sum / ((double)(x1 - x0) * (y1 - y0));
 }
 
-static void file_blocks(const struct judge *j, const struct picture *p, double *out)
+static void file_block_means(const struct judge *j, const struct picture *p, double *out)
 {
-	uint32_t w = p->image.width, h = p->image.height, across = j->out->across, down = j->out->down;
+	uint32_t w = p->image.width, h = p->image.height, across = j->out->blocks_across, down = j->out->blocks_down;
 	for (uint32_t k = 0; k < across * down; k++)
-		out[k] = block_of(p, w * (k % across) / across, w * (k % across + 1) / across, h * (k / across) / down,
-				  h * (k / across + 1) / down);
-	out[across * down] = block_of(p, 0, w, 0, h);
+		out[k] = block_mean(p, w * (k % across) / across, w * (k % across + 1) / across,
+				    h * (k / across) / down, h * (k / across + 1) / down);
+	out[across * down] = block_mean(p, 0, w, 0, h);
 }
 
-static void gather(const double *blocks, size_t groups, size_t cells, size_t cell, double *out)
+static void gather_cell(const double *blocks, size_t groups, size_t cells, size_t cell, double *out)
 {
 	for (size_t g = 0; g < groups; g++)
 		out[g] = blocks[g * cells + cell];
 }
 
-static void take_bias(struct judge *j, size_t i, const double *reference, size_t reference_groups,
-		      struct stats_point *point)
+static void compute_bias(struct judge *j, size_t i, const double *reference, size_t reference_groups,
+			 struct stats_point *point)
 {
 	struct accuracy_figures *f = &j->out->figures[i];
-	double a[PLAN_MAX_GROUPS], b[PLAN_MAX_GROUPS], worst = -1;
-	size_t last = (size_t)j->out->across * j->out->down;
-	/* The bias of every setting is tested in the mean of its image and in every block. bias_seen shares the level
-	 * among all these tests: one half among the means, the other among the blocks. */
-	double settings = (double)j->r->design->count, blocks = last > 0 ? (double)last : 1;
+	double a[PLAN_GROUPS_MAX], b[PLAN_GROUPS_MAX], worst = -1;
+	size_t last = (size_t)j->out->blocks_across * j->out->blocks_down;
+	/* The bias of every setting is tested in the mean of its image and in every block. bias_lower_joint shares the
+	 * level among all these tests: one half among the means, the other among the blocks. */
+	double settings = (double)j->run->design->count, blocks = last > 0 ? (double)last : 1;
 	for (size_t c = 0; c < j->cells; c++) {
 		double t;
-		gather(j->blocks + i * j->groups * j->cells, j->groups, j->cells, c, a);
-		gather(reference, reference_groups, j->cells, c, b);
-		double own = c == last ? LEVEL : LEVEL / blocks;
-		struct interval wide = stats_difference(a, j->groups, b, reference_groups, 0.5 * own / settings, &t);
-		struct interval d = stats_difference(a, j->groups, b, reference_groups, own, NULL);
+		gather_cell(j->blocks + i * j->groups * j->cells, j->groups, j->cells, c, a);
+		gather_cell(reference, reference_groups, j->cells, c, b);
+		double cell_level = c == last ? LEVEL : LEVEL / blocks;
+		struct interval joint =
+			stats_relative_difference(a, j->groups, b, reference_groups, 0.5 * cell_level / settings, &t);
+		struct interval d = stats_relative_difference(a, j->groups, b, reference_groups, cell_level, NULL);
 		if (!isfinite(d.value))
 			continue;
-		f->bias_seen = fmax(f->bias_seen, fmax(wide.low, -wide.high));
-		point->bias_suspect = fmax(point->bias_suspect, fmax(d.low, -d.high));
-		f->bias_bound = fmax(f->bias_bound, fmax(d.high, -d.low));
+		f->bias_lower_joint = fmax(f->bias_lower_joint, fmax(joint.low, -joint.high));
+		point->bias_lower_single = fmax(point->bias_lower_single, fmax(d.low, -d.high));
+		f->bias_upper = fmax(f->bias_upper, fmax(d.high, -d.low));
 		if (c == last) {
 			f->bias_mean = d;
 		} else if (fabs(t) > worst) {
 			worst = fabs(t);
-			f->bias_block = d;
-			f->block = (unsigned)c;
+			f->bias_worst_block = d;
+			f->worst_block = (unsigned)c;
 		}
 	}
-	point->other_image = j->r->design->settings[i].other_image;
-	point->bias_seen = f->bias_seen;
-	point->bias_bound = f->bias_bound;
+	point->changes_image = j->run->design->settings[i].changes_image;
+	point->bias_lower_joint = f->bias_lower_joint;
+	point->bias_upper = f->bias_upper;
 }
 
-static void take_biases(struct judge *j, const struct picture *reference, struct stats_point *points)
+static void compute_biases(struct judge *j, const struct picture *reference, struct stats_point *points)
 {
-	const double *from = j->blocks + ACCURACY_REFERENCE * j->groups * j->cells;
-	double file[ACCURACY_CELLS];
-	for (size_t i = 0; i < j->r->design->count; i++)
-		canvas_group_blocks(job(j, i)->run.canvas, j->out->across, j->out->down,
+	const double *reference_blocks = j->blocks + ACCURACY_REFERENCE * j->groups * j->cells;
+	double file[ACCURACY_CELLS_MAX];
+	for (size_t i = 0; i < j->run->design->count; i++)
+		canvas_group_blocks(get_job(j, i)->run.canvas, j->out->blocks_across, j->out->blocks_down,
 				    j->blocks + i * j->groups * j->cells);
 	if (reference)
-		file_blocks(j, reference, file);
-	for (size_t i = 0; i < j->r->design->count; i++)
+		file_block_means(j, reference, file);
+	for (size_t i = 0; i < j->run->design->count; i++)
 		if (reference || i != ACCURACY_REFERENCE)
-			take_bias(j, i, reference ? file : from, reference ? 1 : j->groups, &points[i]);
+			compute_bias(j, i, reference ? file : reference_blocks, reference ? 1 : j->groups, &points[i]);
 }
 
 static int judge_all(struct judge *j, const struct picture *reference, struct error *e)
 {
-	static struct stats_point points[ACCURACY_SETTINGS];
-	static size_t by[ACCURACY_SETTINGS];
-	size_t n = j->r->design->count;
+	static struct stats_point points[ACCURACY_SETTINGS_MAX];
+	static size_t dominated_by[ACCURACY_SETTINGS_MAX];
+	size_t n = j->run->design->count;
 	memset(points, 0, sizeof points);
-	int rc = take_mean(j, e);
+	int rc = compute_mean_image(j, e);
 	for (size_t i = 0; !rc && i < n; i++) {
-		rc = take_error(j, i, e);
-		take_cost(j, i);
+		rc = compute_error(j, i, e);
+		compute_cost(j, i);
 	}
 	if (rc)
 		return rc;
 	scale_errors(j, points);
 	for (size_t i = 0; i < n; i++)
-		j->out->thin |= j->out->figures[i].rounds < 4;
-	j->out->thin |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
-	take_biases(j, reference, points);
+		j->out->is_unreliable |= j->out->figures[i].rounds < 4;
+	j->out->is_unreliable |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
+	compute_biases(j, reference, points);
 	/* The reference is not a candidate for the front, because it is rendered longer. The last setting takes its
 	 * place. */
 	points[ACCURACY_REFERENCE] = points[n - 1];
-	stats_front(points, n - 1, LEVEL, by);
+	stats_front(points, n - 1, LEVEL, dominated_by);
 	for (size_t i = 0; i + 1 < n; i++)
-		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].beaten_by =
-			by[i] == ACCURACY_REFERENCE ? n - 1 : by[i];
-	j->out->figures[ACCURACY_REFERENCE].beaten_by = ACCURACY_REFERENCE;
+		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].dominated_by =
+			dominated_by[i] == ACCURACY_REFERENCE ? n - 1 : dominated_by[i];
+	j->out->figures[ACCURACY_REFERENCE].dominated_by = ACCURACY_REFERENCE;
 	return 0;
 }
 
@@ -273,25 +277,26 @@ int accuracy_judge(const struct accuracy_run *r, const struct picture *reference
 	const struct plan *p = &r->jobs[0].plan;
 	size_t pixels = (size_t)p->crop_width * p->crop_height, n = r->design->count;
 	bool large = p->crop_width >= 32 && p->crop_height >= 24;
-	*out = (struct accuracy_judgement){.across = large ? 4 : 1,
-					   .down = large ? 3 : 1,
-					   .file = reference != NULL,
+	*out = (struct accuracy_judgement){.blocks_across = large ? 4 : 1,
+					   .blocks_down = large ? 3 : 1,
+					   .has_reference_file = reference != NULL,
 					   .width = p->crop_width,
 					   .height = p->crop_height};
-	struct judge j = {.r = r, .out = out, .cells = (size_t)out->across * out->down + 1, .groups = p->groups};
+	struct judge j = {
+		.run = r, .out = out, .cells = (size_t)out->blocks_across * out->blocks_down + 1, .groups = p->groups};
 	out->rgb = mem_alloc(pixels * 3, sizeof *out->rgb);
-	j.mean = mem_alloc(pixels * 3, sizeof *j.mean);
+	j.mean_image = mem_alloc(pixels * 3, sizeof *j.mean_image);
 	j.weight = mem_alloc(pixels * 3, sizeof *j.weight);
-	j.worst = mem_alloc(pixels * 2, sizeof *j.worst);
+	j.pixel_errors = mem_alloc(pixels * 2, sizeof *j.pixel_errors);
 	j.rel_mse = mem_alloc(n, sizeof *j.rel_mse);
 	j.degrees = mem_alloc(n, sizeof *j.degrees);
 	j.blocks = mem_alloc(n * j.groups * j.cells, sizeof *j.blocks);
-	int rc = !out->rgb || !j.mean || !j.weight || !j.worst || !j.rel_mse || !j.degrees || !j.blocks
+	int rc = !out->rgb || !j.mean_image || !j.weight || !j.pixel_errors || !j.rel_mse || !j.degrees || !j.blocks
 			 ? error_set(e, ENOMEM, "no memory for the comparison")
 			 : judge_all(&j, reference, e);
-	mem_free(j.mean);
+	mem_free(j.mean_image);
 	mem_free(j.weight);
-	mem_free(j.worst);
+	mem_free(j.pixel_errors);
 	mem_free(j.rel_mse);
 	mem_free(j.degrees);
 	mem_free(j.blocks);

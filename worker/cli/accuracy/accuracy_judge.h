@@ -7,7 +7,7 @@
 #include "worker/cli/accuracy/accuracy_stats.h"
 #include "worker/cli/image/picture.h"
 
-enum { ACCURACY_CELLS = 17 }; /* room for the blocks of an image, and its mean */
+enum { ACCURACY_CELLS_MAX = 17 }; /* room for the blocks of an image, and its mean */
 
 /* Share of the pixels, those with the largest errors, that is left out: a single one can make up most of the error. */
 #define ACCURACY_TRIM 0.005
@@ -16,27 +16,30 @@ enum { ACCURACY_CELLS = 17 }; /* room for the blocks of an image, and its mean *
 struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;
-	struct interval cost;		 /* microseconds of CPU time per mutation */
+	struct interval mutation_us;	 /* microseconds of CPU time per mutation */
 	double acceptance;		 /* share of accepted mutations */
 	double failed_walks;		 /* share of all walks; NAN: there were none */
-	double rays;			 /* per mutation */
+	double rays_per_mutation;	 /* per mutation */
 	struct interval equal_mutations; /* error after as many mutations as the default's */
 	struct interval equal_time;	 /* error after as much CPU time as the default's */
 	struct interval bias_mean;	 /* of the image's mean, relative to the reference */
-	struct interval bias_block; /* of the block that differs most significantly; 95 % for all blocks together */
-	unsigned block;		    /* which block that is: across + down * blocks_across */
-	double bias_seen;	    /* lower bound of the bias, all settings and blocks tested together; 0: none */
-	double bias_bound;	    /* upper bound of the bias of the mean or of any block */
-	size_t beaten_by; /* index of a better setting (stats_front); its own: it is on the front, or the reference */
+	struct interval
+		bias_worst_block; /* of the block that differs most significantly; 95 % for all blocks together */
+	unsigned worst_block;	  /* which block that is: blocks_across + down * blocks_across */
+	double bias_lower_joint;  /* lower bound of the bias, all settings and blocks tested together; 0: none */
+	double bias_upper;	  /* upper bound of the bias of the mean or of any block */
+	size_t dominated_by; /* index of a better setting (stats_front); its own: it is on the front, or the reference
+			      */
 };
 
 struct accuracy_judgement {
-	unsigned across, down; /* numbers of blocks */
-	uint64_t at_mutations; /* the number of mutations for equal_mutations */
-	double at_cpu_seconds; /* the CPU time for equal_time */
-	bool file;	       /* the reference is the image of a file */
-	bool thin; /* too little was rendered to trust the figures: groups that all missed rare light look exact */
-	struct accuracy_figures figures[ACCURACY_SETTINGS];
+	unsigned blocks_across, blocks_down; /* numbers of blocks */
+	uint64_t default_mutations;	     /* the number of mutations for equal_mutations */
+	double default_cpu_seconds;	     /* the CPU time for equal_time */
+	bool has_reference_file;	     /* the reference is the image of a file */
+	bool is_unreliable; /* too little was rendered to trust the figures: groups that all missed rare light look
+			       exact */
+	struct accuracy_figures figures[ACCURACY_SETTINGS_MAX];
 	uint32_t width, height;
 	float *rgb; /* planes of the report's image: R, G, B */
 };

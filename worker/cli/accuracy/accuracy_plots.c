@@ -26,9 +26,10 @@ static void put_plot(struct text_file *p, const struct plot *plot)
 
 struct points {
 	size_t count;
-	double x[ACCURACY_SETTINGS], y[ACCURACY_SETTINGS], low[ACCURACY_SETTINGS], high[ACCURACY_SETTINGS];
-	char name[ACCURACY_SETTINGS][96];
-	const char *label[ACCURACY_SETTINGS];
+	double x[ACCURACY_SETTINGS_MAX], y[ACCURACY_SETTINGS_MAX], low[ACCURACY_SETTINGS_MAX],
+		high[ACCURACY_SETTINGS_MAX];
+	char names[ACCURACY_SETTINGS_MAX][96];
+	const char *labels[ACCURACY_SETTINGS_MAX];
 };
 
 static void add_point(struct points *to, double x, struct interval y)
@@ -40,7 +41,7 @@ static void add_point(struct points *to, double x, struct interval y)
 	to->high[k] = 100 * y.high;
 }
 
-static struct plot_series series_of(const struct points *p, const char *name)
+static struct plot_series make_series(const struct points *p, const char *name)
 {
 	return (struct plot_series){.name = name,
 				    .style = PLOT_POINTS,
@@ -54,21 +55,21 @@ static struct plot_series series_of(const struct points *p, const char *name)
 void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
 {
 	static struct points error, standard, mean, block;
-	const char *names[ACCURACY_VALUES];
+	const char *names[ACCURACY_VALUES_MAX];
 	const struct accuracy_judgement *j = x->judgement;
 	error.count = standard.count = mean.count = block.count = 0;
 	for (size_t k = 0; k < s->count; k++) {
-		size_t i = s->setting[k];
+		size_t i = s->setting_indices[k];
 		const struct accuracy_figures *f = &j->figures[i];
-		double at = (double)k + 1;
-		names[k] = s->value[k];
-		add_point(i == ACCURACY_DEFAULT ? &standard : &error, at, f->equal_time);
-		add_point(&mean, at - 0.06, f->bias_mean);
-		if (j->across * j->down > 1)
-			add_point(&block, at + 0.06, f->bias_block);
+		double position = (double)k + 1;
+		names[k] = s->values[k];
+		add_point(i == ACCURACY_DEFAULT ? &standard : &error, position, f->equal_time);
+		add_point(&mean, position - 0.06, f->bias_mean);
+		if (j->blocks_across * j->blocks_down > 1)
+			add_point(&block, position + 0.06, f->bias_worst_block);
 	}
-	const struct plot_series errors[2] = {series_of(&error, "sweep"), series_of(&standard, "default")};
-	const struct plot_series biases[2] = {series_of(&mean, "mean"), series_of(&block, "worst block")};
+	const struct plot_series errors[2] = {make_series(&error, "sweep"), make_series(&standard, "default")};
+	const struct plot_series biases[2] = {make_series(&mean, "mean"), make_series(&block, "worst block")};
 	text_file_put(p, "<div class=\"plots\">\n");
 	put_plot(p, &(struct plot){.title = "Error at equal time",
 				   .x_label = s->parameter,
@@ -99,15 +100,15 @@ void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x)
 		const struct accuracy_figures *f = &j->figures[i];
 		if (i == ACCURACY_REFERENCE)
 			continue;
-		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->beaten_by == i ? 1 : 0];
+		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->dominated_by == i ? 1 : 0];
 		size_t k = to->count;
 		add_point(to, 100 * f->equal_time.value, f->bias_mean);
-		accuracy_name(&x->design->settings[i], to->name[k], sizeof to->name[k]);
-		to->label[k] = i != ACCURACY_DEFAULT && f->bias_seen > 0 ? to->name[k] : "";
+		accuracy_setting_name(&x->design->settings[i], to->names[k], sizeof to->names[k]);
+		to->labels[k] = i != ACCURACY_DEFAULT && f->bias_lower_joint > 0 ? to->names[k] : "";
 	}
 	for (int k = 0; k < 3; k++) {
-		s[k] = series_of(&kinds[k], names[k]);
-		s[k].labels = kinds[k].label;
+		s[k] = make_series(&kinds[k], names[k]);
+		s[k].labels = kinds[k].labels;
 	}
 	text_file_put(p, "<div class=\"wide\">\n");
 	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)",

@@ -19,24 +19,26 @@
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
 /* The speed of a short render of the default, from which the lengths of rounds and bootstraps are computed. */
-struct pilot {
-	double bootstrap_sample; /* CPU seconds per sample of the bootstrap */
-	double mutation;	 /* CPU seconds per mutation */
-	double rate;		 /* CPU seconds per second, which is less if other programs use the processors, too */
+struct pilot_speed {
+	double bootstrap_sample_seconds; /* CPU seconds per sample of the bootstrap */
+	double mutation_seconds;	 /* CPU seconds per mutation */
+	double cpu_per_wall_second; /* CPU seconds per second, which is less if other programs use the processors, too
+				     */
 };
 
 static double sum_of_shares(const struct accuracy_design *d)
 {
 	double sum = 0;
 	for (size_t i = 0; i < d->count; i++)
-		sum += d->settings[i].share;
+		sum += d->settings[i].time_share;
 	return sum;
 }
 
 /* Returns the CPU seconds for a setting whose share is 1; 15 % are set aside for bootstraps and worlds. */
-static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
+static double expected_seconds(const struct accuracy_run *r, const struct pilot_speed *pilot)
 {
-	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / sum_of_shares(r->design);
+	return r->setting_seconds > 0 ? r->setting_seconds
+				      : 0.85 * r->seconds * pilot->cpu_per_wall_second / sum_of_shares(r->design);
 }
 
 /* Returns the bytes of available memory. File caches count as available, because they fill most of the memory of a
@@ -60,25 +62,25 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
 	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS *
 			sizeof(int64_t);
-	double there = available_memory();
-	if (wanted < 0.75 * there)
+	double available = available_memory();
+	if (wanted < 0.75 * available)
 		return 0;
 	return error_set(
 		e, ENOMEM,
 		"%zu settings of %ux%u pixels take %.1f GB of memory, and %.1f are available: choose a smaller "
 		"--size, or fewer --parameters",
-		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
+		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, available / 1e9);
 }
 
 /* Makes the plan of setting i. Rounds are short, so that the settings alternate often; the bootstrap takes about a
  * tenth of the time. */
-static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot, struct error *e)
+static int make_plan(struct accuracy_run *r, size_t i, const struct pilot_speed *pilot, struct error *e)
 {
 	enum { ROUNDS = 25 };
 	const struct accuracy_setting *s = &r->design->settings[i];
 	struct plan_request q = r->request;
 	struct plan *p = &r->jobs[i].plan;
-	double each = expected_seconds(r, pilot);
+	double seconds_per_share = expected_seconds(r, pilot);
 	q.max_depth = s->max_depth;
 	memcpy(q.accuracy, s->accuracy, sizeof q.accuracy);
 	memcpy(q.mixture, s->mixture, sizeof q.mixture);
@@ -88,10 +90,12 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	q.target_error = 0;
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
-		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
+		q.bootstrap = (uint64_t)fmin(
+			fmax(0.1 * seconds_per_share / pilot->bootstrap_sample_seconds, PILOT_BOOTSTRAP), 1e6);
 	/* Plans as many chains as a render of this length usually has. With more, each would be short and close to
 	 * where it started, an error that the differences between groups do not show. */
-	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
+	q.mutations =
+		chains && !q.chains ? (uint64_t)fmin(fmax(seconds_per_share / pilot->mutation_seconds, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
 	q.chains = p->chains;
 	q.mutations = 0;
@@ -99,7 +103,9 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 		rc = plan_make(&q, p, e);
 	if (!rc && !r->request.epoch) {
 		double step = chains ? (double)p->chains : (double)p->groups * (double)plan_extended_pixels(p);
-		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / step, chains ? PILOT_EPOCH : 1), 8192);
+		q.epoch = (uint64_t)fmin(
+			fmax(seconds_per_share / ROUNDS / pilot->mutation_seconds / step, chains ? PILOT_EPOCH : 1),
+			8192);
 		rc = plan_make(&q, p, e);
 	}
 	if (!rc && p->groups < 4)
@@ -110,7 +116,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 /* Finds an existing world that can be used with the settings of this job, or makes a new one. */
 static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct error *e)
 {
-	struct render_options options = *r->render;
+	struct render_options options = *r->options;
 	for (size_t k = 0; k < r->world_count; k++) {
 		bool fits;
 		int rc = world_set_accuracy(r->worlds[k], j->plan.accuracy, &fits, e);
@@ -133,7 +139,7 @@ static bool is_stopped(const struct accuracy_run *r)
 	return r->stop && atomic_load(r->stop);
 }
 
-static int start(struct accuracy_run *r, size_t i, struct error *e)
+static int start_setting(struct accuracy_run *r, size_t i, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[i];
 	int rc = find_world(r, j, e);
@@ -141,7 +147,7 @@ static int start(struct accuracy_run *r, size_t i, struct error *e)
 		return rc;
 	j->run = (struct local_run){.world = j->world, .plan = &j->plan, .threads = r->threads, .stop = r->stop};
 	rc = local_start(&j->run, &j->job, e);
-	if (!rc && j->run.lit.black && j->run.canvas)
+	if (!rc && j->run.bootstrap_result.black && j->run.canvas)
 		rc = error_set(e, EINVAL, "the bootstrap found no light: there is nothing to compare");
 	return rc;
 }
@@ -153,15 +159,15 @@ static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 	bool fits;
 	int rc = world_set_accuracy(j->world, j->plan.accuracy, &fits, e);
 	double before = j->run.cpu_seconds;
-	uint64_t rounds = canvas_rounds(j->run.canvas);
+	uint64_t rounds = canvas_complete_rounds(j->run.canvas);
 	if (!rc)
 		rc = local_step(j->job, e);
-	if (rc || canvas_rounds(j->run.canvas) == rounds)
+	if (rc || canvas_complete_rounds(j->run.canvas) == rounds)
 		return rc;
 	double cpu = j->run.cpu_seconds - before;
-	j->cpu += cpu;
-	if (j->cost_count < ACCURACY_COSTS)
-		j->cost[j->cost_count++] = cpu / (double)plan_round_mutations(&j->plan);
+	j->cpu_seconds += cpu;
+	if (j->cost_count < ACCURACY_COSTS_MAX)
+		j->costs[j->cost_count++] = cpu / (double)plan_round_mutations(&j->plan);
 	return 0;
 }
 
@@ -169,7 +175,8 @@ static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 static double share_used(const struct accuracy_run *r, size_t i)
 {
 	const struct accuracy_job *j = &r->jobs[i];
-	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
+	return (r->setting_rounds ? (double)canvas_complete_rounds(j->run.canvas) : j->cpu_seconds) /
+	       r->design->settings[i].time_share;
 }
 
 /* Returns the setting that has used least of its share. */
@@ -182,26 +189,28 @@ static size_t next_setting(const struct accuracy_run *r)
 	return best;
 }
 
-static void show(const struct accuracy_run *r, double fraction, const char *state)
+static void report_progress(const struct accuracy_run *r, double fraction, const char *state)
 {
-	if (r->progress)
-		r->progress(r->user, fraction, state);
+	if (r->on_progress)
+		r->on_progress(r->user, fraction, state);
 }
 
 static int render_rounds(struct accuracy_run *r, double begin, struct error *e)
 {
-	double first = clock_seconds(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
+	double rounds_begin = clock_seconds(),
+	       quota = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
 	for (;;) {
 		size_t i = next_setting(r);
 		double wall = clock_seconds();
-		bool enough = wanted > 0 ? share_used(r, i) >= wanted : wall >= begin + r->seconds;
+		bool enough = quota > 0 ? share_used(r, i) >= quota : wall >= begin + r->seconds;
 		/* Every setting gets at least two rounds, however short the time. */
-		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || is_stopped(r))
+		if ((enough && canvas_complete_rounds(r->jobs[i].run.canvas) >= 2) || is_stopped(r))
 			return 0;
-		show(r,
-		     fmin(wanted > 0 ? share_used(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1),
-			  1),
-		     "rendering");
+		report_progress(r,
+				fmin(quota > 0 ? share_used(r, i) / quota
+					       : (wall - rounds_begin) / fmax(begin + r->seconds - rounds_begin, 1),
+				     1),
+				"rendering");
 		int rc = run_round(r, i, e);
 		if (rc)
 			return rc;
@@ -217,10 +226,10 @@ static void end_job(struct accuracy_job *j)
 }
 
 /* Renders the default briefly, to measure its speed. */
-static int render_pilot(struct accuracy_run *r, struct pilot *pilot, struct error *e)
+static int render_pilot(struct accuracy_run *r, struct pilot_speed *pilot, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
-	*pilot = (struct pilot){1, 1, 1}; /* a speed so low that make_plan chooses the shortest rounds */
+	*pilot = (struct pilot_speed){1, 1, 1}; /* a speed so low that make_plan chooses the shortest rounds */
 	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
 	if (!rc)
 		rc = check_memory(r, &j->plan, e);
@@ -228,13 +237,13 @@ static int render_pilot(struct accuracy_run *r, struct pilot *pilot, struct erro
 		rc = find_world(r, j, e);
 	double begin = clock_seconds();
 	if (!rc)
-		rc = start(r, ACCURACY_DEFAULT, e);
+		rc = start_setting(r, ACCURACY_DEFAULT, e);
 	if (!rc && !is_stopped(r))
 		rc = run_round(r, ACCURACY_DEFAULT, e);
 	if (!rc && j->cost_count > 0) {
-		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
-		pilot->mutation = fmax(j->cost[0], 1e-9);
-		pilot->rate = fmax(j->run.cpu_seconds / fmax(clock_seconds() - begin, 1e-9), 0.05);
+		pilot->bootstrap_sample_seconds = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
+		pilot->mutation_seconds = fmax(j->costs[0], 1e-9);
+		pilot->cpu_per_wall_second = fmax(j->run.cpu_seconds / fmax(clock_seconds() - begin, 1e-9), 0.05);
 	}
 	end_job(j);
 	return rc;
@@ -248,17 +257,17 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 	r->jobs = mem_alloc(d->count, sizeof *r->jobs);
 	if (!r->jobs)
 		return error_set(e, ENOMEM, "no memory for %zu settings", d->count);
-	struct pilot pilot;
-	show(r, 0, "pilot");
+	struct pilot_speed pilot;
+	report_progress(r, 0, "pilot");
 	rc = render_pilot(r, &pilot, e);
 	for (size_t i = 0; !rc && i < d->count; i++)
 		rc = make_plan(r, i, &pilot, e);
 	for (size_t i = 0; !rc && !is_stopped(r) && i < d->count; i++) {
-		show(r, (double)i / (double)d->count, "bootstrap");
-		rc = start(r, i, e);
+		report_progress(r, (double)i / (double)d->count, "bootstrap");
+		rc = start_setting(r, i, e);
 		if (rc) {
 			char name[96];
-			accuracy_name(&d->settings[i], name, sizeof name);
+			accuracy_setting_name(&d->settings[i], name, sizeof name);
 			error_prefix(e, rc, "%s", name);
 		}
 	}
@@ -267,7 +276,7 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 	r->wall_seconds = clock_seconds() - begin;
 	r->interrupted = is_stopped(r);
 	for (size_t i = 0; !rc && i < d->count; i++)
-		if (!r->jobs[i].run.canvas || canvas_rounds(r->jobs[i].run.canvas) < 1)
+		if (!r->jobs[i].run.canvas || canvas_complete_rounds(r->jobs[i].run.canvas) < 1)
 			rc = error_set(e, EINTR, "interrupted before each setting had a round: no report");
 	return rc;
 }

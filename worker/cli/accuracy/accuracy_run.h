@@ -6,7 +6,7 @@
 #include "worker/cli/accuracy/accuracy_design.h"
 #include "worker/cli/render/local.h"
 
-enum { ACCURACY_COSTS = 4096 }; /* rounds of a setting whose cost is kept, at most */
+enum { ACCURACY_COSTS_MAX = 4096 }; /* rounds of a setting whose cost is kept, at most */
 
 /* One setting's rendering. */
 struct accuracy_job {
@@ -15,8 +15,8 @@ struct accuracy_job {
 	struct local_run run;
 	struct local_job *job;
 	size_t cost_count;
-	double cost[ACCURACY_COSTS]; /* CPU seconds per mutation, of each round */
-	double cpu;		     /* CPU seconds of all rounds */
+	double costs[ACCURACY_COSTS_MAX]; /* CPU seconds per mutation, of each round */
+	double cpu_seconds;		  /* CPU seconds of all rounds */
 };
 
 struct accuracy_run {
@@ -25,18 +25,18 @@ struct accuracy_run {
 	struct plan_request request; /* the values that all settings have in common */
 	const struct scene *scene;
 	const struct asset_source *assets;
-	const struct render_options *render;
+	const struct render_options *options;
 	unsigned threads;
 	double seconds;		 /* total wall-clock time */
 	double setting_seconds;	 /* CPU seconds per setting; 0: by wall-clock time */
 	uint64_t setting_rounds; /* rounds per setting, so that everything but times is reproducible; 0: by time */
 	const atomic_bool *stop;
-	void (*progress)(void *user, double fraction, const char *state);
+	void (*on_progress)(void *user, double fraction, const char *state);
 	void *user;
 	/* Set by accuracy_render. */
 	struct accuracy_job *jobs; /* [design->count] */
 	size_t world_count;
-	struct world *worlds[ACCURACY_SETTINGS];
+	struct world *worlds[ACCURACY_SETTINGS_MAX];
 	double wall_seconds;
 	bool interrupted; /* *stop was set */
 };

@@ -26,6 +26,6 @@ struct asset_source guarded_source(struct guarded_source *g, struct asset_source
 	return (struct asset_source){.user = g,
 				     .open = guarded_open,
 				     .close = guarded_close,
-				     .decoded = inner.decoded,
-				     .parsed = inner.parsed};
+				     .picture_cache = inner.picture_cache,
+				     .obj_cache = inner.obj_cache};
 }

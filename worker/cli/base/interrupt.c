@@ -9,7 +9,7 @@
 
 atomic_bool interrupted;
 
-static void interrupt(int signal_number)
+static void on_interrupt(int signal_number)
 {
 	(void)signal_number;
 	atomic_store(&interrupted, true);
@@ -24,7 +24,7 @@ static void handle_hangup(void (*handler)(int), int flags)
 		sigaction(SIGHUP, &act, NULL);
 }
 
-static void handle_first(void (*handler)(int))
+static void handle_termination(void (*handler)(int))
 {
 	struct sigaction act = {.sa_handler = handler, .sa_flags = (int)SA_RESETHAND};
 	sigaction(SIGINT, &act, NULL);
@@ -33,24 +33,24 @@ static void handle_first(void (*handler)(int))
 
 void interrupt_watch(void)
 {
-	handle_first(interrupt);
-	handle_hangup(interrupt, 0);
+	handle_termination(on_interrupt);
+	handle_hangup(on_interrupt, 0);
 }
 
-static const char *_Atomic last_words;
+static const char *_Atomic end_message;
 
-static void say_and_end(int signal_number)
+static void print_and_raise(int signal_number)
 {
-	const char *text = atomic_load(&last_words);
+	const char *text = atomic_load(&end_message);
 	/* SA_RESETHAND has restored the default action, which raise triggers when this handler returns. */
 	if (write(STDERR_FILENO, text, strlen(text)) < 0)
 		_exit(128 + signal_number);
 	raise(signal_number);
 }
 
-void interrupt_say(const char *text)
+void interrupt_set_message(const char *text)
 {
-	atomic_store(&last_words, text);
-	handle_first(say_and_end);
-	handle_hangup(say_and_end, (int)SA_RESETHAND);
+	atomic_store(&end_message, text);
+	handle_termination(print_and_raise);
+	handle_hangup(print_and_raise, (int)SA_RESETHAND);
 }

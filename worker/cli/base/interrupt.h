@@ -12,6 +12,6 @@ extern atomic_bool interrupted;
 void interrupt_watch(void);
 
 /* From now on, such a signal writes the text, which must stay valid, to stderr, and then takes its default action. */
-void interrupt_say(const char *text);
+void interrupt_set_message(const char *text);
 
 #endif

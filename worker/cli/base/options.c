@@ -42,7 +42,7 @@ int option_scene(void *target, size_t index, char *word, struct error *e)
 int option_image(void *target, char *arg, struct error *e)
 {
 	const char *format = picture_name_format(arg);
-	((struct render_arguments *)target)->output = target_of(arg);
+	((struct render_arguments *)target)->output = target_from_arg(arg);
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
 	return error_set(
@@ -78,7 +78,7 @@ int option_define(void *target, char *arg, struct error *e)
 
 struct asset_folders option_folders(const struct render_arguments *a, const char *folder)
 {
-	return asset_folders_of(folder, a->paths, a->path_count);
+	return asset_folders_make(folder, a->paths, a->path_count);
 }
 
 _Static_assert((int)OPTION_PATHS_MAX <= (int)PLAN_PATHS_MAX, "all folders are listed");
@@ -91,7 +91,7 @@ void option_plan_scene(const struct render_arguments *a, struct plan_scene *out)
 		out->paths[i] = a->paths[i];
 }
 
-bool integrator_is_open(const struct plan_request *r)
+bool integrator_is_undecided(const struct plan_request *r)
 {
 	return !*r->integrator || strcmp(r->integrator, RENDER_INTEGRATOR_DEFAULT) == 0;
 }
@@ -111,14 +111,14 @@ static int take_size(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[2] = {0, 0};
-	bool both = strchr(arg, 'x') != NULL;
-	if (!text_counts(arg, "x", n, both ? 2 : 1))
+	bool has_height = strchr(arg, 'x') != NULL;
+	if (!text_parse_counts(arg, "x", n, has_height ? 2 : 1))
 		return error_set(e, EINVAL, "--size takes W or WxH, such as 640x360 or 1.5k, not '%s'", arg);
-	if (n[0] == 0 || (both && n[1] == 0))
+	if (n[0] == 0 || (has_height && n[1] == 0))
 		return error_set(e, EINVAL, "--size takes a film of at least 1x1 pixels");
-	if (n[0] > PLAN_MAX_SIZE || n[1] > PLAN_MAX_SIZE || (uint64_t)n[0] * n[1] > PLAN_MAX_FILM)
+	if (n[0] > PLAN_SIDE_MAX || n[1] > PLAN_SIDE_MAX || (uint64_t)n[0] * n[1] > PLAN_FILM_PIXELS_MAX)
 		return error_set(e, EINVAL, "--size %s: a film has at most %d pixels a side and %d in all", arg,
-				 PLAN_MAX_SIZE, PLAN_MAX_FILM);
+				 PLAN_SIDE_MAX, PLAN_FILM_PIXELS_MAX);
 	a->render.width = n[0];
 	a->render.height = n[1];
 	return 0;
@@ -128,7 +128,7 @@ static int take_crop(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[4];
-	if (!text_counts(arg, ",,,", n, 4))
+	if (!text_parse_counts(arg, ",,,", n, 4))
 		return error_set(e, EINVAL, "--crop takes X,Y,W,H in pixels, such as 0,0,320,360, not '%s'", arg);
 	if (n[2] == 0 || n[3] == 0)
 		return error_set(e, EINVAL, "--crop takes a part of at least 1x1 pixels");
@@ -143,7 +143,7 @@ static int take_mutations(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	bool is_count = *arg >= '0' && *arg <= '9';
-	if (is_count && !text_count(arg, &a->plan.mutations))
+	if (is_count && !text_parse_count(arg, &a->plan.mutations))
 		return error_set(e, EINVAL, "--mutations takes a whole number such as 4000 or 1.5k, not '%s'", arg);
 	if (is_count)
 		return a->plan.mutations ? 0 : error_set(e, EINVAL, "--mutations takes 1 or more");
@@ -161,8 +161,8 @@ static void list_settings(void)
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		char standard[32], range[80];
-		accuracy_settings_value(&accuracy_settings_default, i, standard, sizeof standard);
-		render_setting_range(k, range, sizeof range);
+		accuracy_settings_print_value(&accuracy_settings_default, i, standard, sizeof standard);
+		render_setting_print_range(k, range, sizeof range);
 		printf("%s=%s (%s)\n    %s\n", k->name, standard, range, k->summary);
 	}
 	exit(0);
@@ -170,11 +170,11 @@ static void list_settings(void)
 
 static int add_setting(struct render_arguments *a, const char *text, struct error *e)
 {
-	char all[2 * PLAN_ACCURACY_MAX];
-	int n = snprintf(all, sizeof all, "%s%s%s", a->render.accuracy, *a->render.accuracy ? "," : "", text);
-	if (n < 0 || (size_t)n >= sizeof all)
+	char combined[2 * PLAN_ACCURACY_MAX];
+	int n = snprintf(combined, sizeof combined, "%s%s%s", a->render.accuracy, *a->render.accuracy ? "," : "", text);
+	if (n < 0 || (size_t)n >= sizeof combined)
 		return error_set(e, EINVAL, "--set: the text is too long");
-	int rc = render_settings_canonical(all, a->render.accuracy, e);
+	int rc = accuracy_settings_canonicalize(combined, a->render.accuracy, e);
 	return rc ? error_prefix(e, -EINVAL, "--set") : 0;
 }
 
@@ -207,7 +207,7 @@ static int take_sensor(void *target, char *arg, struct error *e)
 		a->sensor = arg;
 		return 0;
 	}
-	if (!text_counts(arg, "", &n, 1))
+	if (!text_parse_counts(arg, "", &n, 1))
 		return error_set(e, EINVAL, "--sensor takes the number of a sensor or its id, not '%s'", arg);
 	return set_sensor(a, n, e);
 }
@@ -226,7 +226,7 @@ static int find_sensor(const struct scene *s, struct render_arguments *a, struct
 			return set_sensor(a, count, e);
 		if (n->id) {
 			spelling_offer(&spelling, n->id);
-			spelling_list(ids, sizeof ids, n->id);
+			spelling_append_to_list(ids, sizeof ids, n->id);
 		}
 	}
 	return error_set(e, EINVAL,
@@ -255,35 +255,35 @@ static int take_lenient(void *target, char *arg, struct error *e)
 static int take_effects(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
-	return render_effects(arg, a->render.effects, e) ? error_prefix(e, -EINVAL, "--effects") : 0;
+	return render_canonical_effects(arg, a->render.effects, e) ? error_prefix(e, -EINVAL, "--effects") : 0;
 }
 
 /* ---- lists of choices ---- */
 
 static const char *integrator_name(size_t i)
 {
-	const struct render_integrator *r = render_integrator_at(i);
+	const struct integrator_properties *r = render_integrator_at(i);
 	if (r)
 		return r->name;
 	return i == 0 || render_integrator_at(i - 1) ? RENDER_INTEGRATOR_DEFAULT : NULL;
 }
 
-static void more_strategies(char *text, size_t size)
+static void list_strategies(char *text, size_t size)
 {
 	struct text t = {text, size};
 	const char *name, *summary;
 	for (size_t i = 0; (name = render_mutation_at(i, &summary)) != NULL; i++)
-		text_put(&t, "%s%s (%s)", i == 0 ? ". There are " : ", ", name, summary);
+		text_appendf(&t, "%s%s (%s)", i == 0 ? ". There are " : ", ", name, summary);
 }
 
-static void more_settings(char *text, size_t size)
+static void list_setting_defaults(char *text, size_t size)
 {
 	struct text t = {text, size};
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		char standard[32];
-		accuracy_settings_value(&accuracy_settings_default, i, standard, sizeof standard);
-		text_put(&t, "%s%s=%s", i == 0 ? ". There are " : ", ", k->name, standard);
+		accuracy_settings_print_value(&accuracy_settings_default, i, standard, sizeof standard);
+		text_appendf(&t, "%s%s=%s", i == 0 ? ". There are " : ", ", k->name, standard);
 	}
 }
 
@@ -291,62 +291,63 @@ static void more_settings(char *text, size_t size)
 
 #define RENDER struct render_arguments
 
-static const struct option_row what_rows[] = {
+static const struct option_row scene_rows[] = {
 	{"integrator", 'i', "NAME",
 	 "(" RENDER_INTEGRATOR_DEFAULT ": " RENDER_CHOICES_TEXT " or " RENDER_INTEGRATOR_CHAINS
 	 ", chosen by a short pilot); the scene's own is ignored",
-	 OPTION_TAKE(take_integrator), .values = integrator_name},
+	 OPTION_CUSTOM(take_integrator), .values = integrator_name},
 	{"size", 0, "W[xH]",
 	 "Size of the film in pixels, with the scene's field of view; without H also with its aspect ratio",
-	 OPTION_TAKE(take_size)},
-	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_TAKE(take_crop)},
-	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX), .standard = "0"},
+	 OPTION_CUSTOM(take_size)},
+	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_CUSTOM(take_crop)},
+	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX),
+	 .default_value = "0"},
 	{"min-depth", 0, "K", "Length of the shortest paths, in edges (1: emitters seen directly)",
-	 OPTION_COUNT(RENDER, plan.min_depth, 1, PLAN_MAX_DEPTH)},
+	 OPTION_COUNT(RENDER, plan.min_depth, 1, PLAN_DEPTH_MAX)},
 	{"max-depth", 0, "K", "Length of the longest paths, in edges (the scene's)",
-	 OPTION_COUNT(RENDER, plan.max_depth, 1, PLAN_MAX_DEPTH)},
+	 OPTION_COUNT(RENDER, plan.max_depth, 1, PLAN_DEPTH_MAX)},
 	{"set", 0, "NAME=VALUE",
 	 "Settings that trade accuracy for time, separated by commas; may be repeated; --set help describes them",
-	 OPTION_TAKE(take_set), .more = more_settings},
+	 OPTION_CUSTOM(take_set), .append_default = list_setting_defaults},
 	{"effects", 0, "LIST",
 	 "Effects to simulate or omit, whether or not the scene needs them: all, or a list such as -dispersion,+aperture "
 	 "(hslt-render --explain shows them)",
-	 OPTION_TAKE(take_effects)},
-	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(option_define)},
+	 OPTION_CUSTOM(take_effects)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_CUSTOM(option_define)},
 	{"path", 0, "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
-	 OPTION_TAKE(option_path)},
+	 OPTION_CUSTOM(option_path)},
 	{"sensor", 0, "N|ID",
 	 "Sensor of the scene to use: its number, counted from 1 (1), or its id; the same as --set sensor=N",
-	 OPTION_TAKE(take_sensor)},
+	 OPTION_CUSTOM(take_sensor)},
 	{"lenient", 0, NULL,
 	 "Leave out or replace what is not supported, with a note for each; the same as --set lenient=yes",
-	 OPTION_TAKE(take_lenient)},
+	 OPTION_CUSTOM(take_lenient)},
 	{0},
 };
 
-static const struct option_row when_rows[] = {
+static const struct option_row bound_rows[] = {
 	{"spp", 0, "N", "Samples per pixel (64, 1.5k), rounded up to whole rounds",
 	 OPTION_COUNT(RENDER, plan.spp, 1, DBL_MAX)},
 	{"mutations", 0, "N|LIST",
 	 "N: total number of mutations or samples. LIST: the strategies that propose mutations, with weights "
 	 "(1), such as hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once as each",
-	 OPTION_TAKE(take_mutations), .more = more_strategies},
+	 OPTION_CUSTOM(take_mutations), .append_default = list_strategies},
 	{"time", 0, "SECONDS", "Wall-clock time (90, 5m, 2h), checked after complete rounds",
-	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .above = true, .below = true},
+	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .min_excluded = true, .max_excluded = true},
 	{"target-error", 0, "E", "Estimated relative error: 0.02 or 2%", OPTION_RATIO(RENDER, plan.target_error, 0, 1),
-	 .above = true},
+	 .min_excluded = true},
 	{0},
 };
 
 static const struct option_row plan_rows[] = {
 	{"chains", 0, "N", "Markov chains (1024, fewer for short jobs)",
-	 OPTION_COUNT(RENDER, plan.chains, 1, PLAN_MAX_CHAINS)},
+	 OPTION_COUNT(RENDER, plan.chains, 1, PLAN_CHAINS_MAX)},
 	{"groups", 0, "N", "Independent replicates; their spread gives the error (16)",
-	 OPTION_COUNT(RENDER, plan.groups, 1, PLAN_MAX_GROUPS)},
+	 OPTION_COUNT(RENDER, plan.groups, 1, PLAN_GROUPS_MAX)},
 	{"parts", 0, "N", "Leases of a group in a round: at most groups times parts threads work on the job (4)",
-	 OPTION_COUNT(RENDER, plan.parts, 1, PLAN_MAX_PARTS)},
+	 OPTION_COUNT(RENDER, plan.parts, 1, PLAN_PARTS_MAX)},
 	{"bootstrap", 0, "N", "Bootstrap samples (1000000, fewer for short jobs)",
-	 OPTION_COUNT(RENDER, plan.bootstrap, 1, PLAN_MAX_BOOTSTRAP / 2)},
+	 OPTION_COUNT(RENDER, plan.bootstrap, 1, PLAN_BOOTSTRAP_MAX / 2)},
 	{"epoch", 0, "N",
 	 "Mutations per chain, or samples per pixel and group, in a round (on a farm: leases of at most 20 s)",
 	 OPTION_COUNT(RENDER, plan.epoch, 1, DBL_MAX)},
@@ -354,16 +355,16 @@ static const struct option_row plan_rows[] = {
 };
 
 static const struct option_group groups[] = {
-	{"What to render:", what_rows},
-	{"When to stop (at the first bound reached; without any, at the scene's sampleCount):", when_rows},
+	{"What to render:", scene_rows},
+	{"When to stop (at the first bound reached; without any, at the scene's sampleCount):", bound_rows},
 	{"The plan (affects the bits):", plan_rows},
 	{0},
 };
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	struct render_arguments *a = target;
-	const char *name = integrator_is_open(&a->plan) ? RENDER_INTEGRATOR_CHAINS : a->plan.integrator;
+	const char *name = integrator_is_undecided(&a->plan) ? RENDER_INTEGRATOR_CHAINS : a->plan.integrator;
 	a->render.max_depth = a->plan.max_depth;
 	if (a->plan.chains && render_integrator_find(name)->kind != PLAN_CHAINS)
 		return error_set(e, EINVAL, "--chains %u: the integrator %s has no chains that could be counted",
@@ -374,18 +375,18 @@ static int check(void *target, struct error *e)
 	return 0;
 }
 
-const struct option_table render_table = {groups, check};
+const struct option_table render_option_table = {groups, check_options};
 
-/* Checks that the integrator can render everything in the scene. open: the integrator is still to be chosen. */
-static int check_finds(const struct render_integrator *i, const struct render_summary *summary, bool open,
-		       struct error *e)
+/* Checks that the integrator can render everything in the scene. is_undecided: the integrator is still to be chosen. */
+static int check_integrator(const struct integrator_properties *i, const struct render_summary *summary,
+			    bool is_undecided, struct error *e)
 {
-	if (i->from_camera && summary->beams)
+	if (i->only_from_camera && summary->has_beam)
 		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->name);
-	if (!i->from_camera && summary->rolls)
-		return error_set(e, EINVAL, RENDER_NO_ROLL, i->name);
-	if (i->to_emitters && !open && render_effect_on(summary, "medium-light"))
-		return error_set(e, EINVAL, RENDER_NO_GLOW, i->name);
+	if (!i->only_from_camera && summary->has_rolling_shutter)
+		return error_set(e, EINVAL, RENDER_NO_ROLLING_SHUTTER, i->name);
+	if (i->ends_on_emitters && !is_undecided && render_effect_is_on(summary, "medium-light"))
+		return error_set(e, EINVAL, RENDER_NO_MEDIUM_LIGHT, i->name);
 	return 0;
 }
 
@@ -393,17 +394,19 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 {
 	struct plan_request *p = &a->plan;
 	const struct scene_settings *s = &summary->settings;
-	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* options for chains imply chains */
-	if (open)
+	bool is_undecided = integrator_is_undecided(p),
+	     chains = a->mixture || p->chains; /* options for chains imply chains */
+	if (is_undecided)
 		text_copy(p->integrator, sizeof p->integrator,
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
-	if (open && !chains && summary->rolls) { /* only `path` can render it, so nothing is left to choose */
+	if (is_undecided && !chains &&
+	    summary->has_rolling_shutter) { /* only `path` can render it, so nothing is left to choose */
 		text_copy(p->integrator, sizeof p->integrator, "path");
-		open = false;
+		is_undecided = false;
 	}
-	const struct render_integrator *integrator =
-		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
-	int rc = check_finds(integrator, summary, open && !chains, e);
+	const struct integrator_properties *integrator =
+		render_integrator_find(is_undecided ? RENDER_INTEGRATOR_CHAINS : p->integrator);
+	int rc = check_integrator(integrator, summary, is_undecided && !chains, e);
 	if (rc)
 		return rc;
 	p->kind = integrator->kind;
@@ -433,12 +436,12 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 		p->max_depth = summary->useful_depth;
 	if (!plan_request_is_bounded(p))
 		p->spp = s->spp;
-	return integrator->has_mutations ? render_mutations(a->mixture, summary, p->mixture, e) : 0;
+	return integrator->has_mutations ? render_canonical_mutations(a->mixture, summary, p->mixture, e) : 0;
 }
 
 void option_depth_note(const char *integrator, uint32_t max_depth, char *text, size_t size)
 {
-	const struct render_integrator *i = render_integrator_find(integrator);
+	const struct integrator_properties *i = render_integrator_find(integrator);
 	*text = 0;
 	if (i && i->max_depth < max_depth)
 		text_print(
@@ -449,9 +452,9 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 }
 
 /* Sets the error for a scene file that does not exist, with the nearest name in its folder. */
-static int no_scene(const char *path, const char *folder, const char *name, struct error *e)
+static int missing_scene_error(const char *path, const char *folder, const char *name, struct error *e)
 {
-	struct spelling near = {.wanted = name};
+	struct spelling suggestion = {.wanted = name};
 	struct dirent *entry;
 	char hint[512] = "";
 	struct stat link;
@@ -459,10 +462,10 @@ static int no_scene(const char *path, const char *folder, const char *name, stru
 		return error_set(e, ENOENT, "%s: a link to a file that is not there", path);
 	DIR *d = opendir(folder);
 	while (d && (entry = readdir(d)))
-		spelling_offer(&near, entry->d_name);
+		spelling_offer(&suggestion, entry->d_name);
 	if (d)
 		closedir(d);
-	return error_set(e, ENOENT, "%s: no such file%s", path, spelling_hint(&near, hint, sizeof hint));
+	return error_set(e, ENOENT, "%s: no such file%s", path, spelling_hint(&suggestion, hint, sizeof hint));
 }
 
 int scene_path_split(const char *path, const struct render_arguments *a, char **folder, char **name, struct error *e)
@@ -477,7 +480,7 @@ int scene_path_split(const char *path, const struct render_arguments *a, char **
 		rc = error_set(e, EINVAL,
 			       *path ? "%s is a folder, not a scene file" : "the name of the scene is empty%s", path);
 	if (!rc && !a->path_count && access(path, F_OK) && errno == ENOENT)
-		rc = no_scene(path, *folder, *name, e);
+		rc = missing_scene_error(path, *folder, *name, e);
 	if (rc) {
 		mem_free(*folder);
 		mem_free(*name);

@@ -22,11 +22,11 @@ struct render_arguments {
 	const char *sensor;  /* the id of --sensor ID; NULL: not given, or stored as a number in the settings */
 };
 
-extern const struct option_table render_table; /* fills a struct render_arguments */
+extern const struct option_table render_option_table; /* fills a struct render_arguments */
 
 /* Returns whether the integrator is still to be chosen. choice_make (worker/cli/render/choice.h) chooses it, after
  * render_plan_from_scene. */
-bool integrator_is_open(const struct plan_request *r);
+bool integrator_is_undecided(const struct plan_request *r);
 
 /* Fills in the values that the options have left to the scene: film, depth, samples, mixture of mutations. Returns
  * -EINVAL, a usage error, if the given mixture is invalid or the integrator cannot render this scene. */
@@ -51,7 +51,7 @@ int option_scene(void *target, size_t index, char *word, struct error *e);
 int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,
 		      struct error *e);
 
-/* Lists -D and --path for plan_options_with; *out points to the texts of the arguments. */
+/* Lists -D and --path for plan_print_options_with_scene; *out points to the texts of the arguments. */
 void option_plan_scene(const struct render_arguments *a, struct plan_scene *out);
 
 /* Returns the folders in which the scene's files are searched: its own, then those of --path. */

@@ -11,7 +11,7 @@
 
 struct text_file {
 	struct buf text;
-	bool full; /* memory was out, or a line too long: text_file_write will fail */
+	bool has_failed; /* memory was out, or a line too long: text_file_write will fail */
 };
 
 __attribute__((format(printf, 2, 3))) void text_file_put(struct text_file *p, const char *format, ...);
@@ -27,6 +27,6 @@ int text_file_write(const struct text_file *p, const char *path, struct error *e
 void text_file_fini(struct text_file *p);
 
 /* Returns the bytes of the character at `at`, if it is valid UTF-8 and allowed in XML; otherwise 0. */
-size_t text_file_character(const char *at);
+size_t text_file_character_length(const char *at);
 
 #endif

@@ -15,7 +15,7 @@
 /* Reads the crops and returns the EXR file of the rectangle that they cover; *bytes is freed with mem_free. *disagree:
  * the chains of some crop disagree. Returns -EINVAL if crops overlap, leave out pixels, or are not of the same render
  * (film, layers, version, scene, integrator, depths, --set, --effects). */
-int assemble(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree,
-	     struct error *e);
+int assemble_crops(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree,
+		   struct error *e);
 
 #endif

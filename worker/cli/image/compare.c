@@ -12,12 +12,12 @@ struct pixel_error {
 	double relative, squared; /* means over the channels */
 };
 
-static size_t pixels_of(const struct picture *p)
+static size_t pixel_count(const struct picture *p)
 {
 	return (size_t)p->image.width * p->image.height;
 }
 
-static int check(const struct picture *a, const struct picture *b, struct error *e)
+static int check_comparable(const struct picture *a, const struct picture *b, struct error *e)
 {
 	const struct exr_image *i = &a->image, *j = &b->image;
 	if (i->width != j->width || i->height != j->height)
@@ -25,14 +25,14 @@ static int check(const struct picture *a, const struct picture *b, struct error 
 				 "the images have %ux%u and %ux%u pixels; --size WxH averages both to one size",
 				 i->width, i->height, j->width, j->height);
 	for (int k = 0; k < 3; k++)
-		for (size_t p = 0; p < pixels_of(b); p++)
+		for (size_t p = 0; p < pixel_count(b); p++)
 			if (!isfinite(b->rgb[k][p]))
 				return error_set(e, EINVAL, "the reference is not finite at pixel %zu,%zu",
 						 p % j->width, p / j->width);
 	return 0;
 }
 
-static double mean(const float *plane, size_t n)
+static double plane_mean(const float *plane, size_t n)
 {
 	double sum = 0;
 	for (size_t i = 0; i < n; i++)
@@ -41,29 +41,31 @@ static double mean(const float *plane, size_t n)
 }
 
 /* Returns (0.01 m)^2, m the mean of the reference, which keeps relative errors of black pixels finite. */
-static double floor_of(const struct picture *b)
+static double denominator_floor(const struct picture *b)
 {
 	double sum = 0;
 	for (int k = 0; k < 3; k++)
-		sum += mean(b->rgb[k], pixels_of(b));
+		sum += plane_mean(b->rgb[k], pixel_count(b));
 	return sum / 300 * (sum / 300);
 }
 
-static struct pixel_error error_at(const struct picture *a, const struct picture *b, size_t i, double least)
+static struct pixel_error compute_pixel_error(const struct picture *a, const struct picture *b, size_t i,
+					      double min_denominator)
 {
 	struct pixel_error r = {0, 0};
 	for (int k = 0; k < 3; k++) {
 		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
 		r.squared += d * d / 3;
-		r.relative +=
-			d == 0 ? 0 : d * d / (reference * reference + least) / 3; /* avoids 0 / 0 for a black image */
+		r.relative += d == 0 ? 0
+				     : d * d / (reference * reference + min_denominator) /
+					       3; /* avoids 0 / 0 for a black image */
 	}
 	if (!isfinite(r.squared))
 		r = (struct pixel_error){INFINITY, INFINITY};
 	return r;
 }
 
-static int worst_first(const void *p, const void *q)
+static int compare_worst_first(const void *p, const void *q)
 {
 	const struct pixel_error *a = p, *b = q;
 	if (a->relative != b->relative)
@@ -71,62 +73,63 @@ static int worst_first(const void *p, const void *q)
 	return a->squared == b->squared ? 0 : a->squared > b->squared ? -1 : 1;
 }
 
-static int ascending(const void *p, const void *q)
+static int compare_floats(const void *p, const void *q)
 {
 	float a = *(const float *)p, b = *(const float *)q;
 	return a < b ? -1 : a > b;
 }
 
 /* Computes a percentile of all values of the three channels, by nearest rank. */
-static int percentile(const struct picture *b, double share, double *value, struct error *e)
+static int percentile(const struct picture *b, double fraction, double *value, struct error *e)
 {
-	size_t n = pixels_of(b);
-	float *all = mem_alloc(n, 3 * sizeof *all);
-	if (!all)
+	size_t n = pixel_count(b);
+	float *values = mem_alloc(n, 3 * sizeof *values);
+	if (!values)
 		return error_set(e, ENOMEM, "no memory to sort %zu pixels", n);
 	for (size_t k = 0; k < 3; k++)
 		for (size_t i = 0; i < n; i++)
-			all[k * n + i] = b->rgb[k][i];
-	qsort(all, n * 3, sizeof *all, ascending);
-	*value = (double)all[(size_t)ceil(share * (double)(n * 3)) - 1];
-	mem_free(all);
+			values[k * n + i] = b->rgb[k][i];
+	qsort(values, n * 3, sizeof *values, compare_floats);
+	*value = (double)values[(size_t)ceil(fraction * (double)(n * 3)) - 1];
+	mem_free(values);
 	return 0;
 }
 
-static int errors(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
-		  struct error *e)
+static int compute_errors(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
+			  struct error *e)
 {
-	size_t n = pixels_of(a);
-	double least = floor_of(b), relative = 0, squared = 0;
+	size_t n = pixel_count(a);
+	double min_denominator = denominator_floor(b), relative = 0, squared = 0;
 	struct pixel_error *pixel = mem_alloc(n, sizeof *pixel);
 	if (!pixel)
 		return error_set(e, ENOMEM, "no memory for the errors of %zu pixels", n);
 	for (size_t i = 0; i < n; i++) {
-		pixel[i] = error_at(a, b, i, least);
+		pixel[i] = compute_pixel_error(a, b, i, min_denominator);
 		r->not_finite += isinf(pixel[i].squared) != 0;
 	}
 	r->pixels = n;
-	r->left_out = (size_t)(trim * (double)n * (1 + 4 * DBL_EPSILON));
-	if (r->left_out)
-		qsort(pixel, n, sizeof *pixel, worst_first);
-	for (size_t i = r->left_out; i < n; i++) {
+	r->trimmed = (size_t)(trim * (double)n * (1 + 4 * DBL_EPSILON));
+	if (r->trimmed)
+		qsort(pixel, n, sizeof *pixel, compare_worst_first);
+	for (size_t i = r->trimmed; i < n; i++) {
 		relative += pixel[i].relative;
 		squared += pixel[i].squared;
 	}
 	mem_free(pixel);
-	double kept = (double)(n - r->left_out);
-	r->rel_mse = relative / kept;
+	double kept_count = (double)(n - r->trimmed);
+	r->rel_mse = relative / kept_count;
 	r->relative_error = sqrt(r->rel_mse);
-	r->rmse = sqrt(squared / kept);
+	r->rmse = sqrt(squared / kept_count);
 	return 0;
 }
 
-int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e)
+int compare_to_reference(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
+			 struct error *e)
 {
 	*r = (struct compare_result){0};
-	int rc = check(a, b, e);
+	int rc = check_comparable(a, b, e);
 	if (rc == 0)
-		rc = errors(a, b, trim, r, e);
+		rc = compute_errors(a, b, trim, r, e);
 	if (rc == 0)
 		rc = percentile(b, 0.995, &r->peak, e);
 	if (rc)
@@ -135,8 +138,8 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 	if (r->rmse == 0)
 		r->psnr = INFINITY;
 	for (int k = 0; k < 3; k++) {
-		r->mean_a[k] = mean(a->rgb[k], r->pixels);
-		r->mean_b[k] = mean(b->rgb[k], r->pixels);
+		r->mean_a[k] = plane_mean(a->rgb[k], r->pixels);
+		r->mean_b[k] = plane_mean(b->rgb[k], r->pixels);
 		r->ratio[k] = r->mean_a[k] / r->mean_b[k];
 	}
 	r->luminance_ratio = rec709_luminance(r->mean_a) / rec709_luminance(r->mean_b);
@@ -144,28 +147,28 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 }
 
 /* Returns the colour for t in [0,1]. */
-static void heat(double t, unsigned char rgb[3])
+static void heat_colour(double t, unsigned char rgb[3])
 {
 	static const double stops[6][3] = {{0, 0, 0},	   {70, 0, 110},   {190, 20, 60},
 					   {245, 110, 10}, {255, 215, 70}, {255, 255, 255}};
-	double at = t < 0 ? 0 : t > 1 ? 5 : t * 5;
-	size_t i = at < 4 ? (size_t)at : 4;
+	double position = t < 0 ? 0 : t > 1 ? 5 : t * 5;
+	size_t i = position < 4 ? (size_t)position : 4;
 	for (int k = 0; k < 3; k++)
-		rgb[k] = (unsigned char)(stops[i][k] + (stops[i + 1][k] - stops[i][k]) * (at - (double)i) + 0.5);
+		rgb[k] = (unsigned char)(stops[i][k] + (stops[i + 1][k] - stops[i][k]) * (position - (double)i) + 0.5);
 }
 
 int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e)
 {
-	int rc = check(a, b, e);
+	int rc = check_comparable(a, b, e);
 	if (rc)
 		return rc;
-	double least = floor_of(b);
-	for (size_t i = 0; i < pixels_of(a); i++) {
-		struct pixel_error p = error_at(a, b, i, least);
+	double min_denominator = denominator_floor(b);
+	for (size_t i = 0; i < pixel_count(a); i++) {
+		struct pixel_error p = compute_pixel_error(a, b, i, min_denominator);
 		if (isinf(p.squared))
 			rgb[i * 3] = 0, rgb[i * 3 + 1] = rgb[i * 3 + 2] = 255;
 		else
-			heat((log10(sqrt(p.relative)) + 3) / 3, rgb + i * 3);
+			heat_colour((log10(sqrt(p.relative)) + 3) / 3, rgb + i * 3);
 	}
 	return 0;
 }

@@ -16,12 +16,13 @@ struct compare_result {
 	double rel_mse, relative_error, rmse; /* relative_error: square root of rel_mse */
 	double psnr, peak; /* dB, infinite for equal images; 99.5th percentile of B's values, the peak of the PSNR */
 	double mean_a[3], mean_b[3], ratio[3], luminance_ratio; /* ratios of A to B */
-	size_t pixels, left_out, not_finite; /* pixels in all; omitted; of A with values that are not finite */
+	size_t pixels, trimmed, not_finite; /* pixels in all; omitted; of A with values that are not finite */
 };
 
 /* Compares two images of equal size. trim: the share of pixels to omit, in [0,1). Returns -EINVAL if the sizes differ
  * or a value of B is not finite, or -ENOMEM. */
-int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e);
+int compare_to_reference(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
+			 struct error *e);
 
 /* Shows the relative error of each pixel as a colour, from black (0.1 %) through violet, red and orange to white
  * (100 %), and cyan if it is not finite. rgb: 3 bytes per pixel. Errors as for compare. */

@@ -8,8 +8,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Compares every channel of every pixel, the windows, and all attributes but those of header_excluded. Returns false if
- * they differ, and describes the first difference in `why`. */
+/* Compares every channel of every pixel, the windows, and all attributes but those of header_is_excluded. Returns false
+ * if they differ, and describes the first difference in `why`. */
 bool compare_exact(const struct exr_image *a, const struct exr_image *b, char *why, size_t why_size);
 
 #endif

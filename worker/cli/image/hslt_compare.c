@@ -22,18 +22,18 @@
 #include <string.h>
 
 struct arguments {
-	const char *path[2], *heatmap;
-	double trim, most;	/* most: --max-relmse; negative: not given */
-	uint32_t width, height; /* --size; 0: not given */
+	const char *paths[2], *heatmap;
+	double trim, max_rel_mse; /* max_rel_mse: --max-relmse; negative: not given */
+	uint32_t width, height;	  /* --size; 0: not given */
 	bool exact, json;
-	int dashes; /* number of images from stdin */
+	int stdin_count; /* number of images from stdin */
 };
 
 static int take_size(void *target, char *arg, struct error *e)
 {
 	struct arguments *a = target;
 	uint32_t n[2];
-	if (!text_counts(arg, "x", n, 2) || !n[0] || !n[1])
+	if (!text_parse_counts(arg, "x", n, 2) || !n[0] || !n[1])
 		return error_set(e, EINVAL, "--size takes WxH, not '%s'", arg);
 	a->width = n[0];
 	a->height = n[1];
@@ -43,11 +43,12 @@ static int take_size(void *target, char *arg, struct error *e)
 static const struct option_row rows[] = {
 	{"exact", 0, NULL, "Only check whether all bits are equal", OPTION_FLAG(struct arguments, exact)},
 	{"trim", 0, "F", "Omit the worst share F of the pixels: 0.001 or 0.1%",
-	 OPTION_RATIO(struct arguments, trim, 0, 1), .below = true},
-	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_TAKE(take_size)},
+	 OPTION_RATIO(struct arguments, trim, 0, 1), .max_excluded = true},
+	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_CUSTOM(take_size)},
 	{"heatmap", 0, "FILE.png", "Write relative errors as colours, from black (0.1 %) to white (100 %)",
 	 OPTION_TEXT(struct arguments, heatmap)},
-	{"max-relmse", 0, "X", "Fail when the relMSE is above X", OPTION_NUMBER(struct arguments, most, 0, DBL_MAX)},
+	{"max-relmse", 0, "X", "Fail when the relMSE is above X",
+	 OPTION_NUMBER(struct arguments, max_rel_mse, 0, DBL_MAX)},
 	{"json", 0, NULL, "Print one JSON object", OPTION_FLAG(struct arguments, json)},
 	{0},
 };
@@ -58,32 +59,32 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	if (index > 1)
 		return error_set(e, EINVAL, "only two images can be compared");
 	bool dash = strcmp(word, "-") == 0;
-	a->path[index] = dash ? "/dev/stdin" : word;
-	a->dashes += dash;
-	return a->dashes < 2 ? 0 : error_set(e, EINVAL, "only one image can come from stdin");
+	a->paths[index] = dash ? "/dev/stdin" : word;
+	a->stdin_count += dash;
+	return a->stdin_count < 2 ? 0 : error_set(e, EINVAL, "only one image can come from stdin");
 }
 
-static struct output_files outputs_of(const struct arguments *a)
+static struct output_files list_outputs(const struct arguments *a)
 {
 	return (struct output_files){{{"--heatmap", a->heatmap, OUTPUT_PNG}}};
 }
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	if (!a->path[1])
+	if (!a->paths[1])
 		return error_set(e, EINVAL, "A.exr and B.exr are needed");
-	if (a->heatmap && strcmp(target_of(a->heatmap), TARGET_STDOUT) == 0)
+	if (a->heatmap && strcmp(target_from_arg(a->heatmap), TARGET_STDOUT) == 0)
 		return error_set(e, EINVAL, "--heatmap takes the name of a file: the figures go to stdout");
-	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
+	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->max_rel_mse >= 0))
 		return error_set(e, EINVAL, "--exact can only be combined with --json");
-	struct output_files outputs = outputs_of(a);
+	struct output_files outputs = list_outputs(a);
 	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
 	.name = "hslt-compare",
-	.words = "A.exr B.exr",
+	.synopsis = "A.exr B.exr",
 	.summary = "Measures the difference of image A from reference B: EXR files with the channels R, G, B.",
 	.examples = "hslt-compare noisy.exr reference.exr\n"
 		    "hslt-compare --trim 0.001 --max-relmse 0.01 noisy.exr reference.exr\n"
@@ -94,9 +95,9 @@ static const struct program program = {
 		"square root; PSNR takes the 99.5th percentile of B as peak. --trim omits the worst pixels from relMSE, "
 		"RMSE and PSNR, not from the means.\n--exact compares every channel and the header, except for "
 		"hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end, hslt:sceneHash and hslt:date. - is stdin.",
-	.exits = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
-	.word = take_word,
+	.exit_codes = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.parse_word = take_word,
 };
 
 static void print_json(json_t *o)
@@ -107,33 +108,34 @@ static void print_json(json_t *o)
 }
 
 /* Returns a JSON number; null for infinity and NaN, which JSON does not have. */
-static json_t *json_of(double x)
+static json_t *number_to_json(double x)
 {
 	return isfinite(x) ? json_real(x) : json_null();
 }
 
-static json_t *json_of_text(const char *s)
+static json_t *text_to_json(const char *s)
 {
 	json_t *t = json_string(s);
 	return t ? t : json_string("(not UTF-8)");
 }
 
-static json_t *json_of_three(const double x[3])
+static json_t *triple_to_json(const double x[3])
 {
-	return json_pack("[o,o,o]", json_of(x[0]), json_of(x[1]), json_of(x[2]));
+	return json_pack("[o,o,o]", number_to_json(x[0]), number_to_json(x[1]), number_to_json(x[2]));
 }
 
 static void print_figures(const struct arguments *a, const struct compare_result *r)
 {
 	if (a->json) {
 		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1,
-				     "a", json_of_text(a->path[0]), "b", json_of_text(a->path[1]), "relMSE",
-				     json_of(r->rel_mse), "relativeError", json_of(r->relative_error), "rmse",
-				     json_of(r->rmse), "psnr", json_of(r->psnr), "peak", json_of(r->peak), "meanA",
-				     json_of_three(r->mean_a), "meanB", json_of_three(r->mean_b), "meanRatio",
-				     json_of_three(r->ratio), "luminanceRatio", json_of(r->luminance_ratio), "pixels",
-				     (json_int_t)r->pixels, "leftOut", (json_int_t)r->left_out, "notFinite",
-				     (json_int_t)r->not_finite, "relMSEDefinition", REL_MSE_DEFINITION));
+				     "a", text_to_json(a->paths[0]), "b", text_to_json(a->paths[1]), "relMSE",
+				     number_to_json(r->rel_mse), "relativeError", number_to_json(r->relative_error),
+				     "rmse", number_to_json(r->rmse), "psnr", number_to_json(r->psnr), "peak",
+				     number_to_json(r->peak), "meanA", triple_to_json(r->mean_a), "meanB",
+				     triple_to_json(r->mean_b), "meanRatio", triple_to_json(r->ratio), "luminanceRatio",
+				     number_to_json(r->luminance_ratio), "pixels", (json_int_t)r->pixels, "leftOut",
+				     (json_int_t)r->trimmed, "notFinite", (json_int_t)r->not_finite, "relMSEDefinition",
+				     REL_MSE_DEFINITION));
 		return;
 	}
 	printf("relMSE          %.6g (" REL_MSE_DEFINITION ")\n", r->rel_mse);
@@ -142,19 +144,19 @@ static void print_figures(const struct arguments *a, const struct compare_result
 	printf("PSNR            %.2f dB (peak %.6g)\n", r->psnr, r->peak);
 	printf("mean A/B        R %.6f  G %.6f  B %.6f  luminance %.6f\n", r->ratio[0], r->ratio[1], r->ratio[2],
 	       r->luminance_ratio);
-	if (r->left_out)
-		printf("left out        %zu of %zu pixels\n", r->left_out, r->pixels);
+	if (r->trimmed)
+		printf("left out        %zu of %zu pixels\n", r->trimmed, r->pixels);
 	if (r->not_finite)
 		printf("not finite      %zu pixels of A\n", r->not_finite);
 }
 
-static int run_exact(const struct arguments *a, const struct picture *p, int *code)
+static int compare_bits(const struct arguments *a, const struct picture *p, int *code)
 {
 	char why[1024];
 	bool equal = compare_exact(&p[0].image, &p[1].image, why, sizeof why);
 	if (a->json)
-		print_json(json_pack("{s:i s:o s:o s:b s:o}", "schema", 1, "a", json_of_text(a->path[0]), "b",
-				     json_of_text(a->path[1]), "equal", equal, "difference", json_of_text(why)));
+		print_json(json_pack("{s:i s:o s:o s:b s:o}", "schema", 1, "a", text_to_json(a->paths[0]), "b",
+				     text_to_json(a->paths[1]), "equal", equal, "difference", text_to_json(why)));
 	else
 		printf("%s%s\n", equal ? "equal" : "different: ", why);
 	*code = !equal;
@@ -172,7 +174,7 @@ static int write_heatmap(const char *path, const struct picture *p, struct error
 	return rc;
 }
 
-static int run_figures(const struct arguments *a, struct picture *p, int *code, struct error *e)
+static int compare_figures(const struct arguments *a, struct picture *p, int *code, struct error *e)
 {
 	struct compare_result r;
 	const struct exr_image *i = &p[0].image, *j = &p[1].image;
@@ -182,16 +184,16 @@ static int run_figures(const struct arguments *a, struct picture *p, int *code, 
 	int rc = 0;
 	for (int k = 0; rc == 0 && a->width && k < 2; k++)
 		if ((rc = picture_shrink(&p[k], a->width, a->height, e)) != 0)
-			error_prefix(e, rc, "%s", a->path[k]);
+			error_prefix(e, rc, "%s", a->paths[k]);
 	if (rc == 0)
-		rc = compare(&p[0], &p[1], a->trim, &r, e);
+		rc = compare_to_reference(&p[0], &p[1], a->trim, &r, e);
 	if (rc == 0 && a->heatmap)
 		rc = write_heatmap(a->heatmap, p, e);
 	if (rc)
 		return rc;
 	print_figures(a, &r);
-	if (a->most >= 0 && !(r.rel_mse <= a->most)) {
-		fprintf(stderr, "hslt-compare: the relMSE is %.6g, above %.6g\n", r.rel_mse, a->most);
+	if (a->max_rel_mse >= 0 && !(r.rel_mse <= a->max_rel_mse)) {
+		fprintf(stderr, "hslt-compare: the relMSE is %.6g, above %.6g\n", r.rel_mse, a->max_rel_mse);
 		*code = 1;
 	}
 	return 0;
@@ -199,19 +201,19 @@ static int run_figures(const struct arguments *a, struct picture *p, int *code, 
 
 int main(int argc, char **argv)
 {
-	struct arguments a = {.most = -1};
+	struct arguments a = {.max_rel_mse = -1};
 	struct picture p[2] = {0};
 	struct error e;
 	int code = 0;
-	program_options(&program, argc, argv, &a);
-	struct output_files outputs = outputs_of(&a);
-	int rc = output_files_check(&outputs, a.path, 2, &e);
+	program_parse_options(&program, argc, argv, &a);
+	struct output_files outputs = list_outputs(&a);
+	int rc = output_files_check(&outputs, a.paths, 2, &e);
 	if (rc == 0)
-		rc = picture_read(&p[0], a.path[0], &e);
+		rc = picture_read(&p[0], a.paths[0], &e);
 	if (rc == 0)
-		rc = picture_read(&p[1], a.path[1], &e);
+		rc = picture_read(&p[1], a.paths[1], &e);
 	if (rc == 0)
-		rc = a.exact ? run_exact(&a, p, &code) : run_figures(&a, p, &code, &e);
+		rc = a.exact ? compare_bits(&a, p, &code) : compare_figures(&a, p, &code, &e);
 	picture_fini(&p[0]);
 	picture_fini(&p[1]);
 	if (rc)

@@ -10,13 +10,13 @@
 #include <string.h>
 
 struct arguments {
-	const char *in, *out;
+	const char *input, *output;
 	double stops;
 };
 
 static const struct option_row rows[] = {
 	{"exposure", 'e', "STOPS", "Exposure in stops: each doubles the brightness",
-	 OPTION_NUMBER(struct arguments, stops, -100, 100), .standard = "0"},
+	 OPTION_NUMBER(struct arguments, stops, -100, 100), .default_value = "0"},
 	{0},
 };
 
@@ -27,59 +27,59 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 		return error_set(e, EINVAL, "only two files are accepted");
 	bool dash = strcmp(word, "-") == 0;
 	if (index == 0)
-		a->in = dash ? "/dev/stdin" : word;
+		a->input = dash ? "/dev/stdin" : word;
 	else
-		a->out = target_of(word);
+		a->output = target_from_arg(word);
 	return 0;
 }
 
-static struct output_files outputs_of(const struct arguments *a)
+static struct output_files list_outputs(const struct arguments *a)
 {
-	return (struct output_files){{{"the output", a->out, OUTPUT_PNG}}};
+	return (struct output_files){{{"the output", a->output, OUTPUT_PNG}}};
 }
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	struct output_files outputs = outputs_of(a);
-	if (!a->out)
+	struct output_files outputs = list_outputs(a);
+	if (!a->output)
 		return error_set(e, EINVAL, "IN.exr and OUT.png are needed");
 	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
 	.name = "hslt-tonemap",
-	.words = "IN.exr OUT.png",
+	.synopsis = "IN.exr OUT.png",
 	.summary = "Converts the channels R, G, B of an EXR file to a PNG file of 8-bit sRGB.",
 	.examples = "hslt-tonemap room.exr room.png\n"
 		    "hslt-tonemap --exposure -1.5 room.exr darker.png\n"
 		    "hslt-render room.xml -o - | hslt-tonemap - room.png",
 	.details = "Values are multiplied by 2^STOPS and clipped to [0,1]. NaN becomes 0, infinities become 0 or "
 		   "255; both are counted on stderr. - is stdin or stdout.",
-	.exits = "0 done, 1 failed, 2 usage",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
-	.word = take_word,
+	.exit_codes = "0 done, 1 failed, 2 usage",
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.parse_word = take_word,
 };
 
 static int tonemap_file(const struct arguments *a, struct error *e)
 {
 	struct picture p;
-	struct output_files outputs = outputs_of(a);
-	int rc = output_files_check(&outputs, &a->in, 1, e);
+	struct output_files outputs = list_outputs(a);
+	int rc = output_files_check(&outputs, &a->input, 1, e);
 	if (!rc)
-		rc = picture_read(&p, a->in, e);
+		rc = picture_read(&p, a->input, e);
 	if (rc)
 		return rc;
 	size_t pixels = (size_t)p.image.width * p.image.height;
 	unsigned char *bytes = mem_alloc(pixels, 3);
 	if (bytes) {
-		struct tonemap_counts n = tonemap(p.rgb, pixels, a->stops, bytes);
+		struct tonemap_counts n = tonemap_image(p.rgb, pixels, a->stops, bytes);
 		if (n.nan || n.infinite)
-			fprintf(stderr, "hslt-tonemap: %s: %zu values are not numbers, %zu are infinite\n", a->in,
+			fprintf(stderr, "hslt-tonemap: %s: %zu values are not numbers, %zu are infinite\n", a->input,
 				n.nan, n.infinite);
-		rc = picture_write_png(a->out, bytes, p.image.width, p.image.height, e);
+		rc = picture_write_png(a->output, bytes, p.image.width, p.image.height, e);
 	} else {
-		rc = error_set(e, ENOMEM, "%s: no memory for %zu pixels", a->in, pixels);
+		rc = error_set(e, ENOMEM, "%s: no memory for %zu pixels", a->input, pixels);
 	}
 	mem_free(bytes);
 	picture_fini(&p);
@@ -90,7 +90,7 @@ int main(int argc, char **argv)
 {
 	struct arguments a = {0};
 	struct error e;
-	program_options(&program, argc, argv, &a);
+	program_parse_options(&program, argc, argv, &a);
 	if (tonemap_file(&a, &e) == 0)
 		return 0;
 	fprintf(stderr, "hslt-tonemap: %s\n", e.text);

@@ -14,10 +14,10 @@ static int find_rgb(struct picture *p, struct error *e)
 {
 	const struct exr_image *img = &p->image;
 	for (int k = 0; k < 3; k++) {
-		p->rgb[k] = exr_plane(img, rgb_names[k]);
+		p->rgb[k] = exr_find_plane(img, rgb_names[k]);
 		if (!p->rgb[k])
 			return error_set(e, EINVAL, "it has no channel %s (of R, G and B); its first one is %s",
-					 rgb_names[k], img->names[0]);
+					 rgb_names[k], img->channel_names[0]);
 	}
 	return 0;
 }
@@ -77,7 +77,7 @@ int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct er
 			picture_fini(&small);
 			return error_set(e, ENOMEM, "no memory for a picture of %ux%u", width, height);
 		}
-		snprintf(small.image.names[k], sizeof small.image.names[k], "%s", rgb_names[k]);
+		snprintf(small.image.channel_names[k], sizeof small.image.channel_names[k], "%s", rgb_names[k]);
 		shrink_plane(p->rgb[k], from->width, plane, width, height, from->width / width, from->height / height);
 		small.rgb[k] = plane;
 	}

@@ -8,7 +8,7 @@ double tonemap_srgb(double linear)
 	return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-static unsigned char byte_of(double value, struct tonemap_counts *n)
+static unsigned char display_byte(double value, struct tonemap_counts *n)
 {
 	if (isnan(value)) {
 		n->nan++;
@@ -25,12 +25,12 @@ static unsigned char byte_of(double value, struct tonemap_counts *n)
 	return value >= 1 ? 255 : (unsigned char)(255 * tonemap_srgb(value) + 0.5);
 }
 
-struct tonemap_counts tonemap(const float *const rgb[3], size_t pixels, double stops, unsigned char *out)
+struct tonemap_counts tonemap_image(const float *const rgb[3], size_t pixels, double stops, unsigned char *out)
 {
 	struct tonemap_counts n = {0};
 	double factor = exp2(stops);
 	for (size_t i = 0; i < pixels; i++)
 		for (size_t k = 0; k < 3; k++)
-			out[i * 3 + k] = byte_of((double)rgb[k][i] * factor, &n);
+			out[i * 3 + k] = display_byte((double)rgb[k][i] * factor, &n);
 	return n;
 }

@@ -15,6 +15,6 @@ struct tonemap_counts {
 double tonemap_srgb(double linear);
 
 /* Converts an image, multiplied by 2^stops. out: 3 bytes per pixel. */
-struct tonemap_counts tonemap(const float *const rgb[3], size_t pixels, double stops, unsigned char *out);
+struct tonemap_counts tonemap_image(const float *const rgb[3], size_t pixels, double stops, unsigned char *out);
 
 #endif

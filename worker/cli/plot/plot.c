@@ -36,11 +36,11 @@ extern char **environ;
  * break, so control characters become blanks. */
 static void put_quoted(struct text_file *s, const char *text)
 {
-	enum { LONGEST = 400 };
+	enum { QUOTED_MAX = 400 };
 	const char *end = text + strlen(text);
 	text_file_bytes(s, "'", 1);
-	for (size_t done = 0; text < end && done < LONGEST; done++) {
-		size_t n = text_file_character(text);
+	for (size_t done = 0; text < end && done < QUOTED_MAX; done++) {
+		size_t n = text_file_character_length(text);
 		if (n == 0 || *text == '\t' || *text == '\n')
 			text_file_bytes(s, *text > 0 ? " " : "?", 1);
 		else if (*text == '\'')
@@ -66,11 +66,11 @@ static void put_axis(struct text_file *s, char which, const struct plot_axis *a,
 		return;
 	text_file_put(s, "set logscale %c\nset %ctics (", which, which);
 	for (size_t i = 0; i < a->tic_count; i++)
-		text_file_put(s, "%s'%.6g' %.9g", i ? "," : "", a->tic[i], a->tic[i]);
+		text_file_put(s, "%s'%.6g' %.9g", i ? "," : "", a->tics[i], a->tics[i]);
 	text_file_put(s, ")\n");
 }
 
-static void put_names(struct text_file *s, const struct plot *p)
+static void put_x_names(struct text_file *s, const struct plot *p)
 {
 	if (!p->x_names)
 		return;
@@ -109,7 +109,7 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 	const struct plot_series *r = &p->series[k];
 	text_file_put(s, "$d%zu << EOD\n", k);
 	for (size_t i = 0; i < r->count; i++) {
-		if (!plot_point_shown(p, r, i))
+		if (!plot_point_is_shown(p, r, i))
 			continue;
 		double y = r->y ? r->y[i] : r->low[i];
 		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) &&
@@ -121,7 +121,7 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 	}
 	text_file_put(s, "EOD\n");
 	for (size_t i = 0; r->labels && i < r->count; i++) {
-		if (!r->labels[i] || !*r->labels[i] || !plot_point_shown(p, r, i))
+		if (!r->labels[i] || !*r->labels[i] || !plot_point_is_shown(p, r, i))
 			continue;
 		text_file_put(s, "set label ");
 		put_quoted(s, r->labels[i]);
@@ -133,7 +133,7 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 static bool has_points(const struct plot *p, size_t k)
 {
 	for (size_t i = 0; i < p->series[k].count; i++)
-		if (plot_point_shown(p, &p->series[k], i))
+		if (plot_point_is_shown(p, &p->series[k], i))
 			return true;
 	return false;
 }
@@ -161,7 +161,7 @@ static void put_series(struct text_file *s, const struct plot *p, size_t k)
 static int write_script(struct text_file *s, const struct plot *p, bool png, struct error *e)
 {
 	struct plot_axis x, y;
-	struct text_file body = {.full = false};
+	struct text_file body = {.has_failed = false};
 	if (!plot_axes(p, &x, &y))
 		return error_set(e, EINVAL, "the plot '%.80s' has no point that could be shown", p->title);
 	text_file_put(&body, "set title ");
@@ -169,7 +169,7 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	text_file_put(&body, "\n");
 	put_axis(&body, 'x', &x, p->x_label);
 	put_axis(&body, 'y', &y, p->y_label);
-	put_names(&body, p);
+	put_x_names(&body, p);
 	for (size_t k = 0; k < p->series_count; k++)
 		put_data(&body, p, &y, k);
 	for (size_t k = 0, shown = 0; k < p->series_count; k++) {
@@ -181,16 +181,16 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	text_file_put(&body, "\n");
 	/* Plots in the same page need distinct ids for their parts; these are derived from the contents, so that they
 	 * are reproducible. */
-	put_style(s, png, fnv_add(FNV_BEGIN, body.text.bytes, body.text.size));
+	put_style(s, png, fnv_add(FNV_OFFSET_BASIS, body.text.bytes, body.text.size));
 	text_file_bytes(s, body.text.bytes, body.text.size);
-	s->full = s->full || body.full;
+	s->has_failed = s->has_failed || body.has_failed;
 	text_file_fini(&body);
-	return s->full ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
+	return s->has_failed ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
 }
 
 /* Runs gnuplot with these files as stdin, stdout and stderr, and waits for its end. Returns -EIO without a sentence if
  * gnuplot fails. */
-static int spawn(const int fd[3], struct error *e)
+static int run_gnuplot(const int fd[3], struct error *e)
 {
 	char name[] = "gnuplot", settings[] = "--default-settings", input[] = "-";
 	char *argv[] = {name, settings, input, NULL};
@@ -226,7 +226,7 @@ static int spawn(const int fd[3], struct error *e)
 }
 
 /* Reads the whole file and appends a 0. */
-static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
+static int read_output(int fd, char **bytes, size_t *size, struct error *e)
 {
 	struct stat st;
 	if (fstat(fd, &st) != 0 || st.st_size < 1 || st.st_size > OUTPUT_MAX)
@@ -253,10 +253,10 @@ static void report_gnuplot(int fd, const struct plot *p, struct error *e)
 	error_set(e, EIO, "gnuplot failed at the plot '%.80s': %s", p->title, text);
 }
 
-static int draw(const struct plot *p, bool png, char **bytes, size_t *size, struct error *e)
+static int draw_plot(const struct plot *p, bool png, char **bytes, size_t *size, struct error *e)
 {
 	static const char *const names[3] = {"plot-script", "plot-output", "plot-errors"};
-	struct text_file s = {.full = false};
+	struct text_file s = {.has_failed = false};
 	int fd[3] = {-1, -1, -1};
 	int rc = write_script(&s, p, png, e);
 	for (int i = 0; !rc && i < 3; i++) {
@@ -267,12 +267,12 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	if (!rc && (io_write_all(fd[0], s.text.bytes, s.text.size) || lseek(fd[0], 0, SEEK_SET)))
 		rc = error_set(e, EIO, "no room for a plot's data");
 	if (!rc) {
-		rc = spawn(fd, e);
+		rc = run_gnuplot(fd, e);
 		if (rc == -EIO)
 			report_gnuplot(fd[2], p, e);
 	}
 	if (!rc)
-		rc = read_whole(fd[1], bytes, size, e);
+		rc = read_output(fd[1], bytes, size, e);
 	for (int i = 0; i < 3; i++)
 		if (fd[i] >= 0)
 			close(fd[i]);
@@ -297,7 +297,7 @@ static void drop_titles(char *svg, size_t *size)
 
 int plot_svg(const struct plot *p, char **svg, size_t *size, struct error *e)
 {
-	int rc = draw(p, false, svg, size, e);
+	int rc = draw_plot(p, false, svg, size, e);
 	if (!rc)
 		drop_titles(*svg, size);
 	return rc;
@@ -310,7 +310,7 @@ int plot_write(const struct plot *p, const char *path, struct error *e)
 	bool png = n > 4 && strcmp(path + n - 4, ".png") == 0;
 	if (!png && !(n > 4 && strcmp(path + n - 4, ".svg") == 0))
 		return error_set(e, EINVAL, "%s: plots are .svg or .png", path);
-	int rc = png ? draw(p, true, &bytes, &size, e) : plot_svg(p, &bytes, &size, e);
+	int rc = png ? draw_plot(p, true, &bytes, &size, e) : plot_svg(p, &bytes, &size, e);
 	if (rc)
 		return rc;
 	union {

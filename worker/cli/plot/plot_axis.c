@@ -3,23 +3,23 @@
 
 #include <math.h>
 
-static bool fits(double value, bool log_axis)
+static bool is_plottable(double value, bool log_axis)
 {
 	return isfinite(value) && (!log_axis || value > 0);
 }
 
-bool plot_point_shown(const struct plot *p, const struct plot_series *s, size_t i)
+bool plot_point_is_shown(const struct plot *p, const struct plot_series *s, size_t i)
 {
-	if (!fits(s->x[i], p->log_x))
+	if (!is_plottable(s->x[i], p->log_x))
 		return false;
 	if (s->style == PLOT_BAND)
-		return s->low && s->high && isfinite(s->low[i]) && fits(s->high[i], p->log_y);
-	return fits(s->y[i], p->log_y);
+		return s->low && s->high && isfinite(s->low[i]) && is_plottable(s->high[i], p->log_y);
+	return is_plottable(s->y[i], p->log_y);
 }
 
-static void extend(struct plot_axis *a, const double *value, size_t i)
+static void extend_axis(struct plot_axis *a, const double *value, size_t i)
 {
-	if (!value || !fits(value[i], a->log))
+	if (!value || !is_plottable(value[i], a->log))
 		return;
 	a->low = fmin(a->low, value[i]);
 	a->high = fmax(a->high, value[i]);
@@ -27,8 +27,8 @@ static void extend(struct plot_axis *a, const double *value, size_t i)
 
 static void add_tic(struct plot_axis *a, double value)
 {
-	if (value >= a->low * (1 - 1e-9) && value <= a->high * (1 + 1e-9) && a->tic_count < PLOT_TICS)
-		a->tic[a->tic_count++] = value;
+	if (value >= a->low * (1 - 1e-9) && value <= a->high * (1 + 1e-9) && a->tic_count < PLOT_TICS_MAX)
+		a->tics[a->tic_count++] = value;
 }
 
 /* Returns 1, 2 or 5 times a power of 10, such that about five such steps fill the range. */
@@ -44,7 +44,7 @@ static void place_tics(struct plot_axis *a)
 	double decades = log10(a->high / a->low);
 	if (decades < 0.35) {
 		double step = round_step(a->high - a->low);
-		for (double k = ceil(a->low / step); k * step <= a->high && a->tic_count < PLOT_TICS; k++)
+		for (double k = ceil(a->low / step); k * step <= a->high && a->tic_count < PLOT_TICS_MAX; k++)
 			add_tic(a, k * step);
 		return;
 	}
@@ -67,12 +67,12 @@ static void widen_axis(struct plot_axis *a, bool amounts)
 		place_tics(a);
 		return;
 	}
-	double room = 0.06 * (a->high - a->low);
-	if (!(room > 0))
-		room = a->high != 0 ? 0.3 * fabs(a->high) : 1;
-	bool from_zero = a->low >= 0 && (amounts ? a->low < 0.6 * a->high : a->low < room);
-	a->low = from_zero ? 0 : a->low - room;
-	a->high += room;
+	double margin = 0.06 * (a->high - a->low);
+	if (!(margin > 0))
+		margin = a->high != 0 ? 0.3 * fabs(a->high) : 1;
+	bool from_zero = a->low >= 0 && (amounts ? a->low < 0.6 * a->high : a->low < margin);
+	a->low = from_zero ? 0 : a->low - margin;
+	a->high += margin;
 }
 
 bool plot_axes(const struct plot *p, struct plot_axis *x, struct plot_axis *y)
@@ -82,12 +82,12 @@ bool plot_axes(const struct plot *p, struct plot_axis *x, struct plot_axis *y)
 	for (size_t k = 0; k < p->series_count; k++) {
 		const struct plot_series *s = &p->series[k];
 		for (size_t i = 0; i < s->count; i++) {
-			if (!plot_point_shown(p, s, i))
+			if (!plot_point_is_shown(p, s, i))
 				continue;
-			extend(x, s->x, i);
-			extend(y, s->style == PLOT_BAND ? NULL : s->y, i);
-			extend(y, s->low, i);
-			extend(y, s->high, i);
+			extend_axis(x, s->x, i);
+			extend_axis(y, s->style == PLOT_BAND ? NULL : s->y, i);
+			extend_axis(y, s->low, i);
+			extend_axis(y, s->high, i);
 		}
 	}
 	if (!(x->low <= x->high && y->low <= y->high))

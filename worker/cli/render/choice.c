@@ -8,20 +8,20 @@
 
 #include <stdio.h>
 
-static int choose(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
+static int choose_integrator(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
 	double begin = clock_seconds();
-	int rc = render_choose(w, &a->plan, &out->found, e);
+	int rc = render_choose(w, &a->plan, &out->result, e);
 	out->seconds = clock_seconds() - begin;
 	if (!rc)
-		render_choice_text(a->plan.integrator, &out->found, out->text, sizeof out->text);
+		render_choice_text(a->plan.integrator, &out->result, out->summary, sizeof out->summary);
 	return rc;
 }
 
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
-	*out = (struct choice){.made = integrator_is_open(&a->plan)};
-	int rc = out->made ? choose(w, a, out, e) : 0;
+	*out = (struct choice){.made = integrator_is_undecided(&a->plan)};
+	int rc = out->made ? choose_integrator(w, a, out, e) : 0;
 	if (!rc)
 		rc = render_unseen_light(w, &a->plan, e);
 	return !rc && plan_wants_rays(&a->plan) ? render_count_rays(w, &a->plan, &a->plan.rays, e) : rc;
@@ -33,7 +33,7 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 	struct world *w;
 	*out = (struct choice){.made = false};
 	struct asset_folders folders = option_folders(a, folder);
-	struct asset_source assets = asset_search(&folders);
+	struct asset_source assets = asset_source_for_folders(&folders);
 	int rc = option_scene_read(&scene, &assets, name, a, e);
 	if (rc)
 		return rc;
@@ -53,12 +53,12 @@ void choice_print(const struct choice *c, const char *integrator)
 			integrator, c->seconds);
 }
 
-static json_t *found_to_json(const struct render_found *f)
+static json_t *found_to_json(const struct render_measurement *f)
 {
-	return json_pack("{s:o s:o s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex",
-			 forecast_real(f->tail), "extremeTailIndex", forecast_real(f->extreme), "extremeValueIndex",
-			 forecast_real(f->evi), "largestShare", forecast_real(f->most), "varianceTimesRays",
-			 forecast_real(f->cost));
+	return json_pack("{s:o s:o s:o s:o s:o s:o}", "rareShare", json_real_or_null(f->rare_share), "tailIndex",
+			 json_real_or_null(f->tail_index), "extremeTailIndex", json_real_or_null(f->extreme_tail_index),
+			 "extremeValueIndex", json_real_or_null(f->extreme_value_index), "largestShare",
+			 json_real_or_null(f->largest_share), "varianceTimesRays", json_real_or_null(f->cost));
 }
 
 static json_t *considered_to_json(void)
@@ -76,10 +76,11 @@ json_t *choice_to_json(const struct choice *c)
 {
 	if (!c->made)
 		return json_null();
-	const struct render_choice *f = &c->found;
-	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:f s:o s:o}", "why", c->text, "considered",
-			 considered_to_json(), "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
-			 "pathMissesLight", (int)f->misses, "surfacesFocusLight", (int)f->focuses, "surfacesRefract",
-			 (int)f->refracts, "mergedRareShare", f->merged.share, "shareFoundByPath", f->found, "path",
-			 found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));
+	const struct render_choice *f = &c->result;
+	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:f s:o s:o}", "why", c->summary, "considered",
+			 considered_to_json(), "pilotSamples", (json_int_t)f->sample_count, "pilotSeconds", c->seconds,
+			 "pathMissesLight", (int)f->path_misses_light, "surfacesFocusLight", (int)f->has_narrow_lobes,
+			 "surfacesRefract", (int)f->transmits, "mergedRareShare", f->merging.rare_share,
+			 "shareFoundByPath", f->found_fraction, "path", found_to_json(&f->path), "bdpt",
+			 f->is_settled ? json_null() : found_to_json(&f->bdpt));
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Measures what must be known about a scene before a plan is made for it: the integrator (worker/render/choose.h) if
- * none was given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many rays they
- * take (worker/render/rays.h) if a time or an error ends the render. One thread.
+ * none was given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many
+ * rays they take (worker/render/rays.h) if a time or an error ends the render. One thread.
  */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H
@@ -14,9 +14,9 @@
 
 struct choice {
 	bool made; /* false: an integrator was given, and the rest is empty */
-	struct render_choice found;
-	double seconds; /* wall-clock time that the choice took */
-	char text[512]; /* the choice in one line, for the user */
+	struct render_choice result;
+	double seconds;	   /* wall-clock time that the choice took */
+	char summary[512]; /* the choice in one line, for the user */
 };
 
 /* Makes the choice for the scene `name` in `folder`. a: complete except for the values that are chosen or measured. */

@@ -13,20 +13,21 @@
 /* clang-format off */
 #define ESTIMATE_ROWS(type) \
 	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost", OPTION_FLAG(type, estimate)}, \
-	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(type, pilot, 0, 1e9), .above = true, \
-	 .below = true}, \
+	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(type, pilot, 0, 1e9), .min_excluded = true, \
+	 .max_excluded = true}, \
 	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(type, plot)}
 /* clang-format on */
 
 struct estimate {
-	const char *scene, *where;	      /* name of the file; where it is rendered, as "this machine, 2 threads" */
+	const char *scene, *machine;	      /* name of the file; where it is rendered, as "this machine, 2 threads" */
 	const struct plan_request *request;   /* of the render being predicted; each row sets its own target error */
 	const struct plan *plan;	      /* its plan for its own target error, or the one that pilot.h chose */
 	const struct plan *pilot;	      /* the plan of the pilot */
 	const struct forecast_history *looks; /* the pilot's estimates of its error */
 	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */
-	double bootstrap_cpu, bootstrap_seconds; /* the same for its bootstrap; scaled to the samples of the render's */
-	double target;				 /* an error that is predicted in addition to the usual ones; 0: none */
+	double bootstrap_cpu_seconds,
+		bootstrap_seconds; /* the same for its bootstrap; scaled to the samples of the render's */
+	double target;		   /* an error that is predicted in addition to the usual ones; 0: none */
 	double speed; /* mutations or samples a second of one thread, for plans that depend on it; 0: none does */
 };
 

@@ -8,6 +8,6 @@
 
 /* Reads the scene at `path` and prints the explanation on stdout; if `json` is set, as one JSON object. *usage: the
  * command line is wrong. */
-int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
+int explain_scene(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
 
 #endif

@@ -45,7 +45,7 @@ struct arguments {
 };
 
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_TAKE(option_image)},
+	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_CUSTOM(option_image)},
 	{"threads", 0, "N", "Threads (one per processor); does not change the bits",
 	 OPTION_COUNT(struct arguments, threads, 1, 1024)},
 	{"stats", 0, "FILE",
@@ -61,16 +61,16 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static struct output_files outputs_of(const struct arguments *a)
+static struct output_files list_outputs(const struct arguments *a)
 {
 	return (struct output_files){{
 		{"-o", a->render.output, OUTPUT_EXR},
 		{"--stats", a->stats, OUTPUT_JSON},
-		{"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")},
+		{"--plot", a->plot, output_plot_format(a->plot ? a->plot : "")},
 	}};
 }
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	const struct arguments *a = target;
 	if (!a->render.scene || (!a->render.output && !a->estimate && !a->explain))
@@ -84,13 +84,13 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
 	if (a->json && !a->estimate && !a->explain)
 		return error_set(e, EINVAL, "--json requires --estimate or --explain");
-	struct output_files outputs = outputs_of(a);
+	struct output_files outputs = list_outputs(a);
 	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
 	.name = "hslt-render",
-	.words = "SCENE.xml",
+	.synopsis = "SCENE.xml",
 	.summary = "Renders a scene on this machine, without a farm: the same plan gives the same bits as the farm's.",
 	.examples =
 		"hslt-render room.xml -o room.exr --spp 64\n"
@@ -103,19 +103,20 @@ static const struct program program = {
 		"--estimate makes no image: a pilot of a minute predicts what errors of 10, 5, 2 and 1 % (and "
 		"--target-error) will cost.\nThe image contains linear Rec. 709 (R G B), one standard error of each "
 		"(error.R error.G error.B), and for chains the potential scale reduction of each pixel's tile (rhat.Y).",
-	.exits = "0 done, 1 failed, 2 usage, 4 another bound was reached before the target error, 5 chains disagree "
-		 "(the image is there, and its "
-		 "note says where)",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
-	.shared = &render_table,
-	.word = option_scene,
+	.exit_codes =
+		"0 done, 1 failed, 2 usage, 4 another bound was reached before the target error, 5 chains disagree "
+		"(the image is there, and its "
+		"note says where)",
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.shared_options = &render_option_table,
+	.parse_word = option_scene,
 };
 
 struct session {
-	struct arguments *a;
+	struct arguments *args;
 	char *folder, *name;
 	char scene_hash[BLOB_HEX_SIZE];
-	char scene_notes[HEADER_SCENE_NOTES];
+	char scene_notes[HEADER_SCENE_NOTES_MAX];
 	struct plan_scene inputs;
 	struct world *world;
 	struct render_summary summary;
@@ -129,11 +130,11 @@ struct session {
 	double build_seconds;	 /* of the world */
 	struct choice choice;
 	struct progress progress;
-	struct kept_bootstrap kept;
+	struct kept_bootstrap kept_bootstrap;
 	struct output_files outputs;
-	struct guarded_source files;
-	bool scene_spp; /* no bound was given, so the scene's number of samples is rendered */
-	bool usage;	/* the command line is wrong */
+	struct guarded_source guarded;
+	bool uses_scene_spp; /* no bound was given, so the scene's number of samples is rendered */
+	bool is_usage_error; /* the command line is wrong */
 };
 
 static int hash_scene(struct session *s, const struct asset_source *files, struct error *e)
@@ -145,30 +146,31 @@ static int hash_scene(struct session *s, const struct asset_source *files, struc
 		return rc;
 	rc = blob_hash_bytes(a.bytes, a.size, &h, e);
 	files->close(files->user, &a);
-	blob_hex(&h, s->scene_hash);
+	blob_hash_to_hex(&h, s->scene_hash);
 	return rc;
 }
 
-static int load(struct session *s, struct error *e)
+static int load_scene(struct session *s, struct error *e)
 {
 	struct scene scene;
 	double begin = clock_seconds();
-	int rc = scene_path_split(s->a->render.scene, &s->a->render, &s->folder, &s->name, e);
+	int rc = scene_path_split(s->args->render.scene, &s->args->render, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
-	struct asset_folders folders = option_folders(&s->a->render, s->folder);
-	struct asset_source files = guarded_source(&s->files, asset_search(&folders), &s->outputs),
-			    assets = kept_bootstrap_source(&s->kept, &files);
+	struct asset_folders folders = option_folders(&s->args->render, s->folder);
+	struct asset_source files = guarded_source(&s->guarded, asset_source_for_folders(&folders), &s->outputs),
+			    assets = kept_bootstrap_source(&s->kept_bootstrap, &files);
 	rc = hash_scene(s, &files, e);
 	if (!rc)
-		rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
+		rc = option_scene_read(&scene, &assets, s->name, &s->args->render, e);
 	if (rc)
 		return rc;
-	option_plan_scene(&s->a->render, &s->inputs);
-	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
-		place_print(stderr, "note: ", s->a->render.scene, scene.notes[i]);
-	text_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
-	rc = scene_missing(&scene, &assets, world_new(&s->world, &scene, &assets, &s->a->render.render, e), e);
+	option_plan_scene(&s->args->render, &s->inputs);
+	for (uint32_t i = 0; !s->args->quiet && i < scene.note_count; i++)
+		place_print(stderr, "note: ", s->args->render.scene, scene.notes[i]);
+	text_join_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
+	rc = scene_append_missing_count(&scene, &assets,
+					world_new(&s->world, &scene, &assets, &s->args->render.render, e), e);
 	scene_fini(&scene);
 	if (rc)
 		return rc;
@@ -179,43 +181,43 @@ static int load(struct session *s, struct error *e)
 
 /* Chooses the integrator. From then on a signal ends the render after complete rounds, which are kept; before, there is
  * nothing to keep, and a signal ends the program. */
-static int choose(struct session *s, struct error *e)
+static int choose_integrator(struct session *s, struct error *e)
 {
-	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
+	int rc = choice_in_world(s->world, &s->args->render, &s->choice, e);
 	interrupt_watch();
-	if (!rc && !s->a->quiet)
-		choice_print(&s->choice, s->a->render.plan.integrator);
+	if (!rc && !s->args->quiet)
+		choice_print(&s->choice, s->args->render.plan.integrator);
 	return rc;
 }
 
 static int make_plan(struct session *s, struct error *e)
 {
-	struct plan_request *p = &s->a->render.plan;
-	char text[PLAN_TEXT];
-	s->scene_spp = !plan_request_is_bounded(p);
-	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
+	struct plan_request *p = &s->args->render.plan;
+	char text[PLAN_TEXT_MAX];
+	s->uses_scene_spp = !plan_request_is_bounded(p);
+	int rc = render_plan_from_scene(&s->args->render, &s->summary, e);
 	if (!rc)
-		rc = choose(s, e);
+		rc = choose_integrator(s, e);
 	if (!rc)
 		rc = plan_make(p, &s->plan, e);
-	s->usage = rc == -EINVAL;
+	s->is_usage_error = rc == -EINVAL;
 	if (!rc)
 		rc = canvas_probe(&s->plan, e);
-	if (rc || s->a->quiet)
+	if (rc || s->args->quiet)
 		return rc;
 	plan_describe(&s->plan, text, sizeof text);
 	fprintf(stderr, "%s\n", text);
 	plan_describe_changes(p, &s->plan, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "%s\n", text);
-	stated_error_rule(s->plan.target_error, s->plan.kind == PLAN_CHAINS, text, sizeof text);
+	stated_error_print_rule(s->plan.target_error, s->plan.kind == PLAN_CHAINS, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "%s\n", text);
 	option_depth_note(s->plan.integrator, s->plan.max_depth, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
-		place_print(stderr, "hslt-render: note: ", s->a->render.scene, text);
+		place_print(stderr, "hslt-render: note: ", s->args->render.scene, text);
 	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB for Embree\n", s->build_seconds,
 		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
 	return 0;
@@ -223,46 +225,47 @@ static int make_plan(struct session *s, struct error *e)
 
 /* Returns the elapsed share of the time until the render ends, which is at the end of the round in which the plan's
  * time is over. */
-static double fraction_of_time(const struct plan *plan, const struct local_progress *p)
+static double time_fraction(const struct plan *plan, const struct local_progress *p)
 {
 	double speed = p->round_seconds > 0 ? p->rounds / p->round_seconds : 0;
-	double left = merge_seconds_left(plan, p->seconds, p->rounds, speed);
-	return isnan(left) ? 0.99 : p->seconds / (p->seconds + left);
+	double remaining = merge_seconds_remaining(plan, p->seconds, p->rounds, speed);
+	return isnan(remaining) ? 0.99 : p->seconds / (p->seconds + remaining);
 }
 
-static void show(void *user, const struct local_progress *p)
+static void show_progress(void *user, const struct local_progress *p)
 {
 	struct session *s = user;
 	char detail[256], eta[32];
 	double fraction = 0;
-	if (p->total != UINT64_MAX)
-		fraction = (double)p->done / (double)p->total;
+	if (p->leases_total != UINT64_MAX)
+		fraction = (double)p->leases_done / (double)p->leases_total;
 	if (s->forecast_seconds > 0)
 		fraction = fmax(fraction, fmin(p->seconds / s->forecast_seconds, 0.99));
 	if (s->plan.seconds > 0)
-		fraction = fmax(fraction, fraction_of_time(&s->plan, p));
-	double left = eta_seconds(&s->plan, p, s->forecast_seconds);
-	progress_time(isnan(left) ? 0 : left, eta, sizeof eta);
-	snprintf(detail, sizeof detail, "%s%s%s", isnan(left) ? "" : eta, isnan(left) ? "" : " left", s->forecast);
-	progress_show(&s->progress, progress_kept(&s->progress, fraction, p->state), p->state, detail);
+		fraction = fmax(fraction, time_fraction(&s->plan, p));
+	double remaining = eta_seconds(&s->plan, p, s->forecast_seconds);
+	progress_format_time(isnan(remaining) ? 0 : remaining, eta, sizeof eta);
+	snprintf(detail, sizeof detail, "%s%s%s", isnan(remaining) ? "" : eta, isnan(remaining) ? "" : " left",
+		 s->forecast);
+	progress_show(&s->progress, progress_max_fraction(&s->progress, fraction, p->state), p->state, detail);
 }
 
 /* Called with a new estimate of the error: updates the part of the progress line that says when the target will be
  * reached, and what halving the error costs. */
-static void expect(struct session *s, const struct local_round *r)
+static void update_forecast(struct session *s, const struct local_round *r)
 {
-	struct forecast_cost stop, half;
+	struct forecast_cost stop, halving;
 	struct forecast_range error;
 	char low[32], high[32], more[32];
-	forecast_add(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
-	if (!forecast_error(&s->looks, &error) || !forecast_halving(&s->looks, &s->plan, &half) ||
-	    !forecast_target(&s->looks, &s->plan, s->plan.target_error, FORECAST_SAME, &stop))
+	forecast_add_image(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
+	if (!forecast_current_error(&s->looks, &error) || !forecast_cost_of_halving(&s->looks, &s->plan, &halving) ||
+	    !forecast_cost_of_target(&s->looks, &s->plan, s->plan.target_error, FORECAST_SAME, &stop))
 		return;
 	s->forecast_seconds = stop.seconds.middle + r->bootstrap_seconds;
-	progress_duration(stop.seconds.low - r->seconds, low, sizeof low);
-	progress_duration(stop.seconds.high - r->seconds, high, sizeof high);
-	progress_duration(half.seconds.middle, more, sizeof more);
-	double doubt = forecast_stop_in_doubt(&s->looks, &s->plan, s->plan.target_error);
+	progress_format_duration(stop.seconds.low - r->seconds, low, sizeof low);
+	progress_format_duration(stop.seconds.high - r->seconds, high, sizeof high);
+	progress_format_duration(halving.seconds.middle, more, sizeof more);
+	double doubt = forecast_stopping_error(&s->looks, &s->plan, s->plan.target_error);
 	int n = snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, halved in %s", low,
 			 high, 100 * error.middle, more);
 	if (doubt > 0 && n > 0 && (size_t)n < sizeof s->forecast)
@@ -274,18 +277,18 @@ static void on_round(void *user, const struct local_round *r)
 {
 	struct session *s = user;
 	if (r->image)
-		expect(s, r);
+		update_forecast(s, r);
 }
 
-static int resume(void *user, struct bootstrap *b, struct error *e)
+static int resume_bootstrap(void *user, struct bootstrap *b, struct error *e)
 {
 	struct session *s = user;
 	char text[512], fingerprint[FINGERPRINT_MAX];
 	(void)e;
 	fingerprint_make(fingerprint);
-	kept_bootstrap_begin(&s->kept, s->a->render.output, fingerprint, &s->plan, &s->a->render);
-	kept_bootstrap_resume(&s->kept, b, text, sizeof text);
-	if (*text && !s->a->quiet)
+	kept_bootstrap_begin(&s->kept_bootstrap, s->args->render.output, fingerprint, &s->plan, &s->args->render);
+	kept_bootstrap_resume(&s->kept_bootstrap, b, text, sizeof text);
+	if (*text && !s->args->quiet)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	return 0;
 }
@@ -293,31 +296,31 @@ static int resume(void *user, struct bootstrap *b, struct error *e)
 static void keep_bootstrap(void *user, const struct bootstrap *b)
 {
 	struct session *s = user;
-	kept_bootstrap_write(&s->kept, b);
+	kept_bootstrap_write(&s->kept_bootstrap, b);
 }
 
-static int render(struct session *s, struct error *e)
+static int render_image(struct session *s, struct error *e)
 {
 	s->run = (struct local_run){.world = s->world,
 				    .plan = &s->plan,
-				    .threads = s->a->threads,
+				    .threads = s->args->threads,
 				    .stop = &interrupted,
-				    .progress = s->a->quiet ? NULL : show,
-				    .round = on_round,
-				    .resume = resume,
-				    .keep = keep_bootstrap,
+				    .on_progress = s->args->quiet ? NULL : show_progress,
+				    .on_round = on_round,
+				    .load_bootstrap = resume_bootstrap,
+				    .save_bootstrap = keep_bootstrap,
 				    .user = s};
-	if (!s->a->quiet)
-		progress_start(&s->progress);
+	if (!s->args->quiet)
+		progress_begin(&s->progress);
 	int rc = local_run(&s->run, e);
-	if (!s->a->quiet)
+	if (!s->args->quiet)
 		progress_end(&s->progress);
 	if (rc)
 		return rc;
-	if (!s->run.canvas || (canvas_rounds(s->run.canvas) == 0 && !s->run.lit.black))
+	if (!s->run.canvas || (canvas_complete_rounds(s->run.canvas) == 0 && !s->run.bootstrap_result.black))
 		return error_set(e, EINTR, "interrupted before the first round was complete: there is no image%s",
-				 s->kept.said);
-	rc = canvas_image(s->run.canvas, false, &s->image, e);
+				 s->kept_bootstrap.message);
+	rc = canvas_image_init(s->run.canvas, false, &s->image, e);
 	if (!rc)
 		convergence_judge(&s->plan, &s->image, &s->convergence);
 	return rc;
@@ -327,10 +330,10 @@ static int write_image(const struct session *s, struct error *e)
 {
 	struct header_effect effects[RENDER_EFFECTS_MAX];
 	for (size_t i = 0; i < s->summary.line_count; i++)
-		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on,
-						    s->summary.lines[i].forced, s->summary.lines[i].why,
-						    s->summary.lines[i].saves};
-	char camera[RENDER_CAMERA_TEXT];
+		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].is_on,
+						    s->summary.lines[i].is_forced, s->summary.lines[i].reason,
+						    s->summary.lines[i].savings};
+	char camera[RENDER_CAMERA_TEXT_MAX];
 	render_camera_text(&s->summary, camera, sizeof camera);
 	struct header_extra x = {.scene = s->name,
 				 .scene_hash = s->scene_hash,
@@ -341,14 +344,14 @@ static int write_image(const struct session *s, struct error *e)
 				 .effects = effects,
 				 .wall_seconds = s->run.seconds,
 				 .cpu_seconds = s->run.cpu_seconds,
-				 .workers = s->a->threads,
-				 .end = merge_end_name(s->run.end, s->run.lit.black)};
+				 .worker_count = s->args->threads,
+				 .end_name = merge_end_name(s->run.end, s->run.bootstrap_result.black)};
 	unsigned char *bytes;
 	size_t size;
 	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
 	if (rc)
 		return rc;
-	rc = image_file_write(s->a->render.output, bytes, size, e);
+	rc = image_file_write(s->args->render.output, bytes, size, e);
 	mem_free(bytes);
 	return rc;
 }
@@ -356,130 +359,130 @@ static int write_image(const struct session *s, struct error *e)
 /* Returns what ended the render, in the words of the command line. */
 static const char *end_text(const struct session *s)
 {
-	const struct plan_request *r = &s->a->render.plan;
-	if (s->run.end != MERGE_ROUNDS || s->run.lit.black)
-		return merge_end_name(s->run.end, s->run.lit.black);
-	return s->scene_spp ? "the scene's samples per pixel" : r->mutations ? "--mutations" : "--spp";
+	const struct plan_request *r = &s->args->render.plan;
+	if (s->run.end != MERGE_ROUNDS || s->run.bootstrap_result.black)
+		return merge_end_name(s->run.end, s->run.bootstrap_result.black);
+	return s->uses_scene_spp ? "the scene's samples per pixel" : r->mutations ? "--mutations" : "--spp";
 }
 
 static void print_summary(const struct session *s)
 {
 	const struct canvas_image *i = &s->image;
 	const struct plan *p = &s->plan;
-	char text[STRATEGY_TABLE];
+	char text[STRATEGY_TABLE_MAX];
 	fprintf(stderr, "%llu round%s in %.1f s (%.1f s of CPU time); stopped by: %s\n", (unsigned long long)i->rounds,
 		i->rounds == 1 ? "" : "s", s->run.seconds, s->run.cpu_seconds, end_text(s));
-	stated_error(i, text, sizeof text);
+	stated_error_print(i, text, sizeof text);
 	if (*text && !i->rel_mse_doubt)
 		fprintf(stderr, "%s\n", text);
-	strategy_table(p->mutations, &i->counts, text, sizeof text);
-	if (s->a->stats)
+	strategy_print_table(p->mutations, &i->counts, text, sizeof text);
+	if (s->args->stats)
 		fputs(text, stderr);
-	convergence_table(i->classes, i->b, &s->convergence, text, sizeof text);
-	if (s->a->stats)
+	convergence_print_table(i->classes, i->b, &s->convergence, text, sizeof text);
+	if (s->args->stats)
 		fputs(text, stderr);
-	if (s->a->stats && i->counts.counters[COUNT_SPREAD])
+	if (s->args->stats && i->counts.counters[COUNT_SPREAD])
 		fprintf(stderr,
 			"chains that spread what is too bright for a sample: %.3g %% of the light, %.3g %% of the variance "
 			"of the mean, %.3g %% of the rays\n",
-			100 * i->chains_energy, 100 * i->chains_variance, 100 * stats_chains_rays(i));
-	strategy_note(p, &i->counts, i->black, text, sizeof text);
-	strategy_add_beyond(i->beyond_share, text, sizeof text);
-	convergence_add_note(&s->convergence, text, sizeof text);
+			100 * i->chains_energy_share, 100 * i->chains_variance_share, 100 * stats_chains_rays(i));
+	strategy_print_note(p, &i->counts, i->is_black, text, sizeof text);
+	strategy_append_beyond(i->beyond_share, text, sizeof text);
+	convergence_append_note(&s->convergence, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
 /* Prints a warning that the error of the image is not known. It is the last line, printed even with --quiet. */
-static void warn(const struct session *s)
+static void warn_unknown_error(const struct session *s)
 {
-	char text[STATED_ERROR_TEXT];
-	stated_error(&s->image, text, sizeof text);
+	char text[STATED_ERROR_TEXT_MAX];
+	stated_error_print(&s->image, text, sizeof text);
 	fprintf(stderr, "hslt-render: warning: %s\n", text);
 }
 
-static int report(const struct session *s, const struct local_pilot *p, struct error *e)
+static int report_estimate(const struct session *s, const struct local_pilot *p, struct error *e)
 {
 	char where[64];
-	snprintf(where, sizeof where, "this machine, %u thread%s", s->a->threads, s->a->threads == 1 ? "" : "s");
+	snprintf(where, sizeof where, "this machine, %u thread%s", s->args->threads, s->args->threads == 1 ? "" : "s");
 	struct estimate m = {.scene = s->name,
-			     .where = where,
+			     .machine = where,
 			     .request = p->request,
 			     .plan = &p->render,
 			     .pilot = &p->plan,
 			     .looks = &p->looks,
 			     .cpu_seconds = p->cpu_seconds,
 			     .seconds = p->wall_seconds,
-			     .bootstrap_cpu = p->bootstrap_cpu,
+			     .bootstrap_cpu_seconds = p->bootstrap_cpu_seconds,
 			     .bootstrap_seconds = p->bootstrap_seconds,
-			     .target = s->a->render.plan.target_error};
-	return estimate_report(&m, s->a->json, s->a->plot, e);
+			     .target = s->args->render.plan.target_error};
+	return estimate_report(&m, s->args->json, s->args->plot, e);
 }
 
-static int estimate(struct session *s, struct error *e)
+static int run_estimate(struct session *s, struct error *e)
 {
 	struct plan plan;
-	int rc = load(s, e);
+	int rc = load_scene(s, e);
 	if (!rc) {
-		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
+		rc = pilot_plan_from_scene(&s->args->render, &s->summary, e);
 		if (!rc)
-			rc = choose(s, e);
+			rc = choose_integrator(s, e);
 		if (!rc)
-			rc = pilot_render_plan(&s->a->render.plan, &plan, e);
-		s->usage = rc == -EINVAL;
+			rc = pilot_render_plan(&s->args->render.plan, &plan, e);
+		s->is_usage_error = rc == -EINVAL;
 	}
 	if (rc)
 		return rc;
 	struct local_pilot p = {.world = s->world,
-				.request = &s->a->render.plan,
-				.seconds = s->a->pilot > 0 ? s->a->pilot : PILOT_SECONDS,
-				.threads = s->a->threads,
+				.request = &s->args->render.plan,
+				.seconds = s->args->pilot > 0 ? s->args->pilot : PILOT_SECONDS,
+				.threads = s->args->threads,
 				.stop = &interrupted,
-				.progress = s->a->quiet ? NULL : show,
+				.on_progress = s->args->quiet ? NULL : show_progress,
 				.user = s};
 	s->plan.seconds = p.seconds;
-	if (!s->a->quiet)
-		progress_start(&s->progress);
+	if (!s->args->quiet)
+		progress_begin(&s->progress);
 	rc = local_pilot(&p, e);
-	if (!s->a->quiet)
+	if (!s->args->quiet)
 		progress_end(&s->progress);
-	return rc ? rc : report(s, &p, e);
+	return rc ? rc : report_estimate(s, &p, e);
 }
 
 static int check_outputs(struct session *s, struct error *e)
 {
-	s->outputs = outputs_of(s->a);
-	return output_files_check(&s->outputs, &s->a->render.scene, 1, e);
+	s->outputs = list_outputs(s->args);
+	return output_files_check(&s->outputs, &s->args->render.scene, 1, e);
 }
 
 static int run_session(struct session *s, struct error *e)
 {
-	if (s->a->explain)
-		return explain(s->a->render.scene, &s->a->render, s->a->json, &s->usage, e);
+	if (s->args->explain)
+		return explain_scene(s->args->render.scene, &s->args->render, s->args->json, &s->is_usage_error, e);
 	int rc = check_outputs(s, e);
-	if (rc || s->a->estimate)
-		return rc ? rc : estimate(s, e);
-	rc = load(s, e);
+	if (rc || s->args->estimate)
+		return rc ? rc : run_estimate(s, e);
+	rc = load_scene(s, e);
 	if (!rc)
 		rc = make_plan(s, e);
 	if (!rc)
-		rc = render(s, e);
+		rc = render_image(s, e);
 	if (!rc)
 		rc = write_image(s, e);
 	if (!rc)
-		kept_bootstrap_end(&s->kept);
-	if (!rc && s->a->stats)
-		rc = stats_write(s->a->stats,
+		kept_bootstrap_end(&s->kept_bootstrap);
+	if (!rc && s->args->stats)
+		rc = stats_write(s->args->stats,
 				 &(struct stats){s->name, &s->inputs, &s->summary, &s->run, &s->image, &s->convergence,
 						 s->build_seconds, &s->looks, &s->choice},
 				 e);
-	if (!rc && !s->a->quiet)
+	if (!rc && !s->args->quiet)
 		print_summary(s);
 	if (!rc && s->image.rel_mse_doubt)
-		warn(s);
-	if (!rc && s->run.end == MERGE_GOES_ON)
+		warn_unknown_error(s);
+	if (!rc && s->run.end == MERGE_CONTINUES)
 		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s",
-			       target_shown(s->a->render.output), (unsigned long long)s->image.rounds,
+			       target_display_name(s->args->render.output), (unsigned long long)s->image.rounds,
 			       s->image.rounds == 1 ? "" : "s");
 	return rc;
 }
@@ -489,12 +492,12 @@ int main(int argc, char **argv)
 	static struct arguments a;
 	static struct session s;
 	struct error e = {""};
-	mem_keep(1 << 20);
+	mem_retain_freed(1 << 20);
 	a.threads = option_threads_default();
-	crash_exit("hslt-render");
-	program_options(&program, argc, argv, &a);
-	interrupt_say("hslt-render: interrupted before rendering began: nothing is kept\n");
-	s.a = &a;
+	crash_install_exit_handler("hslt-render");
+	program_parse_options(&program, argc, argv, &a);
+	interrupt_set_message("hslt-render: interrupted before rendering began: nothing is kept\n");
+	s.args = &a;
 	int rc = run_session(&s, &e);
 	canvas_image_fini(&s.image);
 	canvas_free(s.run.canvas);
@@ -503,11 +506,11 @@ int main(int argc, char **argv)
 	mem_free(s.name);
 	if (rc) {
 		place_print(stderr, "hslt-render: ", a.render.scene, e.text);
-		return s.usage ? 2 : 1;
+		return s.is_usage_error ? 2 : 1;
 	}
 	if (s.convergence.verdict == CHAINS_DISAGREE)
 		return 5;
-	bool missed =
-		s.plan.target_error > 0 && s.run.end != MERGE_ERROR && s.run.end != MERGE_BLACK && !s.run.lit.black;
+	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && s.run.end != MERGE_BLACK &&
+		      !s.run.bootstrap_result.black;
 	return missed ? 4 : 0;
 }

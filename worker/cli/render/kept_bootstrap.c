@@ -17,20 +17,20 @@
 #include <unistd.h>
 
 static const char magic[8] = "HSLTBOO1";
-enum { MARK = 24, AT_LENGTH = 20 };
+enum { MARK_SIZE = 24, LENGTH_OFFSET = 20 };
 
-static int marking_open(void *user, const char *name, struct asset *out, struct error *e)
+static int checksum_open(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct kept_bootstrap *k = user;
 	int rc = k->inner->open(k->inner->user, name, out, e);
 	if (rc)
 		return rc;
-	k->crc = crc32c(crc32c(k->crc, name, strlen(name) + 1), out->bytes, out->size);
-	k->bytes += out->size;
+	k->files_crc = crc32c(crc32c(k->files_crc, name, strlen(name) + 1), out->bytes, out->size);
+	k->files_bytes += out->size;
 	return 0;
 }
 
-static void marking_close(void *user, struct asset *a)
+static void checksum_close(void *user, struct asset *a)
 {
 	struct kept_bootstrap *k = user;
 	k->inner->close(k->inner->user, a);
@@ -40,28 +40,29 @@ struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct
 {
 	k->inner = inner;
 	return (struct asset_source){
-		.user = k, .open = marking_open, .close = marking_close, .decoded = inner->decoded};
+		.user = k, .open = checksum_open, .close = checksum_close, .picture_cache = inner->picture_cache};
 }
 
 static void add_text(struct kept_bootstrap *k, const char *text, const char *end)
 {
-	size_t n = strlen(k->text);
-	if ((size_t)snprintf(k->text + n, sizeof k->text - n, "%s%s", text, end) >= sizeof k->text - n)
+	size_t n = strlen(k->identity_text);
+	if ((size_t)snprintf(k->identity_text + n, sizeof k->identity_text - n, "%s%s", text, end) >=
+	    sizeof k->identity_text - n)
 		k->path[0] = 0; /* the text does not fit, so nothing is kept */
 }
 
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a)
 {
-	char options[PLAN_TEXT], counts[128];
+	char options[PLAN_TEXT_MAX], counts[128];
 	bool is_file = image && strncmp(image, "/dev/", 5) != 0;
 	int n = is_file ? snprintf(k->path, sizeof k->path, "%s.bootstrap", image) : -1;
 	if (n < 0 || (size_t)n >= sizeof k->path - sizeof ".new")
 		k->path[0] = 0;
-	plan_options(p, 1, options, sizeof options);
+	plan_print_options(p, 1, options, sizeof options);
 	snprintf(counts, sizeof counts, "%u groups of %u parts, %llu samples", p->groups, p->parts,
 		 (unsigned long long)p->bootstrap);
-	k->text[0] = 0;
+	k->identity_text[0] = 0;
 	add_text(k, fingerprint, "\n");
 	add_text(k, options, "\n");
 	add_text(k, counts, "\n");
@@ -72,33 +73,33 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const cha
 }
 
 /* Writes the part of the file before the text. */
-static void pack_mark(const struct kept_bootstrap *k, unsigned char bytes[MARK])
+static void pack_mark(const struct kept_bootstrap *k, unsigned char bytes[MARK_SIZE])
 {
 	memcpy(bytes, magic, sizeof magic);
-	put32(bytes + 8, k->crc);
-	put64(bytes + 12, k->bytes);
-	put32(bytes + AT_LENGTH, (uint32_t)strlen(k->text));
+	put32(bytes + 8, k->files_crc);
+	put64(bytes + 12, k->files_bytes);
+	put32(bytes + LENGTH_OFFSET, (uint32_t)strlen(k->identity_text));
 }
 
 static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, struct error *e)
 {
-	unsigned char mark[MARK], want[MARK];
-	char text[KEPT_TEXT];
-	pack_mark(k, want);
+	unsigned char mark[MARK_SIZE], expected[MARK_SIZE];
+	char text[KEPT_TEXT_SIZE];
+	pack_mark(k, expected);
 	int rc = checked_file_read(f, mark, sizeof mark, e);
 	if (rc)
 		return rc;
-	uint32_t length = get32(mark + AT_LENGTH);
+	uint32_t length = get32(mark + LENGTH_OFFSET);
 	if (memcmp(mark, magic, sizeof magic) != 0 || length > sizeof text)
 		return error_set(e, EBADMSG, "not a kept bootstrap");
 	rc = checked_file_read(f, text, length, e);
-	if (!rc && (memcmp(mark, want, MARK) != 0 || memcmp(text, k->text, length) != 0))
+	if (!rc && (memcmp(mark, expected, MARK_SIZE) != 0 || memcmp(text, k->identity_text, length) != 0))
 		rc = error_set(e, ESTALE, "it is of another plan, scene, program or machine");
 	return rc;
 }
 
 /* Whether the file begins like a kept bootstrap. */
-static bool is_ours(const char *path)
+static bool is_kept_bootstrap(const char *path)
 {
 	char begin[sizeof magic];
 	FILE *f = fopen(path, "rb");
@@ -120,7 +121,7 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 {
 	struct checked_file f;
 	struct error e;
-	uint32_t all = bootstrap_missing(b);
+	uint32_t missing_before = bootstrap_missing_count(b);
 	text[0] = 0;
 	if (!k->path[0])
 		return;
@@ -132,29 +133,29 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 		if (!rc)
 			rc = bootstrap_load(b, &f, &e);
 		if (!rc)
-			rc = checked_file_end(&f, &e);
+			rc = checked_file_expect_end(&f, &e);
 		checked_file_close(&f);
 	}
-	k->resumed = bootstrap_missing(b) < all;
-	k->damaged = rc == -EBADMSG && is_ours(k->path);
+	k->resumed = bootstrap_missing_count(b) < missing_before;
+	k->damaged = rc == -EBADMSG && is_kept_bootstrap(k->path);
 	if (rc)
 		snprintf(text, size, "%.300s is not used: %.128s", k->path, without_path(&e, k->path));
 	else
 		snprintf(text, size, "continues from %u of %u leases of the bootstrap, kept in %.300s",
-			 all - bootstrap_missing(b), all, k->path);
+			 missing_before - bootstrap_missing_count(b), missing_before, k->path);
 }
 
 static int write_file(const struct kept_bootstrap *k, const char *path, const struct bootstrap *b, struct error *e)
 {
 	struct checked_file f;
-	unsigned char mark[MARK];
+	unsigned char mark[MARK_SIZE];
 	int rc = checked_file_create(&f, path, e);
 	if (rc)
 		return rc;
 	pack_mark(k, mark);
 	rc = checked_file_write(&f, mark, sizeof mark, e);
 	if (!rc)
-		rc = checked_file_write(&f, k->text, strlen(k->text), e);
+		rc = checked_file_write(&f, k->identity_text, strlen(k->identity_text), e);
 	if (!rc)
 		rc = bootstrap_save(b, &f, e);
 	if (!rc)
@@ -169,27 +170,27 @@ static int write_file(const struct kept_bootstrap *k, const char *path, const st
 
 void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
 {
-	char path[KEPT_PATH];
+	char path[KEPT_PATH_SIZE];
 	struct error e;
-	uint32_t done = bootstrap_done(b);
+	uint32_t done = bootstrap_added_count(b);
 	if (done == 0)
 		snprintf(
-			k->said, sizeof k->said,
+			k->message, sizeof k->message,
 			"; nothing is kept: of the %u leases of the bootstrap none was finished, which smaller ones are "
 			"sooner (more --parts, or a smaller --bootstrap)",
-			bootstrap_missing(b));
+			bootstrap_missing_count(b));
 	else if (!k->path[0])
-		snprintf(k->said, sizeof k->said,
+		snprintf(k->message, sizeof k->message,
 			 "; nothing is kept: the bootstrap can be only beside an image in a file (-o)");
 	if (done == 0 || !k->path[0])
 		return;
-	snprintf(path, sizeof path, "%.*s.new", KEPT_PATH - 8, k->path);
+	snprintf(path, sizeof path, "%.*s.new", KEPT_PATH_SIZE - 8, k->path);
 	if (write_file(k, path, b, &e))
-		snprintf(k->said, sizeof k->said, "; the bootstrap could not be kept: %.300s", e.text);
+		snprintf(k->message, sizeof k->message, "; the bootstrap could not be kept: %.300s", e.text);
 	else
-		snprintf(k->said, sizeof k->said,
+		snprintf(k->message, sizeof k->message,
 			 "; %u of %u leases of the bootstrap are kept in %s, and the same command continues from them",
-			 done, done + bootstrap_missing(b), k->path);
+			 done, done + bootstrap_missing_count(b), k->path);
 }
 
 void kept_bootstrap_end(const struct kept_bootstrap *k)

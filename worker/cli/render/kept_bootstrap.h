@@ -23,17 +23,17 @@
 #include "worker/cli/base/options.h"
 #include "worker/render/asset/asset.h"
 
-enum { KEPT_PATH = 4096, KEPT_TEXT = 8192 };
+enum { KEPT_PATH_SIZE = 4096, KEPT_TEXT_SIZE = 8192 };
 
 struct kept_bootstrap {
-	const struct asset_source *inner; /* the source of the scene's files */
-	uint32_t crc;			  /* of names and contents of the files, in the order of opening */
-	uint64_t bytes;			  /* sum of the sizes of the files */
-	char path[KEPT_PATH];		  /* "": nothing can be kept */
-	char text[KEPT_TEXT];		  /* fingerprint, plan and defines */
-	bool resumed;			  /* leases were added from the file */
-	bool damaged;			  /* the file is a kept bootstrap, but damaged */
-	char said[KEPT_PATH + 256];	  /* set by kept_bootstrap_write: the end of a sentence for the user */
+	const struct asset_source *inner;   /* the source of the scene's files */
+	uint32_t files_crc;		    /* of names and contents of the files, in the order of opening */
+	uint64_t files_bytes;		    /* sum of the sizes of the files */
+	char path[KEPT_PATH_SIZE];	    /* "": nothing can be kept */
+	char identity_text[KEPT_TEXT_SIZE]; /* fingerprint, plan and defines */
+	bool resumed;			    /* leases were added from the file */
+	bool damaged;			    /* the file is a kept bootstrap, but damaged */
+	char message[KEPT_PATH_SIZE + 256]; /* set by kept_bootstrap_write: the end of a sentence for the user */
 };
 
 /* Returns a source that opens the files of `inner` and adds them to the checksum. k and inner must outlive it. */
@@ -43,9 +43,9 @@ struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct
  * program (worker/render/fingerprint.h). */
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a);
-/* Adds the leases in the file, if there is one. text: a message for the user, or "". */
+/* Adds the leases in the file, if there is one. identity_text: a message for the user, or "". */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size);
-/* Writes the finished leases, if there are any, and sets k->said. */
+/* Writes the finished leases, if there are any, and sets k->message. */
 void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b);
 /* Removes the file, if leases were added from it or it is damaged; another command's file stays. Call when the image is
  * written. */

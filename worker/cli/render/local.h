@@ -12,11 +12,11 @@
 
 /* The progress after a lease. */
 struct local_progress {
-	const char *state;	      /* bootstrap, running */
-	uint64_t done, total;	      /* leases of the whole job; total UINT64_MAX: not known */
-	double seconds;		      /* wall-clock time since the first bootstrap sample */
+	const char *state;		    /* bootstrap, running */
+	uint64_t leases_done, leases_total; /* leases of the whole job; total UINT64_MAX: not known */
+	double seconds;			    /* wall-clock time since the first bootstrap sample */
 	double rounds, round_seconds; /* rounds done, with a fraction, and the time for them; 0: still the bootstrap */
-	double rounds_left; /* rounds up to the plan's bound on them, with a fraction; INFINITY: it has none */
+	double rounds_remaining; /* rounds up to the plan's bound on them, with a fraction; INFINITY: it has none */
 };
 
 /* The state after a complete round. */
@@ -34,19 +34,20 @@ struct local_run {
 	const struct plan *plan;
 	unsigned threads;
 	const atomic_bool *stop; /* may become true at any time; complete rounds are kept */
-	void (*progress)(void *user, const struct local_progress *p); /* under the lock, from any thread; may be NULL */
+	void (*on_progress)(void *user,
+			    const struct local_progress *p); /* under the lock, from any thread; may be NULL */
 	/* Called after each complete round, from the calling thread while no lease runs. May set *stop: then the rounds
-	 * end, and `end` stays MERGE_GOES_ON. Its CPU time is not counted. May be NULL. */
-	void (*round)(void *user, const struct local_round *r);
+	 * end, and `end` stays MERGE_CONTINUES. Its CPU time is not counted. May be NULL. */
+	void (*on_round)(void *user, const struct local_round *r);
 	/* resume is called before the bootstrap, to add leases that an earlier run kept; keep after a stop before the
 	 * first round was complete, to keep the finished leases. From the calling thread; may be NULL. */
-	int (*resume)(void *user, struct bootstrap *b, struct error *e);
-	void (*keep)(void *user, const struct bootstrap *b);
+	int (*load_bootstrap)(void *user, struct bootstrap *b, struct error *e);
+	void (*save_bootstrap)(void *user, const struct bootstrap *b);
 	void *user;
 	/* Set by the run. */
 	struct canvas *canvas; /* freed with canvas_free; NULL: stopped before the bootstrap was complete, or failed */
-	struct bootstrap_result lit;
-	enum merge_end end; /* MERGE_GOES_ON: stopped */
+	struct bootstrap_result bootstrap_result;
+	enum merge_end end; /* MERGE_CONTINUES: stopped */
 	double seconds;	    /* wall-clock time from the first bootstrap sample to the last merge */
 	double cpu_seconds; /* CPU time of all leases */
 	double bootstrap_cpu_seconds, bootstrap_seconds; /* the part of the bootstrap in both */
@@ -57,8 +58,8 @@ int local_run(struct local_run *r, struct error *e);
 
 /*
  * The same in steps, for jobs that alternate: local_start runs the bootstrap, local_step one round. The plan's bounds
- * and the callback `round` are ignored; the caller decides when to end. canvas_rounds tells whether a round was
- * completed or stopped. The run must outlive the job.
+ * and the callback `on_round` are ignored; the caller decides when to end. canvas_complete_rounds tells whether a round
+ * was completed or stopped. The run must outlive the job.
  */
 struct local_job;
 int local_start(struct local_run *r, struct local_job **j, struct error *e);

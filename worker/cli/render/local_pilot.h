@@ -14,15 +14,15 @@ struct local_pilot {
 	double seconds;			    /* length of the pilot */
 	unsigned threads;
 	atomic_bool *stop; /* may become true at any time; the pilot sets it when it has enough estimates */
-	void (*progress)(void *user, const struct local_progress *p); /* may be NULL */
+	void (*on_progress)(void *user, const struct local_progress *p); /* may be NULL */
 	void *user;
 	/* Set by local_pilot. */
-	struct plan render, plan;		 /* the plans of the render being predicted, and of the pilot */
-	struct forecast_history looks;		 /* estimates of the pilot's error */
-	bool timed;				 /* the probe is over, and the pilot itself has started */
-	bool over;				 /* the pilot has ended itself by *stop */
-	double cpu_seconds, wall_seconds;	 /* of the pilot, its bootstrap included */
-	double bootstrap_cpu, bootstrap_seconds; /* CPU and wall-clock time of its bootstrap */
+	struct plan render, plan;			 /* the plans of the render being predicted, and of the pilot */
+	struct forecast_history looks;			 /* estimates of the pilot's error */
+	bool is_timed;					 /* the probe is over, and the pilot itself has started */
+	bool has_ended;					 /* the pilot has ended itself by *stop */
+	double cpu_seconds, wall_seconds;		 /* of the pilot, its bootstrap included */
+	double bootstrap_cpu_seconds, bootstrap_seconds; /* CPU and wall-clock time of its bootstrap */
 };
 
 /* Runs probe and pilot. Returns -EINTR if *stop was set before the bootstrap of either was complete. */

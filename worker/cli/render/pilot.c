@@ -7,12 +7,12 @@
 
 enum {
 	PROBE_BOOTSTRAP = 16384,
-	PROBE_EPOCH = 16,	      /* mutations per chain; starting a chain costs about one */
-	PROBE_SAMPLES_MOST = 1 << 21, /* if the shortest round has more samples, there is no probe */
+	PROBE_EPOCH = 16,	     /* mutations per chain; starting a chain costs about one */
+	PROBE_SAMPLES_MAX = 1 << 21, /* if the shortest round has more samples, there is no probe */
 };
-static const double out_of_reach = 1e-9;    /* a target error that no pilot reaches */
-static const double bootstrap_share = 0.25; /* of the pilot's time, at most */
-static const double probe_seconds = 1;	    /* of one thread: limits the probe's bootstrap if samples take many rays */
+static const double unreachable_error = 1e-9;	/* a target error that no pilot reaches */
+static const double max_bootstrap_share = 0.25; /* of the pilot's time, at most */
+static const double probe_seconds = 1; /* of one thread: limits the probe's bootstrap if samples take many rays */
 
 int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {
@@ -23,12 +23,12 @@ int pilot_plan_from_scene(struct render_arguments *a, const struct render_summar
 	return rc;
 }
 
-static struct plan_request open_ended(const struct plan_request *request, const struct plan *render)
+static struct plan_request unbounded_request(const struct plan_request *request, const struct plan *render)
 {
 	struct plan_request r = *request;
 	r.spp = r.mutations = 0;
 	r.seconds = 0;
-	r.target_error = out_of_reach;
+	r.target_error = unreachable_error;
 	r.groups = render->groups;
 	r.chains = render->chains;
 	r.bootstrap = render->bootstrap;
@@ -46,10 +46,10 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 	return rc;
 }
 
-bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe)
+bool pilot_probe_request(const struct plan_request *request, const struct plan *render, struct plan_request *probe)
 {
-	*probe = open_ended(request, render);
-	uint64_t room = plan_bootstrap_room(request, probe_seconds);
+	*probe = unbounded_request(request, render);
+	uint64_t room = plan_affordable_bootstrap(request, probe_seconds);
 	probe->bootstrap = room < PROBE_BOOTSTRAP ? room : PROBE_BOOTSTRAP;
 	if (render->bootstrap < probe->bootstrap)
 		probe->bootstrap = render->bootstrap;
@@ -61,22 +61,24 @@ bool pilot_probe(const struct plan_request *request, const struct plan *render, 
 	}
 	uint64_t round = plan_extended_pixels(render) * render->groups;
 	probe->spp = render->groups;
-	return round <= PROBE_SAMPLES_MOST;
+	return round <= PROBE_SAMPLES_MAX;
 }
 
 void pilot_request(const struct plan_request *request, const struct plan *render, const struct plan_request *probe,
 		   const struct pilot_cost *cost, double seconds, struct plan_request *pilot)
 {
-	*pilot = open_ended(request, render);
+	*pilot = unbounded_request(request, render);
 	pilot->seconds = seconds;
 	pilot->epoch = 1;
 	if (!cost)
 		return;
-	double sample = cost->bootstrap / (double)probe->bootstrap, most = bootstrap_share * seconds / sample;
-	if (most < (double)pilot->bootstrap)
-		pilot->bootstrap = (uint64_t)fmax((double)probe->bootstrap, most);
-	double left = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
-	double epochs = left / PILOT_ROUNDS / cost->rounds;
-	double longest = (double)render->epoch / (double)probe->epoch; /* the pilot's epoch is at most the render's */
-	pilot->epoch = (uint64_t)fmax(1, (double)probe->epoch * fmin(epochs, longest));
+	double sample = cost->bootstrap_seconds / (double)probe->bootstrap,
+	       max_bootstrap = max_bootstrap_share * seconds / sample;
+	if (max_bootstrap < (double)pilot->bootstrap)
+		pilot->bootstrap = (uint64_t)fmax((double)probe->bootstrap, max_bootstrap);
+	double remaining = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
+	double epochs = remaining / PILOT_ROUNDS / cost->round_seconds;
+	double max_epochs =
+		(double)render->epoch / (double)probe->epoch; /* the pilot's epoch is at most the render's */
+	pilot->epoch = (uint64_t)fmax(1, (double)probe->epoch * fmin(epochs, max_epochs));
 }

@@ -12,9 +12,9 @@
 enum {
 	PILOT_SECONDS = 60,	/* default length */
 	PILOT_ROUNDS = 16,	/* the goal, which gives about a dozen estimates */
-	PILOT_LOOKS = 4,	/* with fewer estimates, a pilot takes up to four times its length */
-	PILOT_LOOKS_LEAST = 2,	/* with fewer, it goes on, whatever the time, until it has PILOT_ROUNDS_MOST rounds */
-	PILOT_ROUNDS_MOST = 64, /* see PILOT_LOOKS_LEAST */
+	PILOT_LOOKS_WANTED = 4, /* with fewer estimates, a pilot takes up to four times its length */
+	PILOT_LOOKS_MIN = 2,	/* with fewer, it goes on, whatever the time, until it has PILOT_ROUNDS_MAX rounds */
+	PILOT_ROUNDS_MAX = 64,	/* see PILOT_LOOKS_MIN */
 };
 
 struct render_arguments;
@@ -29,12 +29,12 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 
 /* Wall-clock seconds of a probe. */
 struct pilot_cost {
-	double bootstrap, rounds;
+	double bootstrap_seconds, round_seconds;
 };
 
 /* Makes the request of the probe. Returns false if no probe is needed, because even an epoch of one sample, the
  * shortest, is as long as a pilot's should be. */
-bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe);
+bool pilot_probe_request(const struct plan_request *request, const struct plan *render, struct plan_request *probe);
 /* Makes the request of the pilot. cost: of the probe; NULL: there was none. */
 void pilot_request(const struct plan_request *request, const struct plan *render, const struct plan_request *probe,
 		   const struct pilot_cost *cost, double seconds, struct plan_request *pilot);

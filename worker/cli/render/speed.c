@@ -8,15 +8,15 @@ enum {
 	CHAINS = 16,
 	BOOTSTRAP = 4096,
 	FIRST_EPOCH = 32, /* of chains; each further epoch is eight times as long */
-	LONGEST_EPOCH = 1 << 20,
-	SMALL_FILM = 1 << 13, /* pixels */
+	EPOCH_MAX = 1 << 20,
+	SPEED_FILM_PIXELS = 1 << 13, /* pixels */
 };
-static const double enough_seconds = 0.25; /* a render at least as long is measured accurately enough */
+static const double min_seconds = 0.25; /* a render at least as long is measured accurately enough */
 
 /* Samples are measured on a smaller film of the same view, because a round has at least one sample per pixel. */
 static void shrink_film(struct render_options *o, struct plan_request *r)
 {
-	double scale = sqrt(SMALL_FILM / ((double)r->width * r->height));
+	double scale = sqrt(SPEED_FILM_PIXELS / ((double)r->width * r->height));
 	r->crop_x = r->crop_y = r->crop_width = r->crop_height = 0;
 	if (scale >= 1)
 		return;
@@ -24,7 +24,7 @@ static void shrink_film(struct render_options *o, struct plan_request *r)
 	r->height = o->height = (uint32_t)fmax(1, round(scale * r->height));
 }
 
-static struct plan_request pilot_of(const struct render_arguments *a)
+static struct plan_request speed_request(const struct render_arguments *a)
 {
 	struct plan_request r = a->plan;
 	r.spp = r.mutations = 0;
@@ -35,13 +35,13 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 }
 
 /* Repeats the render, each time with a longer epoch, until it takes long enough to be measured. */
-static int measure_speed(const struct world *w, struct plan_request *r, double *speed, struct error *e)
+static int measure_in_world(const struct world *w, struct plan_request *r, double *speed, struct error *e)
 {
 	static const atomic_bool never;
 	int counted = r->rays.bootstrap > 0 ? 0 : render_count_rays(w, r, &r->rays, e);
 	if (counted)
 		return counted;
-	uint64_t room = plan_bootstrap_room(r, enough_seconds);
+	uint64_t room = plan_affordable_bootstrap(r, min_seconds);
 	r->bootstrap = room < BOOTSTRAP ? room : BOOTSTRAP;
 	for (r->epoch = r->kind == PLAN_CHAINS ? FIRST_EPOCH : 1;; r->epoch *= 8) {
 		struct plan p;
@@ -54,10 +54,10 @@ static int measure_speed(const struct world *w, struct plan_request *r, double *
 			return rc;
 		double seconds = l.cpu_seconds - l.bootstrap_cpu_seconds;
 		canvas_free(l.canvas);
-		if (l.lit.black && r->kind == PLAN_CHAINS)
+		if (l.bootstrap_result.black && r->kind == PLAN_CHAINS)
 			return 0;
-		if (seconds >= enough_seconds || r->epoch >= LONGEST_EPOCH) {
-			*speed = fmin((double)plan_round_mutations(&p) / fmax(seconds, 1e-6), PLAN_SPEED_MOST);
+		if (seconds >= min_seconds || r->epoch >= EPOCH_MAX) {
+			*speed = fmin((double)plan_round_mutations(&p) / fmax(seconds, 1e-6), PLAN_SPEED_MAX);
 			return 0;
 		}
 	}
@@ -66,7 +66,7 @@ static int measure_speed(const struct world *w, struct plan_request *r, double *
 int speed_measure(const struct render_arguments *a, const char *folder, const char *name, double *speed,
 		  struct error *e)
 {
-	struct plan_request r = pilot_of(a);
+	struct plan_request r = speed_request(a);
 	struct render_options o = a->render;
 	struct scene scene;
 	struct world *w;
@@ -74,7 +74,7 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	if (r.kind == PLAN_SAMPLES)
 		shrink_film(&o, &r);
 	struct asset_folders folders = option_folders(a, folder);
-	struct asset_source assets = asset_search(&folders);
+	struct asset_source assets = asset_source_for_folders(&folders);
 	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &o, e);
 	if (rc)
 		return rc;
@@ -82,7 +82,7 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	scene_fini(&scene);
 	if (rc)
 		return rc;
-	rc = measure_speed(w, &r, speed, e);
+	rc = measure_in_world(w, &r, speed, e);
 	world_free(w);
 	return rc;
 }

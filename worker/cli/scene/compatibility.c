@@ -27,7 +27,7 @@ static const char *const headings[PLUGIN_CLASSES] = {
 	[PLUGIN_MEDIUM] = "Media",     [PLUGIN_PHASE] = "Phase functions", [PLUGIN_VOLUME] = "Volumes",
 };
 
-static void print_params(FILE *out, const struct plugin_decl *d, enum param_class status)
+static void print_params(FILE *out, const struct plugin_decl *d, enum param_status status)
 {
 	const char *before = "";
 	for (const struct param *p = d->params; p && p->name; p++)
@@ -50,22 +50,23 @@ static void print_supported(FILE *out, const struct plugin_decl *d)
 	fprintf(out, " |\n");
 }
 
-static bool is_same(const struct integrator_image *a, const struct integrator_image *b)
+static bool shows_same_light(const struct integrator_image *a, const struct integrator_image *b)
 {
-	return a->other == b->other && a->direct == b->direct && a->prb == b->prb && a->no_media == b->no_media;
+	return a->shows_other == b->shows_other && a->is_direct == b->is_direct && a->is_prb == b->is_prb &&
+	       a->lacks_media == b->lacks_media;
 }
 
 static void print_image(FILE *out, const struct integrator_image *image)
 {
-	if (image->other)
+	if (image->shows_other)
 		fprintf(out, "all light, or that of the integrator inside, with a note");
-	else if (image->direct)
+	else if (image->is_direct)
 		fprintf(out, "light that is scattered once, with a note");
 	else
 		fprintf(out, "all light");
-	if (image->prb)
+	if (image->is_prb)
 		fprintf(out, ", by paths of %d edges if there is no `max_depth`", SCENE_PRB_DEPTH);
-	fprintf(out, image->no_media ? "; no media without `--set media=shown`, with a note |\n" : " |\n");
+	fprintf(out, image->lacks_media ? "; no media without `--set media=shown`, with a note |\n" : " |\n");
 }
 
 /* Prints a table of the light that the image shows for each integrator of a scene, with one row for all integrators
@@ -76,15 +77,15 @@ static void print_integrators(FILE *out)
 	const char *type;
 	fprintf(out, "\n`--integrator` chooses how light is found; the scene's own says which light:\n\n"
 		     "| type | the image shows |\n|---|---|\n");
-	for (size_t i = 0; integrators_at(i, &image); i++) {
+	for (size_t i = 0; integrator_type_at(i, &image); i++) {
 		size_t first = 0;
-		while (integrators_at(first, &other) && !is_same(&image, &other))
+		while (integrator_type_at(first, &other) && !shows_same_light(&image, &other))
 			first++;
 		if (first < i)
 			continue;
 		const char *before = "| ";
-		for (size_t k = i; (type = integrators_at(k, &other)); k++)
-			if (is_same(&image, &other)) {
+		for (size_t k = i; (type = integrator_type_at(k, &other)); k++)
+			if (shows_same_light(&image, &other)) {
 				fprintf(out, "%s`%s`", before, type);
 				before = ", ";
 			}
@@ -98,7 +99,7 @@ static void print_samplers(FILE *out)
 {
 	enum plugin_class cls;
 	const char *type, *before = "\nAny sampler is accepted, and samples are independent; Mitsuba's are ";
-	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++)
+	for (size_t i = 0; (type = plugin_mitsuba_at(i, &cls)); i++)
 		if (cls == PLUGIN_SAMPLER) {
 			fprintf(out, "%s`%s`", before, type);
 			before = ", ";
@@ -162,34 +163,35 @@ static void print_subsurfaces(FILE *out)
 	const char *type, *becomes;
 	fprintf(out, "\n## Subsurface scattering of 0.6\n\nRefused; media inside shapes are supported.\n\n"
 		     "| `<subsurface type>` | with `--lenient` |\n|---|---|\n");
-	for (size_t i = 0; (type = subsurface_at(i, &becomes)); i++)
+	for (size_t i = 0; (type = subsurface_model_at(i, &becomes)); i++)
 		fprintf(out, "| `%s` | %s |\n", type, becomes);
 }
 
-static void print_renamed(FILE *out, const struct renamed *n, const char *versions)
+static void print_renamed(FILE *out, const struct renamed_name *n, const char *versions)
 {
 	if (!n->element)
-		fprintf(out, "| `<%s>` | `<%s>` | %s |\n", n->old, n->now, versions);
-	else if (!n->parameter)
-		fprintf(out, "| %s `%s` | `%s` | %s |\n", n->element, n->old, n->now, versions);
+		fprintf(out, "| `<%s>` | `<%s>` | %s |\n", n->old, n->current, versions);
+	else if (!n->is_parameter)
+		fprintf(out, "| %s `%s` | `%s` | %s |\n", n->element, n->old, n->current, versions);
 	else if (n->type)
-		fprintf(out, "| `%s` of the %s `%s` | `%s` | %s |\n", n->old, n->element, n->type, n->now, versions);
+		fprintf(out, "| `%s` of the %s `%s` | `%s` | %s |\n", n->old, n->element, n->type, n->current,
+			versions);
 	else
-		fprintf(out, "| `%s` of each %s | `%s` | %s |\n", n->old, n->element, n->now, versions);
+		fprintf(out, "| `%s` of each %s | `%s` | %s |\n", n->old, n->element, n->current, versions);
 }
 
 static void print_other_names(FILE *out)
 {
-	struct renamed n;
+	struct renamed_name n;
 	char versions[32];
 	fprintf(out, "\n## Other names\n\nThose of older versions, read as the ones of today.\n\n"
 		     "| name | read as | in files of |\n|---|---|---|\n");
-	for (size_t i = 0; upgrade_name_at(i, &n); i++) {
-		snprintf(versions, sizeof versions, "before 0.%d", n.before);
+	for (size_t i = 0; upgrade_rename_at(i, &n); i++) {
+		snprintf(versions, sizeof versions, "before 0.%d", n.dropped_in_minor);
 
-		print_renamed(out, &n, n.before ? versions : "2.x and 3.x");
+		print_renamed(out, &n, n.dropped_in_minor ? versions : "2.x and 3.x");
 	}
-	for (size_t i = 0; plugin_new_name_at(i, &n); i++)
+	for (size_t i = 0; plugin_renamed_param(i, &n); i++)
 		print_renamed(out, &n, "0.5 and 0.6");
 }
 
@@ -197,7 +199,7 @@ static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
 {
 	const char *stand_in;
 	fprintf(out, "| %s | `%s` | ", plugin_class_name(cls), type);
-	switch (lenient_plugin(cls, type, &stand_in)) {
+	switch (lenient_plugin_action(cls, type, &stand_in)) {
 	case LENIENT_REFUSE:
 		fprintf(out, "refused |\n");
 		break;
@@ -227,7 +229,7 @@ static void print_unsupported(FILE *out)
 		"3.7.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;
-	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++) {
+	for (size_t i = 0; (type = plugin_mitsuba_at(i, &cls)); i++) {
 		const struct plugin_decl *d = plugin_find(render_plugins(), cls, type);
 		if (!d)
 			print_stand_in(out, cls, type);

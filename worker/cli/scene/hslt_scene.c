@@ -16,9 +16,9 @@ struct arguments {
 };
 
 static const struct option_row rows[] = {
-	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(option_define)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_CUSTOM(option_define)},
 	{"path", 'p', "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
-	 OPTION_TAKE(option_path)},
+	 OPTION_CUSTOM(option_path)},
 	{"lenient", 'l', NULL,
 	 "Like --lenient of hslt-render: leave out or replace what is not supported, with a note instead of a problem",
 	 OPTION_FLAG(struct arguments, lenient)},
@@ -41,7 +41,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return 0;
 }
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	const struct arguments *a = target;
 	bool reads = strcmp(a->verb, "compatibility") != 0;
@@ -56,7 +56,7 @@ static int check(void *target, struct error *e)
 
 static const struct program program = {
 	.name = "hslt-scene",
-	.words = "check|show SCENE.xml\ncompatibility",
+	.synopsis = "check|show SCENE.xml\ncompatibility",
 	.summary = "Lists the problems of a scene file, or what was read from it. Renders nothing.",
 	.examples = "hslt-scene check room.xml\n"
 		    "hslt-scene check -D light=sun room.xml\n"
@@ -66,10 +66,10 @@ static const struct program program = {
 		"`note:` for what is ignored.\nshow: film, camera, counts, the effects that the scene needs, "
 		"and its files with the first digits of their SHA-256.\ncompatibility: what is supported of Mitsuba's "
 		"scenes, all plug-ins and parameters, as in docs/compatibility.md.",
-	.exits = "0 the scene can be rendered, 1 it cannot, 2 usage",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.exit_codes = "0 the scene can be rendered, 1 it cannot, 2 usage",
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
 	.verbs = verb_at,
-	.word = take_word,
+	.parse_word = take_word,
 };
 
 int main(int argc, char **argv)
@@ -77,7 +77,7 @@ int main(int argc, char **argv)
 	static struct arguments a;
 	struct error e;
 	bool bad = false;
-	program_options(&program, argc, argv, &a);
+	program_parse_options(&program, argc, argv, &a);
 	if (!a.render.scene) {
 		compatibility_print(stdout);
 		return 0;

@@ -22,23 +22,23 @@
 #include <string.h>
 
 /* An open scene file: its folder, its name there, and the folder's files. */
-struct opened {
+struct opened_scene {
 	char *folder, *name;
 	struct asset_folders folders;
 	struct asset_source assets;
 };
 
-static int open_scene(const struct render_arguments *a, struct opened *o, struct error *e)
+static int open_scene(const struct render_arguments *a, struct opened_scene *o, struct error *e)
 {
 	int rc = scene_path_split(a->scene, a, &o->folder, &o->name, e);
 	if (rc)
 		return rc;
 	o->folders = option_folders(a, o->folder);
-	o->assets = asset_search(&o->folders);
+	o->assets = asset_source_for_folders(&o->folders);
 	return 0;
 }
 
-static void close_scene(struct opened *o)
+static void close_scene(struct opened_scene *o)
 {
 	mem_free(o->folder);
 	mem_free(o->name);
@@ -60,11 +60,11 @@ struct problem {
 
 struct problem_list {
 	size_t count;
-	struct problem *at;
+	struct problem *problems;
 };
 
 /* Returns the length of the file's name, and the line: 4 and 12 for "file:12". */
-static size_t place_of(const char *text, unsigned long *line)
+static size_t parse_place(const char *text, unsigned long *line)
 {
 	const char *colon = strchr(text, ':');
 	*line = colon ? strtoul(colon + 1, NULL, 10) : 0;
@@ -74,23 +74,24 @@ static size_t place_of(const char *text, unsigned long *line)
 static void add_problem(struct problem_list *p, const char *text)
 {
 	unsigned long line, other;
-	size_t n = place_of(text, &line), file = 0;
-	struct problem *more = mem_grow(p->at, p->count * sizeof *more, (p->count + 1) * sizeof *more);
+	size_t n = parse_place(text, &line), file = 0;
+	struct problem *more = mem_grow(p->problems, p->count * sizeof *more, (p->count + 1) * sizeof *more);
 	char *copy = mem_strdup(text);
-	p->at = more ? more : p->at;
+	p->problems = more ? more : p->problems;
 	if (!more || !copy) {
 		mem_free(copy);
 		printf("%s\n", text);
 		return;
 	}
-	while (file < p->count && (place_of(p->at[file].text, &other) != n || memcmp(p->at[file].text, text, n) != 0))
+	while (file < p->count &&
+	       (parse_place(p->problems[file].text, &other) != n || memcmp(p->problems[file].text, text, n) != 0))
 		file++;
-	file = file < p->count ? p->at[file].file : p->count;
-	p->at[p->count] = (struct problem){copy, file, p->count, line};
+	file = file < p->count ? p->problems[file].file : p->count;
+	p->problems[p->count] = (struct problem){copy, file, p->count, line};
 	p->count++;
 }
 
-static int by_place(const void *x, const void *y)
+static int compare_places(const void *x, const void *y)
 {
 	const struct problem *a = x, *b = y;
 	if (a->file != b->file)
@@ -103,17 +104,17 @@ static int by_place(const void *x, const void *y)
 static void print_problems(struct problem_list *p, const char *scene)
 {
 	if (p->count)
-		qsort(p->at, p->count, sizeof *p->at, by_place);
+		qsort(p->problems, p->count, sizeof *p->problems, compare_places);
 	for (size_t i = 0; i < p->count; i++) {
-		place_print(stdout, "", scene, p->at[i].text);
-		mem_free(p->at[i].text);
+		place_print(stdout, "", scene, p->problems[i].text);
+		mem_free(p->problems[i].text);
 	}
-	mem_free(p->at);
+	mem_free(p->problems);
 }
 
 /* Adds a problem for each file that cannot be opened, and returns their number. The contents of the others are checked
- * later, by find_deeper. */
-static uint32_t find_missing(const struct scene *s, const struct asset_source *assets, struct problem_list *list)
+ * later, by find_build_problems. */
+static uint32_t find_missing_files(const struct scene *s, const struct asset_source *assets, struct problem_list *list)
 {
 	uint32_t missing = 0;
 	char text[2048];
@@ -136,22 +137,22 @@ static uint32_t find_missing(const struct scene *s, const struct asset_source *a
 }
 
 /* Returns whether a problem is at this line of this file. */
-static bool same_place(const char *text, const char *file, size_t n, unsigned long line)
+static bool is_at_place(const char *text, const char *file, size_t n, unsigned long line)
 {
-	unsigned long own;
-	return place_of(text, &own) == n && memcmp(text, file, n) == 0 && own == line;
+	unsigned long problem_line;
+	return parse_place(text, &problem_line) == n && memcmp(text, file, n) == 0 && problem_line == line;
 }
 
-/* Returns whether a problem found by building may only follow from one of the first `count` problems, found by reading:
- * it has no line, or the line of such a problem, or of an object that lacks something. */
-static bool may_follow(const struct scene *s, const struct problem_list *list, size_t count, const char *text)
+/* Returns whether a problem found by building may only follow from one of the first `read_count` problems, found by
+ * reading: it has no line, or the line of such a problem, or of an object that lacks something. */
+static bool may_follow(const struct scene *s, const struct problem_list *list, size_t read_count, const char *text)
 {
 	unsigned long line;
-	size_t n = place_of(text, &line);
+	size_t n = parse_place(text, &line);
 	if (line == 0)
 		return true;
-	for (size_t i = 0; i < count; i++)
-		if (same_place(list->at[i].text, text, n, line))
+	for (size_t i = 0; i < read_count; i++)
+		if (is_at_place(list->problems[i].text, text, n, line))
 			return true;
 	for (uint32_t i = 0; i < s->flawed_count; i++)
 		if (strlen(s->flawed[i]->file) == n && memcmp(s->flawed[i]->file, text, n) == 0 &&
@@ -162,10 +163,10 @@ static bool may_follow(const struct scene *s, const struct problem_list *list, s
 
 /* Adds the problems that the reader cannot see: in meshes, pictures, and values that do not fit together. Returns their
  * number. */
-static uint32_t find_deeper(const struct scene *s, const struct asset_source *assets, struct problem_list *list,
-			    struct render_summary *m)
+static uint32_t find_build_problems(const struct scene *s, const struct asset_source *assets, struct problem_list *list,
+				    struct render_summary *m)
 {
-	const struct render_options as_it_is = {0};
+	const struct render_options default_options = {0};
 	const size_t before = list->count;
 	struct arena arena = {0};
 	struct report found = {.problem_count = 0};
@@ -173,7 +174,7 @@ static uint32_t find_deeper(const struct scene *s, const struct asset_source *as
 	uint32_t problems = 0;
 	int rc = report_init(&found, &arena, &e);
 	if (!rc)
-		rc = render_check_all(s, assets, &as_it_is, &found, m, &e);
+		rc = render_check_all(s, assets, &default_options, &found, m, &e);
 	for (uint32_t i = 0; i < found.problem_count; i++)
 		if (!before || !may_follow(s, list, before, found.problems[i])) {
 			add_problem(list, found.problems[i]);
@@ -205,9 +206,9 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	struct problem_list list = {0};
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		add_problem(&list, s->problems[i]);
-	problems += find_missing(s, assets, &list);
+	problems += find_missing_files(s, assets, &list);
 	if (!problems || (s->object_count > 0 && problems < REPORT_PROBLEMS_MAX))
-		problems += find_deeper(s, assets, &list, &m);
+		problems += find_build_problems(s, assets, &list, &m);
 	print_problems(&list, scene);
 	for (uint32_t i = 0; i < s->note_count; i++)
 		place_print(stdout, "note: ", scene, s->notes[i]);
@@ -215,9 +216,9 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
 		place_print(stdout, "note: ", scene, text);
 	uint64_t pixels = (uint64_t)scene_settings_width(&m.settings) * scene_settings_height(&m.settings);
-	if (!problems && pixels > PLAN_MAX_PIXELS) {
+	if (!problems && pixels > PLAN_PIXELS_MAX) {
 		printf("note: the image has %llu pixels; a render has at most %d: --crop or --size is needed\n",
-		       (unsigned long long)pixels, PLAN_MAX_PIXELS);
+		       (unsigned long long)pixels, PLAN_PIXELS_MAX);
 		notes++;
 	}
 	*bad = problems > 0;
@@ -233,7 +234,7 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 
 int scene_report_check(const struct render_arguments *a, bool lenient, bool *bad, struct error *e)
 {
-	struct opened o;
+	struct opened_scene o;
 	struct scene s;
 	int rc = open_scene(a, &o, e);
 	if (rc)
@@ -248,7 +249,7 @@ int scene_report_check(const struct render_arguments *a, bool lenient, bool *bad
 }
 
 /* Returns {"name", "bytes", "sha256"} of one file; NULL, with the error set, after a failure. */
-static json_t *file_of(const struct asset_source *assets, const char *name, struct error *e)
+static json_t *file_to_json(const struct asset_source *assets, const char *name, struct error *e)
 {
 	struct asset a;
 	struct blob_hash h;
@@ -258,7 +259,7 @@ static json_t *file_of(const struct asset_source *assets, const char *name, stru
 	int rc = blob_hash_bytes(a.bytes, a.size, &h, e);
 	json_t *o = NULL;
 	if (!rc) {
-		blob_hex(&h, hex);
+		blob_hash_to_hex(&h, hex);
 		o = json_pack("{s:s s:I s:s}", "name", name, "bytes", (json_int_t)a.size, "sha256", hex);
 		if (!o)
 			error_set(e, ENOMEM, "no memory for the list of files");
@@ -267,11 +268,11 @@ static json_t *file_of(const struct asset_source *assets, const char *name, stru
 	return o;
 }
 
-static json_t *files_of(const struct scene *s, const struct opened *o, struct error *e)
+static json_t *files_to_json(const struct scene *s, const struct opened_scene *o, struct error *e)
 {
 	json_t *files = json_array();
 	for (uint32_t i = 0; files && i <= s->asset_count; i++) {
-		json_t *one = file_of(&o->assets, i ? s->assets[i - 1] : o->name, e);
+		json_t *one = file_to_json(&o->assets, i ? s->assets[i - 1] : o->name, e);
 		if (!one || json_array_append_new(files, one)) {
 			json_decref(files);
 			return NULL;
@@ -280,24 +281,24 @@ static json_t *files_of(const struct scene *s, const struct opened *o, struct er
 	return files;
 }
 
-static json_t *effects_of(const struct render_summary *m)
+static json_t *effects_to_json(const struct render_summary *m)
 {
 	json_t *on = json_array();
 	for (size_t i = 0; i < m->line_count; i++)
-		if (m->lines[i].on)
+		if (m->lines[i].is_on)
 			json_array_append_new(on, json_string(m->lines[i].name));
 	return on;
 }
 
 /* Returns everything that `show` prints, as JSON, from which the text is made, too. NULL, with the error set, after a
  * failure. */
-static json_t *describe(const struct scene *s, const struct opened *o, struct error *e)
+static json_t *scene_to_json(const struct scene *s, const struct opened_scene *o, struct error *e)
 {
 	static struct render_summary m; /* too large for the stack */
-	const struct render_options as_it_is = {0};
-	if (render_check(s, &o->assets, &as_it_is, &m, e))
+	const struct render_options default_options = {0};
+	if (render_check(s, &o->assets, &default_options, &m, e))
 		return NULL;
-	json_t *files = files_of(s, o, e), *notes = json_array();
+	json_t *files = files_to_json(s, o, e), *notes = json_array();
 	if (!files)
 		return NULL;
 	for (uint32_t i = 0; i < s->note_count; i++)
@@ -309,15 +310,15 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	json_t *all =
 		json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema",
 			  1, "scene", o->name, "dialect",
-			  gltf_is(o->name) ? "glTF 2.0"
-			  : s->dialect_3   ? "3.x"
-					   : "0.6",
+			  gltf_is_file_name(o->name) ? "glTF 2.0"
+			  : s->is_dialect_3	     ? "3.x"
+						     : "0.6",
 			  "width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov",
 			  f->fov, "fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes,
 			  "triangles", (json_int_t)m.triangles, "segments", (json_int_t)m.segments, "instances",
-			  (json_int_t)m.instances, "sharingShapes", (json_int_t)m.sharing, "sharedMeshes",
+			  (json_int_t)m.instances, "sharingShapes", (json_int_t)m.sharing_shapes, "sharedMeshes",
 			  (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles, "memoryBytes",
-			  (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
+			  (json_int_t)m.memory_bytes, "effects", effects_to_json(&m), "notes", notes, "files", files);
 	if (!all)
 		error_set(e, ENOMEM, "no memory for the description");
 	return all;
@@ -379,7 +380,7 @@ static void print_text(json_t *all)
 
 int scene_report_show(const struct render_arguments *a, bool lenient, bool json, struct error *e)
 {
-	struct opened o;
+	struct opened_scene o;
 	struct scene s;
 	int rc = open_scene(a, &o, e);
 	if (rc)
@@ -387,7 +388,7 @@ int scene_report_show(const struct render_arguments *a, bool lenient, bool json,
 	rc = (lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), a->defines,
 							 a->define_count, e);
 	if (!rc) {
-		json_t *all = describe(&s, &o, e);
+		json_t *all = scene_to_json(&s, &o, e);
 		if (all && json)
 			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF
 				     ? error_set(e, EIO, "stdout: a write failed")

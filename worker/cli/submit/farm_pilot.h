@@ -15,8 +15,8 @@ struct farm_pilot {
 	const struct scene_files *files;
 	double seconds; /* time for the pilot */
 	/* Set by farm_pilot. */
-	struct plan render, plan; /* the plans of the render and of the pilot */
-	struct submit_end end;	  /* the end of the pilot, with its estimates */
+	struct plan render, plan;      /* the plans of the render and of the pilot */
+	struct submit_outcome outcome; /* the end of the pilot, with its estimates */
 };
 
 /* Runs the pilot. Returns 0, -ECANCELED if one of its jobs failed, or an error of the connection. */

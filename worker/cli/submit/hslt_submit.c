@@ -28,19 +28,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NAME_MOST = 127 }; /* bytes of a job's displayed name */
+enum { JOB_NAME_MAX = 127 }; /* bytes of a job's displayed name */
 
 struct arguments {
 	struct render_arguments render;
 	const char *coordinator, *tls, *name;
 	struct submit_request request;
 	const char *plot;
-	double pilot;	 /* s; 0: not given */
-	double patience; /* s */
+	double pilot;		 /* s; 0: not given */
+	double patience_seconds; /* s */
 	bool wait, json, insecure, estimate;
 };
 
-static bool to_stdout(const struct arguments *a)
+static bool writes_to_stdout(const struct arguments *a)
 {
 	return a->render.output && strcmp(a->render.output, TARGET_STDOUT) == 0;
 }
@@ -58,21 +58,22 @@ static int take_priority(void *target, char *arg, struct error *e)
 
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct arguments, coordinator),
-	 .environment = "HSLT_COORDINATOR", .needed = true},
-	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(option_image)},
-	{"priority", 0, "P", "-100 to 100, higher first", OPTION_TAKE(take_priority), .standard = "0"},
+	 .environment = "HSLT_COORDINATOR", .required = true},
+	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_CUSTOM(option_image)},
+	{"priority", 0, "P", "-100 to 100, higher first", OPTION_CUSTOM(take_priority), .default_value = "0"},
 	{"name", 0, "NAME", "Displayed name of the job (the scene's file name)",
-	 OPTION_NAME(struct arguments, name, NAME_MOST)},
+	 OPTION_NAME(struct arguments, name, JOB_NAME_MAX)},
 	{"wait", 0, NULL, "Show progress and fetch the image", OPTION_FLAG(struct arguments, wait)},
 	{"patience", 0, "SECONDS", "With --wait: how long to try to reconnect to the coordinator",
-	 OPTION_SECONDS(struct arguments, patience, 0, 1e9), .above = true, .below = true, .standard = "600"},
+	 OPTION_SECONDS(struct arguments, patience_seconds, 0, 1e9), .min_excluded = true, .max_excluded = true,
+	 .default_value = "600"},
 	{"json", 0, NULL, "Print one JSON object instead of the id, or of the estimate's table",
 	 OPTION_FLAG(struct arguments, json)},
 	ESTIMATE_ROWS(struct arguments),
 	{"mixed", 0, NULL, "Accept workers of any numeric fingerprint, without equal bits",
 	 OPTION_FLAG(struct arguments, request.mixed)},
 	{"verify", 0, "P", "Share or percentage of the epochs on which two workers must agree before they count",
-	 OPTION_RATIO(struct arguments, request.verify, 0, 1), .standard = "0"},
+	 OPTION_RATIO(struct arguments, request.verify_fraction, 0, 1), .default_value = "0"},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TLS"},
 	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",
@@ -80,32 +81,32 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static struct output_files outputs_of(const struct arguments *a)
+static struct output_files list_outputs(const struct arguments *a)
 {
 	return (struct output_files){{{"-o", a->wait ? a->render.output : NULL, OUTPUT_EXR},
-				      {"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")}}};
+				      {"--plot", a->plot, output_plot_format(a->plot ? a->plot : "")}}};
 }
 
-static int check(void *target, struct error *e)
+static int check_options(void *target, struct error *e)
 {
 	const struct arguments *a = target;
 	if (!a->render.scene || (!a->render.output && !a->estimate))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
-	if (a->request.verify > 0 && a->request.mixed)
+	if (a->request.verify_fraction > 0 && a->request.mixed)
 		return error_set(e, EINVAL, "results of --mixed workers cannot be compared: no --verify");
 	if (a->estimate && (a->render.output || a->wait))
 		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --wait");
 	if (!a->estimate && (a->pilot > 0 || a->plot))
 		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
-	if (to_stdout(a) && (!a->wait || a->json))
+	if (writes_to_stdout(a) && (!a->wait || a->json))
 		return error_set(e, EINVAL, "-o - writes the image to stdout: it requires --wait and excludes --json");
-	struct output_files outputs = outputs_of(a);
+	struct output_files outputs = list_outputs(a);
 	return output_files_check_names(&outputs, e);
 }
 
 static const struct program program = {
 	.name = "hslt-submit",
-	.words = "SCENE.xml",
+	.synopsis = "SCENE.xml",
 	.summary = "Checks a scene, sends it to a coordinator as a job, and optionally waits for the image.",
 	.examples =
 		"hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
@@ -119,18 +120,18 @@ static const struct program program = {
 		"10, 5, 2 and 1 % (and --target-error) will cost there. For long jobs without --epoch, a pilot of a second on "
 		"this machine measures how many mutations a thread makes in the 20 s that a lease should take. --wait "
 		"reconnects when the coordinator restarts.",
-	.exits =
+	.exit_codes =
 		"0 done, 1 failed, 2 usage, 3 job failed, 4 another bound was reached before the target error, 5 "
 		"chains disagree (the image is "
 		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited "
 		"(the job continues)",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
-	.shared = &render_table,
-	.word = option_scene,
+	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.shared_options = &render_option_table,
+	.parse_word = option_scene,
 };
 
 /* Returns the default name for a later fetch: without the folder, which the farm does not need. */
-static const char *last_part(const char *path)
+static const char *file_name_part(const char *path)
 {
 	const char *slash = strrchr(path, '/');
 	return slash ? slash + 1 : path;
@@ -142,11 +143,11 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
 		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
-				      "output", target_arg(a->render.output), "plan", plan, "state", state);
+				      "output", target_to_arg(a->render.output), "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
-	} else if (to_stdout(a)) {
+	} else if (writes_to_stdout(a)) {
 		fprintf(stderr, "%s\n", id);
 	} else {
 		puts(id);
@@ -156,37 +157,38 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 }
 
 /* Prepares the text for a signal: ending this program does not end the job. */
-static void say_at_the_end(const struct arguments *a, uint64_t job)
+static void set_end_message(const struct arguments *a, uint64_t job)
 {
 	static char text[512];
 	unsigned long long id = job;
 	char fetch[256], cancel[64];
-	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, target_arg(a->render.output));
+	int width =
+		snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, target_to_arg(a->render.output));
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(
 		text, sizeof text,
 		"\nhslt-submit: the job continues without this program.\n  %s  fetches its image when it is done, with --preview "
 		"the image so far\n  %-*s  shows its progress\n  %-*s  ends it\n",
 		fetch, width, "hslt-job list", width, cancel);
-	interrupt_say(text);
+	interrupt_set_message(text);
 }
 
 static int submit_scene(struct arguments *a, struct client **cl, const struct scene_files *files, int *code,
 			struct error *e)
 {
-	struct submitted job;
-	struct submit_end end = {0};
-	char plan[PLAN_TEXT] = "", rule[STATED_ERROR_TEXT];
-	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience};
+	struct submitted_job job;
+	struct submit_outcome end = {0};
+	char plan[PLAN_TEXT_MAX] = "", rule[STATED_ERROR_TEXT_MAX];
+	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience_seconds};
 	int rc = submit_send(*cl, &a->request, files, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
 	fprintf(stderr, "%s\n", plan);
-	stated_error_rule(a->render.plan.target_error, a->render.plan.kind == PLAN_CHAINS, rule, sizeof rule);
+	stated_error_print_rule(a->render.plan.target_error, a->render.plan.kind == PLAN_CHAINS, rule, sizeof rule);
 	if (*rule)
 		fprintf(stderr, "%s\n", rule);
 	if (a->wait)
-		say_at_the_end(a, job.job);
+		set_end_message(a, job.job);
 	if (!a->wait || !a->json)
 		print_id(a, job.job, plan, "queued");
 	if (!a->wait)
@@ -203,7 +205,7 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 	return rc;
 }
 
-static int estimate(const struct arguments *a, struct client *cl, const struct scene_files *files, struct error *e)
+static int run_estimate(const struct arguments *a, struct client *cl, const struct scene_files *files, struct error *e)
 {
 	struct farm_pilot p = {.client = cl,
 			       .request = &a->request,
@@ -212,21 +214,21 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	int rc = farm_pilot(&p, e);
 	if (rc)
 		return rc;
-	const struct forecast_history *looks = &p.end.looks;
+	const struct forecast_history *looks = &p.outcome.looks;
 	const struct forecast_look *last = looks->count ? &looks->looks[looks->count - 1] : NULL;
 	struct estimate m = {.scene = a->request.name,
-			     .where = "the farm in its current state",
+			     .machine = "the farm in its current state",
 			     .request = &a->render.plan,
 			     .plan = &p.render,
 			     .pilot = &p.plan,
 			     .looks = looks,
-			     .cpu_seconds = p.end.cpu_seconds,
-			     .seconds = p.end.bootstrap_seconds + (last ? last->seconds : 0),
-			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
-			     .bootstrap_seconds = p.end.bootstrap_seconds,
+			     .cpu_seconds = p.outcome.cpu_seconds,
+			     .seconds = p.outcome.bootstrap_seconds + (last ? last->seconds : 0),
+			     .bootstrap_cpu_seconds = p.outcome.bootstrap_cpu_seconds,
+			     .bootstrap_seconds = p.outcome.bootstrap_seconds,
 			     .target = a->render.plan.target_error,
 			     .speed = last && last->cpu_seconds > 0 ? last->work / last->cpu_seconds : 0};
-	return client_local(estimate_report(&m, a->json, a->plot, e));
+	return client_local_error(estimate_report(&m, a->json, a->plot, e));
 }
 
 /* Checks that the coordinator will be able to make a plan of the request. */
@@ -237,7 +239,7 @@ static int check_plan(const struct arguments *a, struct error *e)
 }
 
 /* Measures the speed of a thread, which determines the length of epochs, unless it does not matter for this plan. */
-static void measure(struct arguments *a, const struct scene_files *files)
+static void measure_speed(struct arguments *a, const struct scene_files *files)
 {
 	struct plan plan;
 	struct error e;
@@ -267,9 +269,9 @@ static int check_access(const struct arguments *a, struct error *e)
 }
 
 /* Returns the name of a job without --name: that of the scene file, cut to fit and made valid UTF-8. */
-static const char *name_of_file(const char *file, char name[NAME_MOST + 1])
+static const char *default_job_name(const char *file, char name[JOB_NAME_MAX + 1])
 {
-	text_copy(name, NAME_MOST + 1, file);
+	text_copy(name, JOB_NAME_MAX + 1, file);
 	text_clean(name);
 	return name;
 }
@@ -289,9 +291,9 @@ int main(int argc, char **argv)
 	struct error e;
 	int code = 0;
 	a.request.args = &a.render;
-	crash_exit("hslt-submit");
-	program_options(&program, argc, argv, &a);
-	struct output_files outputs = outputs_of(&a);
+	crash_install_exit_handler("hslt-submit");
+	program_parse_options(&program, argc, argv, &a);
+	struct output_files outputs = list_outputs(&a);
 	int rc = output_files_check(&outputs, &a.render.scene, 1, &e);
 	if (!rc)
 		rc = scene_files_read(&files, a.render.scene, &a.render, &outputs, &e);
@@ -308,10 +310,10 @@ int main(int argc, char **argv)
 		scene_files_fini(&files);
 		return rc == -EINVAL ? 2 : 1;
 	}
-	char note[512], name[NAME_MOST + 1];
+	char note[512], name[JOB_NAME_MAX + 1];
 	print_notes(&a, &files);
-	a.request.output = a.estimate || to_stdout(&a) ? "" : last_part(a.render.output);
-	a.request.name = a.name ? a.name : name_of_file(files.scene, name);
+	a.request.output = a.estimate || writes_to_stdout(&a) ? "" : file_name_part(a.render.output);
+	a.request.name = a.name ? a.name : default_job_name(files.scene, name);
 	if ((rc = check_access(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_files_fini(&files);
@@ -330,10 +332,10 @@ int main(int argc, char **argv)
 	option_depth_note(a.render.plan.integrator, a.render.plan.max_depth, note, sizeof note);
 	if (*note)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
-	measure(&a, &files);
+	measure_speed(&a, &files);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
-		rc = a.estimate ? estimate(&a, cl, &files, &e) : submit_scene(&a, &cl, &files, &code, &e);
+		rc = a.estimate ? run_estimate(&a, cl, &files, &e) : submit_scene(&a, &cl, &files, &code, &e);
 		client_close(cl);
 	}
 	scene_files_fini(&files);

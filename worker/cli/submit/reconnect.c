@@ -5,7 +5,7 @@
 #include "common/base/target.h"
 #include <stdio.h>
 
-static const double first_pause = 0.25, longest_pause = 10;
+static const double initial_pause = 0.25, max_pause = 10;
 
 static void sleep_seconds(double seconds)
 {
@@ -13,13 +13,13 @@ static void sleep_seconds(double seconds)
 	nanosleep(&t, NULL);
 }
 
-static bool is_gone(int rc)
+static bool is_connection_lost(int rc)
 {
 	return rc == -ECONNRESET || rc == -ECONNREFUSED || rc == -ETIMEDOUT || rc == -EHOSTUNREACH;
 }
 
-static int try_once(struct client *cl, const struct submitted *job, const char *output, struct submit_end *end,
-		    struct error *e)
+static int wait_and_fetch(struct client *cl, const struct submitted_job *job, const char *output,
+			  struct submit_outcome *end, struct error *e)
 {
 	int rc = submit_wait(cl, job, end, e);
 	/* Fetches also if the job made an image that has been deleted since: the coordinator's error tells that. */
@@ -31,38 +31,39 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 /* Connects again and again, with growing pauses, until a coordinator answers or the patience is over. A refusal is
  * retried, too, because the coordinator accepted this client before: an expired certificate may be renewed, or a clock
  * corrected. */
-static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
+static int reconnect_client(struct client **cl, const struct reconnect *o, struct error *e)
 {
-	double gone = clock_seconds(), pause = first_pause;
+	double lost_at = clock_seconds(), pause = initial_pause;
 	int rc;
 	do {
-		double left = gone + o->patience - clock_seconds();
-		sleep_seconds(pause < left ? pause : left > 0 ? left : 0);
-		pause = 2 * pause < longest_pause ? 2 * pause : longest_pause;
+		double remaining = lost_at + o->patience_seconds - clock_seconds();
+		sleep_seconds(pause < remaining ? pause : remaining > 0 ? remaining : 0);
+		pause = 2 * pause < max_pause ? 2 * pause : max_pause;
 		rc = client_open(cl, o->coordinator, o->tls, o->insecure, "hslt-submit", e);
-	} while ((is_gone(rc) || rc == -EKEYEXPIRED) && clock_seconds() - gone < o->patience);
+	} while ((is_connection_lost(rc) || rc == -EKEYEXPIRED) && clock_seconds() - lost_at < o->patience_seconds);
 	return rc;
 }
 
-int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
-		  struct submit_end *end, struct error *e)
+int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted_job *job, const char *output,
+		  struct submit_outcome *end, struct error *e)
 {
 	int rc;
-	while (is_gone(rc = try_once(*cl, job, output, end, e))) {
+	while (is_connection_lost(rc = wait_and_fetch(*cl, job, output, end, e))) {
 		client_close(*cl);
 		*cl = NULL;
-		fprintf(stderr, "hslt-submit: %s; trying again for %g s\n", e->text, o->patience);
-		rc = call_again(cl, o, e);
-		if (is_gone(rc))
+		fprintf(stderr, "hslt-submit: %s; trying again for %g s\n", e->text, o->patience_seconds);
+		rc = reconnect_client(cl, o, e);
+		if (is_connection_lost(rc))
 			return error_set(
 				e, ECONNREFUSED,
 				"no coordinator at %s for %g s. The job is in its spool and continues when it is back: hslt-job "
 				"fetch j%llu -o %s",
-				o->coordinator, o->patience, (unsigned long long)job->job, target_arg(output));
+				o->coordinator, o->patience_seconds, (unsigned long long)job->job,
+				target_to_arg(output));
 		if (rc == -EKEYEXPIRED) {
 			struct error why = *e;
 			return error_set(e, EKEYEXPIRED, "%s. The job continues: hslt-job fetch j%llu -o %s", why.text,
-					 (unsigned long long)job->job, target_arg(output));
+					 (unsigned long long)job->job, target_to_arg(output));
 		}
 		if (rc)
 			break;

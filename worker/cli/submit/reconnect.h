@@ -11,14 +11,14 @@
 struct reconnect {
 	const char *coordinator, *tls;
 	bool insecure;
-	double patience; /* how long to wait for a coordinator, s */
+	double patience_seconds; /* how long to wait for a coordinator, s */
 };
 
 /* Waits for the job's end and fetches its result, if there is one, into `output`. *cl may be another connection
- * afterwards, or NULL. Returns -ECONNREFUSED if no coordinator answered within `patience`, -EKEYEXPIRED if a
+ * afterwards, or NULL. Returns -ECONNREFUSED if no coordinator answered within `patience_seconds`, -EKEYEXPIRED if a
  * certificate stayed expired for as long (in both cases the sentence says how to get the image later), -ESTALE if
  * another job has the number now, or another error of the client. */
-int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
-		  struct submit_end *end, struct error *e);
+int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted_job *job, const char *output,
+		  struct submit_outcome *end, struct error *e);
 
 #endif

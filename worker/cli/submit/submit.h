@@ -17,12 +17,12 @@ struct scene_files {
 	char *folder; /* of the scene file; names of files are relative to this folder, or to one of --path */
 	struct asset_folders folders;
 	char *scene; /* name of the scene file in its folder */
-	size_t count;
+	size_t file_count;
 	struct scene_file {
 		char *name;
 		struct blob_hash hash;
 		uint64_t size;
-	} * list;
+	} * files;
 	struct render_summary summary;
 	size_t note_count;
 	char **notes;
@@ -37,23 +37,23 @@ void scene_files_fini(struct scene_files *files);
 struct submit_request {
 	const char *name, *output; /* output: name of the image file for a later fetch, or "" */
 	int priority;
-	bool mixed;    /* workers of any numeric fingerprint may take part */
-	double verify; /* share of the epochs that two workers compute */
+	bool mixed;		/* workers of any numeric fingerprint may take part */
+	double verify_fraction; /* share of the epochs that two workers compute */
 	const struct render_arguments *args;
 };
 
 /* Identifies a job of a coordinator. A new spool counts from 1 again, so the number alone could mean another job. */
-struct submitted {
+struct submitted_job {
 	uint64_t job;
-	double at; /* when it was submitted, s since 1970 by the coordinator's clock */
+	double submitted_at; /* when it was submitted, s since 1970 by the coordinator's clock */
 };
 
 /* Sends a job and the files that the coordinator lacks. plan_text: the plan, and by which rules it was made. Returns
  * -EACCES, with the coordinator's sentence, if the job is refused. */
 int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *files,
-		struct submitted *job, char *plan_text, size_t plan_size, struct error *e);
+		struct submitted_job *job, char *plan_text, size_t plan_size, struct error *e);
 
-struct submit_end {
+struct submit_outcome {
 	uint32_t exit_code; /* exit code for a program that waits for the job */
 	bool has_result;
 	char state[16];		       /* "done", "failed" or "cancelled" */
@@ -63,6 +63,6 @@ struct submit_end {
 };
 
 /* Shows progress on stderr until the job has ended. Returns -ESTALE if another job has the number now. */
-int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e);
+int submit_wait(struct client *cl, const struct submitted_job *job, struct submit_outcome *end, struct error *e);
 
 #endif

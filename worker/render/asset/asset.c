@@ -4,8 +4,9 @@
  * the user added with --path.
  *
  * Happy path: search_open tries the folders in order. open_below opens the folder and lets the kernel resolve the name
- * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that is absolute or leads out
- * of the scene's folder (asset_name_up) is resolved textually, and opened if the result lies below one of the folders.
+ * beneath it (openat2, RESOLVE_BENEATH); read_regular_file then reads the file into memory. A name that is absolute or
+ * leads out of the scene's folder (asset_name_levels_up) is resolved textually, and opened if the result lies below one
+ * of the folders.
  *
  * Failures are one sentence in struct error: a name that leads out of the folders (-EINVAL, with the --path that would
  * allow it), a file that does not exist (-ENOENT, with the --path that would find it, or a similar name), anything but
@@ -31,12 +32,12 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-enum { NAME_MAX_BYTES = 4096 };
+enum { NAME_BYTES_MAX = 4096 };
 #define ASSET_SIZE_MAX ((off_t)1 << 32)
 
 static bool is_below(const char *name)
 {
-	if (!*name || *name == '/' || strlen(name) >= NAME_MAX_BYTES)
+	if (!*name || *name == '/' || strlen(name) >= NAME_BYTES_MAX)
 		return false;
 	for (const char *part = name; *part; part += strspn(part, "/")) {
 		size_t n = strcspn(part, "/");
@@ -50,8 +51,8 @@ static bool is_below(const char *name)
 /* For kernels that cannot confine the look-up to the folder: follows no symbolic links at all. */
 static int open_step_by_step(int folder, const char *name)
 {
-	int at = dup(folder);
-	while (at >= 0) {
+	int folder_fd = dup(folder);
+	while (folder_fd >= 0) {
 		char part[256];
 		name += strspn(name, "/");
 		size_t n = strcspn(name, "/");
@@ -60,17 +61,17 @@ static int open_step_by_step(int folder, const char *name)
 		if (n < sizeof part) {
 			memcpy(part, name, n);
 			part[n] = 0;
-			next = openat(at, part,
+			next = openat(folder_fd, part,
 				      O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW | (*rest ? O_DIRECTORY : 0));
 		} else {
 			errno = ENAMETOOLONG;
 		}
-		int saved = errno;
-		close(at);
-		errno = saved;
+		int saved_errno = errno;
+		close(folder_fd);
+		errno = saved_errno;
 		if (next < 0 || !*rest)
 			return next;
-		at = next;
+		folder_fd = next;
 		name = rest;
 	}
 	return -1;
@@ -78,22 +79,22 @@ static int open_step_by_step(int folder, const char *name)
 
 static int open_below(const char *folder, const char *name)
 {
-	int at = open(*folder ? folder : ".", O_PATH | O_DIRECTORY | O_CLOEXEC);
-	if (at < 0)
+	int folder_fd = open(*folder ? folder : ".", O_PATH | O_DIRECTORY | O_CLOEXEC);
+	if (folder_fd < 0)
 		return -1;
 	struct open_how how = {.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK,
 			       .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
-	int fd = (int)syscall(SYS_openat2, at, name, &how, sizeof how);
+	int fd = (int)syscall(SYS_openat2, folder_fd, name, &how, sizeof how);
 	if (fd < 0 && (errno == ENOSYS || errno == EPERM || errno == EINVAL))
-		fd = open_step_by_step(at, name);
-	int saved = errno;
-	close(at);
-	errno = saved;
+		fd = open_step_by_step(folder_fd, name);
+	int saved_errno = errno;
+	close(folder_fd);
+	errno = saved_errno;
 	return fd;
 }
 
 /* Reads the file rather than mapping it: a mapped file that another process truncates would kill this one. */
-static int read_all(int fd, const char *name, struct asset *out, struct error *e)
+static int read_regular_file(int fd, const char *name, struct asset *out, struct error *e)
 {
 	struct stat st;
 	if (fstat(fd, &st) != 0)
@@ -116,19 +117,20 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 	return 0;
 }
 
-/* `shown` is the name for messages, as the user wrote it: it differs from `name` if the written name leads out of
- * the scene's folder. */
-static int open_in(const char *folder, const char *name, const char *shown, struct asset *out, struct error *e)
+/* `display_name` is the name for messages, as the user wrote it: it differs from `name` if the written name leads out
+ * of the scene's folder. */
+static int open_in_folder(const char *folder, const char *name, const char *display_name, struct asset *out,
+			  struct error *e)
 {
 	*out = (struct asset){0};
 	if (!is_below(name))
 		return error_set(e, EINVAL, "%.256s: files must lie below the scene's folder, or one given with --path",
-				 shown);
+				 display_name);
 	int fd = open_below(folder, name);
 	if (fd < 0)
-		return error_set(e, errno, "%.256s: %s", shown,
+		return error_set(e, errno, "%.256s: %s", display_name,
 				 errno == EXDEV ? "leads out of the scene's folder" : strerror(errno));
-	int r = read_all(fd, shown, out, e);
+	int r = read_regular_file(fd, display_name, out, e);
 	close(fd);
 	return r;
 }
@@ -150,45 +152,45 @@ static const char *path_below(const char *folder, const char *path)
 	return name || !realpath(*folder ? folder : ".", real) ? name : path_after(real, path);
 }
 
-/* Opens a name that leads `up` folders out of the scene's own, or to the root, and from there to `rest`. */
+/* Opens a name that leads `levels_up` folders out of the scene's own, or to the root, and from there to `rest`. */
 static int open_outside(const struct asset_folders *f, const char *canonical, struct asset *out, struct error *e)
 {
-	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
+	char path[PATH_MAX + NAME_BYTES_MAX], display_name[NAME_BYTES_MAX];
 	const char *rest;
-	size_t up = asset_name_up(canonical, &rest);
+	size_t levels_up = asset_name_levels_up(canonical, &rest);
 	*out = (struct asset){0};
-	if (strlen(canonical) >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
+	if (strlen(canonical) >= sizeof display_name || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
 		return error_set(e, ENAMETOOLONG, "%.256s: the name is too long", rest);
-	asset_name_shown(canonical, shown, sizeof shown);
-	size_t end = up == ASSET_NAME_ABSOLUTE ? 0 : strlen(path);
-	for (size_t i = 0; i < up && end > 0; i++)
+	asset_name_display(canonical, display_name, sizeof display_name);
+	size_t end = levels_up == ASSET_NAME_ABSOLUTE ? 0 : strlen(path);
+	for (size_t i = 0; i < levels_up && end > 0; i++)
 		while (end > 0 && path[--end] != '/')
 			;
-	size_t top = end; /* end of the folder that the ".." lead to, suggested for --path */
+	size_t suggested_end = end; /* end of the folder that the ".." lead to, suggested for --path */
 	snprintf(path + end, sizeof path - end, "/%s", rest);
 	int rc = 0;
 	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
 		const char *name = path_below(f->folder[i], path);
-		if (name && !(rc = open_in(f->folder[i], name, shown, out, e)))
+		if (name && !(rc = open_in_folder(f->folder[i], name, display_name, out, e)))
 			return 0;
 	}
 	if (rc)
 		return rc;
-	if (up == ASSET_NAME_ABSOLUTE && access(path, F_OK) != 0)
-		return error_set(e, ENOENT, "%.256s: no such file on this machine", shown);
-	*(top > 0 ? path + top : strrchr(path, '/')) = 0;
-	return error_set(e, EINVAL, "%.256s: leads out of the scene's folder; to allow that, give --path %.400s", shown,
-			 *path ? path : "/");
+	if (levels_up == ASSET_NAME_ABSOLUTE && access(path, F_OK) != 0)
+		return error_set(e, ENOENT, "%.256s: no such file on this machine", display_name);
+	*(suggested_end > 0 ? path + suggested_end : strrchr(path, '/')) = 0;
+	return error_set(e, EINVAL, "%.256s: leads out of the scene's folder; to allow that, give --path %.400s",
+			 display_name, *path ? path : "/");
 }
 
 static int open_any(const struct asset_folders *f, const char *name, struct asset *out, struct error *e)
 {
 	const char *rest;
 	int rc = -ENOENT;
-	if (asset_name_up(name, &rest) > 0 && is_below(rest))
+	if (asset_name_levels_up(name, &rest) > 0 && is_below(rest))
 		return open_outside(f, name, out, e);
 	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
-		rc = open_in(f->folder[i], name, name, out, e);
+		rc = open_in_folder(f->folder[i], name, name, out, e);
 	return rc;
 }
 
@@ -204,13 +206,13 @@ static bool has_file(const char *folder, const char *name)
  * scene may have been written, or one of those above the scene's. NULL if none has it. */
 static const char *find_elsewhere(const char *scene_folder, const char *name, char path[PATH_MAX])
 {
-	enum { UP = 8 };
+	enum { LEVELS_UP_MAX = 8 };
 	if (!is_below(name))
 		return NULL;
 	if (has_file(".", name))
 		return strcpy(path, ".");
 	char *end = realpath(*scene_folder ? scene_folder : ".", path) ? strrchr(path, '/') : NULL;
-	for (int i = 0; i < UP && end && end > path; i++, end = strrchr(path, '/')) {
+	for (int i = 0; i < LEVELS_UP_MAX && end && end > path; i++, end = strrchr(path, '/')) {
 		*end = 0;
 		if (has_file(path, name))
 			return path;
@@ -233,24 +235,24 @@ static bool has_same_digits(const char *a, const char *b)
 
 /* Finds the entry of that folder with the most similar name. Compares only the first entries of a large folder,
  * since thousands of files may be missing. */
-static bool find_entry(const char *folder, const char *inside, const char *wanted, char best[NAME_MAX + 1])
+static bool find_similar_entry(const char *folder, const char *subfolder, const char *wanted, char best[NAME_MAX + 1])
 {
-	enum { COMPARED_MAX = 1024 };
-	int fd = open_below(folder, *inside ? inside : ".");
-	DIR *all = fd < 0 ? NULL : fdopendir(fd);
-	if (!all) {
+	enum { ENTRIES_COMPARED_MAX = 1024 };
+	int fd = open_below(folder, *subfolder ? subfolder : ".");
+	DIR *dir = fd < 0 ? NULL : fdopendir(fd);
+	if (!dir) {
 		if (fd >= 0)
 			close(fd);
 		return false;
 	}
 	struct spelling s = {.wanted = wanted};
-	const struct dirent *one;
-	for (int i = 0; i < COMPARED_MAX && (one = readdir(all)); i++) {
-		if (one->d_name[0] == '.' || !has_same_digits(one->d_name, wanted))
+	const struct dirent *entry;
+	for (int i = 0; i < ENTRIES_COMPARED_MAX && (entry = readdir(dir)); i++) {
+		if (entry->d_name[0] == '.' || !has_same_digits(entry->d_name, wanted))
 			continue;
-		spelling_offer(&s, one->d_name);
+		spelling_offer(&s, entry->d_name);
 	}
-	closedir(all);
+	closedir(dir);
 	if (s.best)
 		snprintf(best, NAME_MAX + 1, "%s", s.best);
 	return s.best != NULL;
@@ -260,36 +262,36 @@ static bool is_file(const char *folder, const char *name)
 {
 	struct stat st;
 	int fd = open_below(folder, name);
-	bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+	bool is_regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
 	if (fd >= 0)
 		close(fd);
-	return regular;
+	return is_regular;
 }
 
 /* Finds an existing file with a similar name: each part of the path that does not exist is replaced by the most
  * similar entry. Names from Windows often differ only in upper and lower case. */
-static bool find_near(const char *folder, const char *name, char near[NAME_MAX_BYTES])
+static bool find_similar_file(const char *folder, const char *name, char similar[NAME_BYTES_MAX])
 {
-	size_t used = 0;
-	near[0] = 0;
+	size_t length = 0;
+	similar[0] = 0;
 	for (const char *part = name + strspn(name, "/"); *part; part += strspn(part, "/")) {
 		char wanted[NAME_MAX + 1], best[NAME_MAX + 1];
 		size_t n = strcspn(part, "/");
-		if (n > NAME_MAX || used + NAME_MAX + 2 > NAME_MAX_BYTES)
+		if (n > NAME_MAX || length + NAME_MAX + 2 > NAME_BYTES_MAX)
 			return false;
 		memcpy(wanted, part, n);
 		wanted[n] = 0;
 		part += n;
-		snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", wanted);
-		if (!has_file(folder, near)) {
-			near[used] = 0;
-			if (!find_entry(folder, near, wanted, best))
+		snprintf(similar + length, NAME_BYTES_MAX - length, "%s%s", length ? "/" : "", wanted);
+		if (!has_file(folder, similar)) {
+			similar[length] = 0;
+			if (!find_similar_entry(folder, similar, wanted, best))
 				return false;
-			snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", best);
+			snprintf(similar + length, NAME_BYTES_MAX - length, "%s%s", length ? "/" : "", best);
 		}
-		used = strlen(near);
+		length = strlen(similar);
 	}
-	return is_file(folder, near);
+	return is_file(folder, similar);
 }
 
 /* Like open_any, but if the file is not found, the error says which --path would help. */
@@ -298,21 +300,22 @@ static int search_open(void *user, const char *name, struct asset *out, struct e
 	const struct asset_folders *f = user;
 	const char *rest;
 	int rc = open_any(f, name, out, e);
-	if (rc != -ENOENT || asset_name_up(name, &rest) > 0)
+	if (rc != -ENOENT || asset_name_levels_up(name, &rest) > 0)
 		return rc;
 	char path[PATH_MAX];
-	const char *there = find_elsewhere(f->folder[0], name, path);
-	char near[NAME_MAX_BYTES];
-	for (size_t i = 0; i < f->count && !there && is_below(name); i++)
-		if (find_near(f->folder[i], name, near))
+	const char *suggested_folder = find_elsewhere(f->folder[0], name, path);
+	char similar[NAME_BYTES_MAX];
+	for (size_t i = 0; i < f->count && !suggested_folder && is_below(name); i++)
+		if (find_similar_file(f->folder[i], name, similar))
 			return error_set(e, ENOENT,
 					 "%.256s: no such file in the scene's folder%s; did you mean `%.256s`?", name,
-					 f->count > 1 ? " or those of --path" : "", near);
+					 f->count > 1 ? " or those of --path" : "", similar);
 	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s%s%.400s%s", name,
-			 f->count > 1 ? " or those of --path" : "", there ? "; --path " : "", there ? there : "",
-			 there		? " finds it"
-			 : f->count > 1 ? ""
-					: "; --path FOLDER searches there, too");
+			 f->count > 1 ? " or those of --path" : "", suggested_folder ? "; --path " : "",
+			 suggested_folder ? suggested_folder : "",
+			 suggested_folder ? " finds it"
+			 : f->count > 1	  ? ""
+					  : "; --path FOLDER searches there, too");
 }
 
 static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
@@ -328,20 +331,20 @@ static void folder_close(void *user, struct asset *a)
 	*a = (struct asset){0};
 }
 
-struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count)
+struct asset_folders asset_folders_make(const char *scene_folder, const char *const *extra_folders, size_t count)
 {
-	struct asset_folders f = {.count = 1, .folder = {own}};
+	struct asset_folders f = {.count = 1, .folder = {scene_folder}};
 	for (size_t i = 0; i < count && f.count < ASSET_FOLDERS_MAX; i++)
-		f.folder[f.count++] = others[i];
+		f.folder[f.count++] = extra_folders[i];
 	return f;
 }
 
-struct asset_source asset_search(const struct asset_folders *folders)
+struct asset_source asset_source_for_folders(const struct asset_folders *folders)
 {
 	return (struct asset_source){.user = (void *)(uintptr_t)folders, .open = search_open, .close = folder_close};
 }
 
-struct asset_source asset_folder(const char *folder)
+struct asset_source asset_source_for_folder(const char *folder)
 {
 	return (struct asset_source){.user = (void *)(uintptr_t)folder, .open = folder_open, .close = folder_close};
 }

@@ -26,24 +26,25 @@ struct asset_source {
 	/* Reads the whole file into memory. Returns 0, or a negative errno with a sentence in *e. Any thread. */
 	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
 	void (*close)(void *user, struct asset *a);
-	struct picture_cache *decoded; /* NULL: each texture decodes its own picture */
-	struct obj_cache *parsed;      /* NULL: each shape parses its own file */
+	struct picture_cache *picture_cache; /* NULL: each texture decodes its own picture */
+	struct obj_cache *obj_cache;	     /* NULL: each shape parses its own file */
 };
 
 /* A source for one folder. Names must stay below it: no "..", no absolute paths to elsewhere, no symbolic links that
  * lead out of it; regular files only, at most 4 GB. `folder` must outlive the source. */
-struct asset_source asset_folder(const char *folder);
+struct asset_source asset_source_for_folder(const char *folder);
 
-/* Folders that are searched in turn, each with the rules of asset_folder(): the scene's own, then those that the
- * user adds. */
+/* Folders that are searched in turn, each with the rules of asset_source_for_folder(): the scene's own, then those that
+ * the user adds. */
 enum { ASSET_FOLDERS_MAX = 17 };
 struct asset_folders {
 	size_t count;
 	const char *folder[ASSET_FOLDERS_MAX];
 };
 
-/* Returns `own` followed by the first ASSET_FOLDERS_MAX - 1 of `others`. */
-struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count);
-struct asset_source asset_search(const struct asset_folders *folders); /* the folders must outlive the source */
+/* Returns `scene_folder` followed by the first ASSET_FOLDERS_MAX - 1 of `extra_folders`. */
+struct asset_folders asset_folders_make(const char *scene_folder, const char *const *extra_folders, size_t count);
+struct asset_source
+asset_source_for_folders(const struct asset_folders *folders); /* the folders must outlive the source */
 
 #endif

@@ -12,36 +12,36 @@
 
 static void drop_asset(struct asset_keeper *k)
 {
-	if (k->name)
-		k->inner->close(k->inner->user, &k->kept);
-	mem_free(k->name);
-	k->name = NULL;
+	if (k->kept_name)
+		k->inner_source->close(k->inner_source->user, &k->kept_asset);
+	mem_free(k->kept_name);
+	k->kept_name = NULL;
 }
 
 static int keeper_open(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct asset_keeper *k = user;
-	if (k->name && strcmp(k->name, name) == 0) {
-		k->users++;
-		*out = k->kept;
+	if (k->kept_name && strcmp(k->kept_name, name) == 0) {
+		k->user_count++;
+		*out = k->kept_asset;
 		return 0;
 	}
-	if (k->users == 0)
+	if (k->user_count == 0)
 		drop_asset(k); /* before the next file takes memory */
-	if (k->read > ASSET_KEEPER_BYTES_MAX)
+	if (k->bytes_read > ASSET_KEEPER_BYTES_MAX)
 		return error_set(e, E2BIG, "%s: the scene asks for its files again and again; %llu GB were read so far",
-				 name, (unsigned long long)k->read >> 30);
-	int rc = k->inner->open(k->inner->user, name, out, e);
+				 name, (unsigned long long)k->bytes_read >> 30);
+	int rc = k->inner_source->open(k->inner_source->user, name, out, e);
 	if (!rc)
-		k->read += out->size;
-	if (rc || k->users > 0)
+		k->bytes_read += out->size;
+	if (rc || k->user_count > 0)
 		return rc;
 	size_t size = strlen(name) + 1;
-	k->name = mem_alloc(size, 1);
-	if (k->name) {
-		memcpy(k->name, name, size);
-		k->kept = *out;
-		k->users = 1;
+	k->kept_name = mem_alloc(size, 1);
+	if (k->kept_name) {
+		memcpy(k->kept_name, name, size);
+		k->kept_asset = *out;
+		k->user_count = 1;
 	}
 	return 0;
 }
@@ -49,11 +49,11 @@ static int keeper_open(void *user, const char *name, struct asset *out, struct e
 static void keeper_close(void *user, struct asset *a)
 {
 	struct asset_keeper *k = user;
-	if (k->name && k->users > 0 && a->bytes == k->kept.bytes && a->handle == k->kept.handle) {
-		k->users--;
+	if (k->kept_name && k->user_count > 0 && a->bytes == k->kept_asset.bytes && a->handle == k->kept_asset.handle) {
+		k->user_count--;
 		*a = (struct asset){0};
 	} else {
-		k->inner->close(k->inner->user, a);
+		k->inner_source->close(k->inner_source->user, a);
 	}
 }
 

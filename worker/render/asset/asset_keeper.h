@@ -14,14 +14,14 @@
 #define ASSET_KEEPER_BYTES_MAX (UINT64_C(256) << 30)
 
 struct asset_keeper {
-	const struct asset_source *inner;
-	char *name; /* NULL: nothing is kept */
-	struct asset kept;
-	unsigned users;
-	uint64_t read; /* bytes read so far */
+	const struct asset_source *inner_source;
+	char *kept_name; /* NULL: nothing is kept */
+	struct asset kept_asset;
+	unsigned user_count;
+	uint64_t bytes_read; /* bytes read so far */
 };
 
-/* k->inner must be set and all other members 0. */
+/* k->inner_source must be set and all other members 0. */
 struct asset_source asset_keeper_source(struct asset_keeper *k);
 void asset_keeper_fini(struct asset_keeper *k);
 

@@ -9,27 +9,27 @@
 
 #include <string.h>
 
-static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+static const char base64_alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-static int digit_of_letter(unsigned char c)
+static int base64_digit(unsigned char c)
 {
-	const char *at = c ? strchr(letters, c) : NULL;
-	return at ? (int)(at - letters) : -1;
+	const char *match = c ? strchr(base64_alphabet, c) : NULL;
+	return match ? (int)(match - base64_alphabet) : -1;
 }
 
-void asset_range_encode(const unsigned char *bytes, size_t n, char *text)
+void asset_range_encode_base64(const unsigned char *bytes, size_t n, char *text)
 {
 	for (size_t i = 0; i < n; i += 3) {
 		uint32_t bits = (uint32_t)bytes[i] << 16 | (uint32_t)(i + 1 < n ? bytes[i + 1] : 0) << 8 |
 				(i + 2 < n ? bytes[i + 2] : 0);
 		for (int k = 0; k < 4; k++)
-			*text++ = i + (size_t)k > n ? '=' : letters[bits >> (18 - 6 * k) & 63];
+			*text++ = i + (size_t)k > n ? '=' : base64_alphabet[bits >> (18 - 6 * k) & 63];
 	}
 	*text = 0;
 }
 
 /* Returns the number of decoded bytes, or -1 if the text is not base64. `out` has room for three quarters of n. */
-static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
+static int64_t decode_base64(const unsigned char *text, size_t n, unsigned char *out)
 {
 	size_t count = 0;
 	while (n > 0 && text[n - 1] == '=')
@@ -38,7 +38,7 @@ static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
 		return -1;
 	uint32_t bits = 0;
 	for (size_t i = 0; i < n; i++) {
-		int x = digit_of_letter(text[i]);
+		int x = base64_digit(text[i]);
 		if (x < 0)
 			return -1;
 		bits = bits << 6 | (uint32_t)x;
@@ -48,12 +48,12 @@ static int64_t decode(const unsigned char *text, size_t n, unsigned char *out)
 	return (int64_t)count;
 }
 
-int asset_range_decode(struct asset_range *p, const char *name, struct error *e)
+int asset_range_decode_base64(struct asset_range *p, const char *name, struct error *e)
 {
 	p->decoded = mem_alloc(p->size / 4 * 3 + 3, 1);
 	if (!p->decoded)
 		return error_set(e, ENOMEM, "%s: out of memory", name);
-	int64_t size = decode(p->bytes, p->size, p->decoded);
+	int64_t size = decode_base64(p->bytes, p->size, p->decoded);
 	if (size < 0) {
 		mem_free(p->decoded);
 		return error_set(e, EINVAL, "%s: the embedded data is not base64", name);
@@ -63,24 +63,24 @@ int asset_range_decode(struct asset_range *p, const char *name, struct error *e)
 	return 0;
 }
 
-int asset_range_open(struct asset_range *p, const struct asset_source *assets, const char *name, uint64_t first,
+int asset_range_open(struct asset_range *p, const struct asset_source *assets, const char *name, uint64_t offset,
 		     uint64_t count, bool base64, struct error *e)
 {
 	int rc = assets->open(assets->user, name, &p->file, e);
 	if (rc)
 		return rc;
 	uint64_t size = p->file.size;
-	p->opened = true;
+	p->file_is_open = true;
 	p->decoded = NULL;
 	if (count == UINT64_MAX)
-		count = first < size ? size - first : 0;
-	p->bytes = p->file.bytes + first;
+		count = offset < size ? size - offset : 0;
+	p->bytes = p->file.bytes + offset;
 	p->size = (size_t)count;
-	if (first > size || count > size - first)
+	if (offset > size || count > size - offset)
 		rc = error_set(e, EINVAL, "%s has %llu bytes, too few for %llu bytes from byte %llu on", name,
-			       (unsigned long long)size, (unsigned long long)count, (unsigned long long)first);
+			       (unsigned long long)size, (unsigned long long)count, (unsigned long long)offset);
 	else if (base64)
-		rc = asset_range_decode(p, name, e);
+		rc = asset_range_decode_base64(p, name, e);
 	if (rc)
 		assets->close(assets->user, &p->file);
 	return rc;
@@ -89,6 +89,6 @@ int asset_range_open(struct asset_range *p, const struct asset_source *assets, c
 void asset_range_close(struct asset_range *p, const struct asset_source *assets)
 {
 	mem_free(p->decoded);
-	if (p->opened)
+	if (p->file_is_open)
 		assets->close(assets->user, &p->file);
 }

@@ -17,10 +17,10 @@ enum { BLEND_PARTS_MAX = 16 };
 struct blend {
 	uint32_t count;
 	struct bsdf part[BLEND_PARTS_MAX];
-	struct texture weight; /* weight of one of two parts; the other part has the rest */
-	bool weight_of_first;  /* the weight is that of the first part, otherwise that of the second */
-	bool is_fixed;	       /* the parts have the constant weights `fixed` instead of `weight` */
-	double fixed[BLEND_PARTS_MAX];
+	struct texture weight;	 /* weight of one of two parts; the other part has the rest */
+	bool weight_is_of_first; /* the weight is that of the first part, otherwise that of the second */
+	bool has_fixed_weights;	 /* the parts have the constant weights `fixed_weight` instead of `weight` */
+	double fixed_weight[BLEND_PARTS_MAX];
 };
 
 /* Returns b->data as a blend of `count` parts, which the caller has yet to create. Never fails. */
@@ -30,7 +30,8 @@ int blend_read_parts(struct blend *m, struct bsdf *b, const struct scene_node *n
 		     struct error *e);
 /* Merges the properties of a part of the given type into b. -ENOTSUP if the part is dispersive, or if its index of
  * refraction differs from that of the parts before it. */
-int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const struct scene_node *n, struct error *e);
+int blend_merge_part(struct bsdf *b, const struct bsdf *part, const char *type, const struct scene_node *n,
+		     struct error *e);
 
 spectrum blend_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);

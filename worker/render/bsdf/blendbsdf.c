@@ -10,8 +10,8 @@ static int blendbsdf_create(struct bsdf *b, const struct scene_node *n, const st
 	int code = blend_read_parts(m, b, n, build, e);
 	if (code)
 		return code;
-	b->alpha_mean = 0.5 * m->part[0].alpha_mean + 0.5 * m->part[1].alpha_mean;
-	return bsdf_number(b, &m->weight, n, "weight", 0.5, build, e);
+	b->mean_alpha = 0.5 * m->part[0].mean_alpha + 0.5 * m->part[1].mean_alpha;
+	return bsdf_read_number(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
-BLEND_OPS(blendbsdf, {.name = "weight", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1});
+BLEND_OPS(blendbsdf, {.name = "weight", .types = VALUE_TEXTURE | VALUE_CLAMPED, .min = 0, .max = 1});

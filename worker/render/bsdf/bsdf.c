@@ -20,7 +20,7 @@ const struct bsdf_ops *const bsdf_registry[] = {
 int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n,
 		   const struct bsdf_build *build, struct error *e)
 {
-	*b = (struct bsdf){.ops = ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+	*b = (struct bsdf){.ops = ops, .min_alpha = INFINITY, .eta = 1, .color_kind = COLOR_KIND_CONSTANT};
 	if (ops->data_size > 0) {
 		b->data = arena_alloc(build->arena, 1, ops->data_size);
 		if (!b->data)
@@ -39,55 +39,55 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
 {
-	return b->dispersive && b->ior ? ior_eta(b->ior, w->nm[0]) : b->eta;
+	return b->is_dispersive && b->ior ? ior_eta(b->ior, w->nm[0]) : b->eta;
 }
 
 /* Computes the product of bsdf_eval_halfvec from `eval`, with nothing cancelled, for plug-ins without eval_halfvec. */
-static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+static spectrum eval_halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	struct bsdf_point radiance = *p;
 	radiance.transport = TRANSPORT_RADIANCE;
 	spectrum f = b->ops->eval(b, &radiance, wo, wi);
 	bool reflect = wo.z * wi.z > 0;
-	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w), length;
+	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->wavelengths) : 1 / bsdf_eta(b, p->wavelengths), length;
 	vec3 h;
 	if (!reflect && eta == 1)
 		return f; /* d wi / d h is 1 / |wi.z| */
-	if (spectrum_is_zero(f) || !microfacet_half(wo, eta, wi, &h, &length))
-		return spectrum_of(0);
+	if (spectrum_is_zero(f) || !microfacet_half_vector(wo, eta, wi, &h, &length))
+		return spectrum_constant(0);
 	double ih = vec3_dot(wi, h), solid = reflect ? 2 * length : length * length / (eta * eta * fabs(ih));
 	return spectrum_scale(fabs(wi.z * h.z * h.z * h.z) * solid, f);
 }
 
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
+	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : eval_halfvec_product(b, p, wo, wi);
 }
 
 /* Straight and refracted transmission leave on the same side of the surface: a query for the one must not be answered
  * with the other. */
-static bool may_have(const struct bsdf *b, unsigned mode)
+static bool may_have_delta(const struct bsdf *b, unsigned mode)
 {
 	if (mode & BSDF_STRAIGHT)
 		return b->modes & BSDF_STRAIGHT;
-	return !(mode & BSDF_TRANSMIT) || !b->only_straight;
+	return !(mode & BSDF_TRANSMIT) || !b->transmits_only_straight;
 }
 
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			 double *chance)
 {
-	if (!b->ops->eval_delta || !may_have(b, mode))
-		return spectrum_of(0);
+	if (!b->ops->eval_delta || !may_have_delta(b, mode))
+		return spectrum_constant(0);
 	return b->ops->eval_delta(b, p, wo, mode, wi, chance);
 }
 
-spectrum bsdf_no_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+spectrum bsdf_eval_zero(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p, (void)wo, (void)wi;
-	return spectrum_of(0);
+	return spectrum_constant(0);
 }
 
-double bsdf_no_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+double bsdf_pdf_zero(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p, (void)wo, (void)wi;
 	return 0;
@@ -100,9 +100,10 @@ static bool black_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return false;
 }
 
-void bsdf_black(struct bsdf *b)
+void bsdf_make_black(struct bsdf *b)
 {
 	static const struct bsdf_ops ops = {
-		.decl.type = "black", .eval = bsdf_no_eval, .pdf_solid = bsdf_no_pdf, .sample = black_sample};
-	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .black = true, .shape = COLOR_SHAPE_CONSTANT};
+		.decl.type = "black", .eval = bsdf_eval_zero, .pdf_solid = bsdf_pdf_zero, .sample = black_sample};
+	*b = (struct bsdf){
+		.ops = &ops, .min_alpha = INFINITY, .eta = 1, .is_black = true, .color_kind = COLOR_KIND_CONSTANT};
 }

@@ -30,11 +30,11 @@ enum bsdf_mode {
 enum transport { TRANSPORT_RADIANCE, TRANSPORT_IMPORTANCE };
 
 struct bsdf_point {
-	struct texture_point where;
-	const struct wavelengths *w;
+	struct texture_point texture_point;
+	const struct wavelengths *wavelengths;
 	enum transport transport;
-	bool culled;		   /* rays that hit the surface from below its normal ignore it: struct bsdf.culls */
-	struct relief_place place; /* the shading frames of single parts: tilted.h, bumpmap.c */
+	bool culls_backfaces; /* rays that hit the surface from below its normal ignore it: struct bsdf.culls */
+	struct relief_frames relief_frames; /* the shading frames of single parts: tilted.h, bumpmap.c */
 };
 
 struct bsdf_sample {
@@ -49,17 +49,18 @@ struct bsdf_sample {
 struct bsdf;
 struct ior;
 struct boundary_table;
-struct bend;
+struct relief_map;
 
 struct bsdf_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	double least_roughness;		    /* metal and glass with a roughness below this one are created as smooth */
+	double min_roughness;		    /* metal and glass with a roughness below this one are created as smooth */
 	struct attribute_table *attributes; /* of the mesh that has this BSDF; NULL: none */
-	bool black_backs;		    /* opaque materials without `twosided` reflect nothing on their back */
-	struct boundary_table **boundaries; /* list of the tables that the scene's materials share; NULL: no sharing */
-	struct bend **bends;		    /* likewise, the bump and normal maps of one material */
+	bool has_black_backs;		    /* opaque materials without `twosided` reflect nothing on their back */
+	struct boundary_table *
+		*boundary_tables;	    /* list of the tables that the scene's materials share; NULL: no sharing */
+	struct relief_map **relief_maps;    /* likewise, the bump and normal maps of one material */
 	const struct volume_build *volumes; /* NULL: none */
 };
 
@@ -90,42 +91,42 @@ struct bsdf {
 	unsigned modes;	 /* union of the modes of all lobes: DELTA does not say which of the other modes is specular */
 	bool has_smooth; /* some lobe is not a delta lobe: eval is not identically 0 */
 	bool has_delta;
-	double alpha;	   /* smallest roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
-	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
+	double min_alpha;  /* smallest roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double mean_alpha; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
 			      only */
 	double eta; /* index below the surface (against the normal) over the one above, at 587.6 nm where it depends on
 		       the wavelength; 1: opaque, or not known. Lobes with BSDF_STRAIGHT ignore it */
-	bool only_straight;    /* every lobe that transmits has BSDF_STRAIGHT: eta has no meaning */
-	bool dispersive;       /* the index depends on the wavelength: use bsdf_eta; paths carry one wavelength only */
-	const struct ior *ior; /* laws of dispersion of both sides, by enum ior_side; NULL: only eta is known */
-	bool two_sided;	       /* scatters light that arrives from below the normal */
-	bool mirrored;	       /* two_sided only since bsdf_mirror_back (twosided.h) made some part of it so */
-	bool textured;
-	bool directed;	 /* not reciprocal; paths from a light choose specular lobes with other probabilities than paths
-			    from the camera */
-	bool culls;	 /* light that has entered a curve with this BSDF leaves it without a vertex: struct
-			    geom_shape.culled */
-	bool uses_place; /* some part has a shading frame of its own, and needs bsdf_point.place */
-	bool passes;	 /* a `mask` or `null`: objects behind the surface show through */
+	bool transmits_only_straight; /* every lobe that transmits has BSDF_STRAIGHT: eta has no meaning */
+	bool is_dispersive;	/* the index depends on the wavelength: use bsdf_eta; paths carry one wavelength only */
+	const struct ior *ior;	/* laws of dispersion of both sides, by enum ior_side; NULL: only eta is known */
+	bool is_two_sided;	/* scatters light that arrives from below the normal */
+	bool has_mirrored_back; /* is_two_sided only since bsdf_mirror_back (twosided.h) made some part of it so */
+	bool is_textured;
+	bool is_nonreciprocal; /* not reciprocal; paths from a light choose specular lobes with other probabilities than
+			  paths from the camera */
+	bool culls_backfaces;  /* light that has entered a curve with this BSDF leaves it without a vertex: struct
+			  geom_shape.culled */
+	bool uses_relief_frames;     /* some part has a shading frame of its own, and needs bsdf_point.place */
+	bool is_see_through;	     /* a `mask` or `null`: objects behind the surface show through */
 	bool uses_tangents;	     /* anisotropic, or has a normal map: depends on the tangents of the frame */
-	bool black;		     /* neither reflects nor transmits */
-	enum color_shape shape;	     /* COLOR_SHAPE_CONSTANT: the BSDF has no colour */
+	bool is_black;		     /* neither reflects nor transmits */
+	enum color_kind color_kind;  /* COLOR_KIND_CONSTANT: the BSDF has no colour */
 	const struct relief *relief; /* bump or normal map that bends the shading normals; NULL: none */
 	void *data;
 };
 
 /* Returns whether connections may look through surfaces with b (path/transparent.h). They do not look through hair,
  * which culls. */
-static inline bool bsdf_is_passed(const struct bsdf *b)
+static inline bool bsdf_passes_connections(const struct bsdf *b)
 {
-	return (b->modes & BSDF_STRAIGHT) && !b->culls;
+	return (b->modes & BSDF_STRAIGHT) && !b->culls_backfaces;
 }
 
 /* Returns whether connections to emitters may be refracted by b (path/refracted.h). Surfaces that connections look
  * through are excluded, so that there is one connection from each point of an emitter. */
-static inline bool bsdf_refracts(const struct bsdf *b)
+static inline bool bsdf_refracts_connections(const struct bsdf *b)
 {
-	return b->has_delta && (b->modes & BSDF_TRANSMIT) && !(b->modes & BSDF_STRAIGHT) && !b->culls;
+	return b->has_delta && (b->modes & BSDF_TRANSMIT) && !(b->modes & BSDF_STRAIGHT) && !b->culls_backfaces;
 }
 
 /* Returns the index below the surface over the one above, at the hero wavelength nm[0] if b is dispersive. */
@@ -153,9 +154,9 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n,
 		   const struct bsdf_build *build, struct error *e);
 /* `eval` and `pdf_solid` of a BSDF that has specular lobes only: zero. */
-spectrum bsdf_no_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-double bsdf_no_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-void bsdf_black(struct bsdf *b); /* absorbs everything: for emitters without a BSDF */
+spectrum bsdf_eval_zero(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+double bsdf_pdf_zero(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+void bsdf_make_black(struct bsdf *b); /* absorbs everything: for emitters without a BSDF */
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
 

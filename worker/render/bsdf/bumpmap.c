@@ -23,26 +23,27 @@
  * Shadowing Function to Solve the Bump Terminator Problem. Ray Tracing Gems, ch. 12, 2019). Not reciprocal. Densities
  * stay as they are, since G lies between 0 and 1.
  */
-static double square_of_tangent(double cosine)
+static double tangent_squared(double cosine)
 {
 	double c2 = cosine * cosine;
 	return fmax(1 - c2, 0) / c2;
 }
 
 /* Returns G. At 90 degrees to the unbent normal G is 0, or 1 if the normal is not bent. */
-static double shadow(const struct bsdf_point *p, vec3 wo, vec3 wi)
+static double shadowing_factor(const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!p->place.frame)
+	if (!p->relief_frames.get_frame)
 		return 1;
-	vec3 light = p->transport == TRANSPORT_RADIANCE ? wi : wo, n = p->place.frame(p->place.point, NULL).n;
-	double a2 = fmin(square_of_tangent(n.z) / 8, 1);
-	return a2 > 0 ? 2 / (1 + sqrt(1 + a2 * square_of_tangent(vec3_dot(n, light)))) : 1;
+	vec3 light = p->transport == TRANSPORT_RADIANCE ? wi : wo,
+	     n = p->relief_frames.get_frame(p->relief_frames.context, NULL).n;
+	double a2 = fmin(tangent_squared(n.z) / 8, 1);
+	return a2 > 0 ? 2 / (1 + sqrt(1 + a2 * tangent_squared(vec3_dot(n, light)))) : 1;
 }
 
 static spectrum shadowed_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct bsdf *inner = b->data;
-	return spectrum_scale(shadow(p, wo, wi), inner->ops->eval(inner, p, wo, wi));
+	return spectrum_scale(shadowing_factor(p, wo, wi), inner->ops->eval(inner, p, wo, wi));
 }
 
 static double shadowed_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -56,14 +57,14 @@ static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_po
 {
 	struct bsdf_point radiance = *p;
 	radiance.transport = TRANSPORT_RADIANCE;
-	return spectrum_scale(shadow(&radiance, wo, wi), bsdf_eval_halfvec(b->data, p, wo, wi));
+	return spectrum_scale(shadowing_factor(&radiance, wo, wi), bsdf_eval_halfvec(b->data, p, wo, wi));
 }
 
 static spectrum shadowed_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				    double *chance)
 {
 	spectrum weight = bsdf_eval_delta(b->data, p, wo, mode, wi, chance);
-	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadow(p, wo, *wi), weight);
+	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadowing_factor(p, wo, *wi), weight);
 }
 
 static bool shadowed_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -72,7 +73,7 @@ static bool shadowed_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	const struct bsdf *inner = b->data;
 	if (!inner->ops->sample(inner, p, wo, u, out))
 		return false;
-	out->f = spectrum_scale(shadow(p, wo, out->wi), out->f);
+	out->f = spectrum_scale(shadowing_factor(p, wo, out->wi), out->f);
 	return true;
 }
 
@@ -86,42 +87,42 @@ static const struct bsdf_ops shadowed_ops = {
 };
 
 /* Wraps b, whose relief is known, so that f of all its lobes is scaled by G. */
-static int shadow_bumps(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int add_shadowing(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	b->uses_place = true;
+	b->uses_relief_frames = true;
 	return bsdf_wrap(b, &shadowed_ops, n, build, e);
 }
 
 /* ---- bent normals */
 
-struct bend {
+struct relief_map {
 	struct relief relief;
 	const struct scene_node *node; /* the node of the texture; NULL: one colour */
 	struct texture texture;
-	double scale;	   /* factor of heights, or of the first two components of a normal */
-	struct bend *next; /* the next map of the same material */
+	double scale;		 /* factor of heights, or of the first two components of a normal */
+	struct relief_map *next; /* the next map of the same material */
 };
 
-static double height_of(const double x[3], bool grey)
+static double height_from_rgb(const double x[3], bool grey)
 {
 	return grey ? x[0] : rec709_luminance(x);
 }
 
-static void height_at(const void *data, double u, double v, struct relief_value *out)
+static void eval_height(const void *data, double u, double v, struct relief_value *out)
 {
-	const struct bend *b = data;
+	const struct relief_map *b = data;
 	struct texture_jet j;
 	texture_jet(&b->texture, u, v, &j);
-	double mixed = b->scale * height_of(j.duv, j.grey);
-	out->x = (vec3){b->scale * height_of(j.du, j.grey), b->scale * height_of(j.dv, j.grey), 0};
-	out->du = (vec3){b->scale * height_of(j.duu, j.grey), mixed, 0};
-	out->dv = (vec3){mixed, b->scale * height_of(j.dvv, j.grey), 0};
+	double mixed = b->scale * height_from_rgb(j.duv, j.is_grey);
+	out->x = (vec3){b->scale * height_from_rgb(j.du, j.is_grey), b->scale * height_from_rgb(j.dv, j.is_grey), 0};
+	out->du = (vec3){b->scale * height_from_rgb(j.duu, j.is_grey), mixed, 0};
+	out->dv = (vec3){mixed, b->scale * height_from_rgb(j.dvv, j.is_grey), 0};
 }
 
 /* Components of the image from 0 to 1 stand for those of a normal from -1 to 1. */
-static void normal_at(const void *data, double u, double v, struct relief_value *out)
+static void eval_normal(const void *data, double u, double v, struct relief_value *out)
 {
-	const struct bend *b = data;
+	const struct relief_map *b = data;
 	struct texture_jet j;
 	texture_jet(&b->texture, u, v, &j);
 	double k = b->scale;
@@ -130,90 +131,93 @@ static void normal_at(const void *data, double u, double v, struct relief_value 
 	out->dv = (vec3){2 * k * j.dv[0], 2 * k * j.dv[1], 2 * j.dv[2]};
 }
 
-static bool same_texture(const struct bend *a, const struct bend *b)
+static bool has_same_texture(const struct relief_map *a, const struct relief_map *b)
 {
 	if (!a->node || !b->node)
 		return a->node == b->node &&
 		       memcmp(a->texture.relief, b->texture.relief, sizeof a->texture.relief) == 0;
-	return node_same(a->node, b->node);
+	return node_equals(a->node, b->node);
 }
 
-/* Returns a map equal to `like` that another part of the material has already, or NULL. Parts with equal maps have to
+/* Returns a map equal to `wanted` that another part of the material has already, or NULL. Parts with equal maps have to
  * share them, since parts with different reliefs get shading frames of their own (tilted.h). */
-static const struct bend *find_bend(const struct bend *like, const struct bend *made)
+static const struct relief_map *find_relief_map(const struct relief_map *wanted, const struct relief_map *maps)
 {
-	for (const struct bend *b = made; b; b = b->next)
-		if (b->relief.kind == like->relief.kind && b->relief.handed == like->relief.handed &&
-		    b->relief.turns == like->relief.turns && b->scale == like->scale && same_texture(b, like))
+	for (const struct relief_map *b = maps; b; b = b->next)
+		if (b->relief.kind == wanted->relief.kind &&
+		    b->relief.uses_handedness == wanted->relief.uses_handedness &&
+		    b->relief.flips_invalid_normals == wanted->relief.flips_invalid_normals &&
+		    b->scale == wanted->scale && has_same_texture(b, wanted))
 			return b;
 	return NULL;
 }
 
 /* Finds or creates the map of n. texture: NULL for the colour that n has. */
-static int bend_of(const struct scene_node *n, const struct scene_node *texture, enum relief_kind kind,
-		   const struct bsdf_build *build, const struct bend **out, struct error *e)
+static int get_relief_map(const struct scene_node *n, const struct scene_node *texture, enum relief_kind kind,
+			  const struct bsdf_build *build, const struct relief_map **out, struct error *e)
 {
-	const struct texture_build of_texture = bsdf_texture_build(build);
-	struct bend wanted = {.relief = {.kind = kind,
-					 .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
-					 .turns = node_bool(n, "flip_invalid_normals", build->dialect_3),
-					 .handed = node_bool(n, "handedness", false)},
-			      .node = texture,
-			      .scale = node_float(n, "scale", 1),
-			      .next = build->bends ? *build->bends : NULL};
-	int code = texture ? 0 : texture_from_node(&wanted.texture, n, "normalmap", 0, COLOR_RELIEF, &of_texture, e);
+	const struct texture_build texture_build = bsdf_texture_build(build);
+	struct relief_map wanted = {
+		.relief = {.kind = kind,
+			   .eval = kind == RELIEF_HEIGHT ? eval_height : eval_normal,
+			   .flips_invalid_normals = node_bool(n, "flip_invalid_normals", build->dialect_3),
+			   .uses_handedness = node_bool(n, "handedness", false)},
+		.node = texture,
+		.scale = node_float(n, "scale", 1),
+		.next = build->relief_maps ? *build->relief_maps : NULL};
+	int code = texture ? 0 : texture_from_node(&wanted.texture, n, "normalmap", 0, COLOR_RELIEF, &texture_build, e);
 	if (code)
 		return code;
-	*out = find_bend(&wanted, wanted.next);
+	*out = find_relief_map(&wanted, wanted.next);
 	if (*out)
 		return 0;
-	struct bend *bend = arena_alloc(build->arena, 1, sizeof *bend);
-	if (!bend)
+	struct relief_map *map = arena_alloc(build->arena, 1, sizeof *map);
+	if (!map)
 		return node_error(n, e, ENOMEM, "out of memory");
-	*bend = wanted;
-	bend->relief.data = bend;
+	*map = wanted;
+	map->relief.data = map;
 	if (texture)
-		code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
-	if (!code && build->bends)
-		*build->bends = bend;
-	*out = bend;
+		code = texture_create(&map->texture, texture, COLOR_RELIEF, &texture_build, e);
+	if (!code && build->relief_maps)
+		*build->relief_maps = map;
+	*out = map;
 	return code;
 }
 
-static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, enum relief_kind kind,
-		  struct error *e)
+static int create_relief_bsdf(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			      enum relief_kind kind, struct error *e)
 {
 	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0), *texture = node_child(n, PLUGIN_TEXTURE, 0);
-	const struct bend *bend;
+	const struct relief_map *map;
 	if (node_ref(n, "normalmap"))
 		texture = node_ref(n, "normalmap");
-	if (!inner || !(texture || node_find(n, "normalmap")) || node_child(n, PLUGIN_BSDF, 1))
+	if (!inner || !(texture || node_find_property(n, "normalmap")) || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
-	int code = bend_of(n, texture, kind, build, &bend, e);
+	int code = get_relief_map(n, texture, kind, build, &map, e);
 	if (!code)
 		code = bsdf_create(b, inner, build, e);
-	if (!code && (b->relief || b->uses_place))
+	if (!code && (b->relief || b->uses_relief_frames))
 		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
 	if (code)
 		return code;
-	b->relief = &bend->relief;
-	b->textured = true;
+	b->relief = &map->relief;
+	b->is_textured = true;
 	b->uses_tangents |= kind == RELIEF_NORMAL;
-	return node_bool(n, "use_shadowing_function", build->dialect_3) ? shadow_bumps(b, n, build, e) : 0;
+	return node_bool(n, "use_shadowing_function", build->dialect_3) ? add_shadowing(b, n, build, e) : 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	return create(b, n, build, RELIEF_HEIGHT, e);
+	return create_relief_bsdf(b, n, build, RELIEF_HEIGHT, e);
 }
 
 static int normalmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	return create(b, n, build, RELIEF_NORMAL, e);
+	return create_relief_bsdf(b, n, build, RELIEF_NORMAL, e);
 }
 
 /* Mitsuba 3.7's parameters for places where the bent normal and the surface disagree. */
-#define OF_MITSUBA_3_7                                                \
+#define MITSUBA_3_7_PARAMS                                            \
 	{.name = "flip_invalid_normals", .types = VALUE_BOOL},        \
 	{                                                             \
 		.name = "use_shadowing_function", .types = VALUE_BOOL \
@@ -222,10 +226,10 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 const struct bsdf_ops bsdf_ops_bumpmap = {
 	.decl = {PLUGIN_BSDF, "bumpmap",
 		 PARAMS({.name = "scale",
-			 .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3,
+			 .types = VALUE_FLOAT | VALUE_INT | VALUE_DIALECT_3_ONLY,
 			 .min = -PARAM_UV_MAX,
 			 .max = PARAM_UV_MAX},
-			OF_MITSUBA_3_7),
+			MITSUBA_3_7_PARAMS),
 		 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.create = bumpmap_create,
 };
@@ -236,10 +240,10 @@ const struct bsdf_ops bsdf_ops_normalmap = {
 	.decl = {PLUGIN_BSDF, "normalmap",
 		 PARAMS({.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
 			{.name = "scale",
-			 .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3,
+			 .types = VALUE_FLOAT | VALUE_INT | VALUE_DIALECT_3_ONLY,
 			 .min = -PARAM_UV_MAX,
 			 .max = PARAM_UV_MAX},
-			{.name = "handedness", .types = VALUE_BOOL}, OF_MITSUBA_3_7),
+			{.name = "handedness", .types = VALUE_BOOL}, MITSUBA_3_7_PARAMS),
 		 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.create = normalmap_create,
 };

@@ -25,7 +25,7 @@ struct coat {
 	struct bsdf inner;
 	struct texture specular;
 	struct texture absorption; /* sigma_a */
-	double thickness, eta, specular_max;
+	double thickness, eta, max_specular;
 	struct rough_boundary boundary;
 	struct rough_boundary *rough; /* points to `boundary`; NULL: the layer is smooth */
 };
@@ -36,9 +36,9 @@ struct layer {
 	struct boundary_point boundary;
 };
 /* A direction inside the layer, and the share of the light that the boundary transmits to it. */
-struct passage {
-	vec3 inside;
-	double transmitted;
+struct refracted_ray {
+	vec3 direction;
+	double transmittance;
 };
 
 static struct layer layer_at(const struct bsdf *b, const struct bsdf_point *p)
@@ -54,79 +54,79 @@ static vec3 facing_up(vec3 v)
 	return (vec3){v.x, v.y, fabs(v.z)};
 }
 
-static double transmitted_at(const struct layer *l, double cosine)
+static double boundary_transmittance(const struct layer *l, double cosine)
 {
-	return l->c->rough ? boundary_transmitted(&l->boundary, cosine)
-			   : fresnel_dielectric(fmin(cosine, 1), l->c->eta).transmitted;
+	return l->c->rough ? rough_boundary_transmittance(&l->boundary, cosine)
+			   : fresnel_dielectric(fmin(cosine, 1), l->c->eta).transmittance;
 }
 
 /* Returns false if no light enters the layer from w. */
-static bool refract_into(const struct layer *l, vec3 w, struct passage *out)
+static bool refract_into(const struct layer *l, vec3 w, struct refracted_ray *out)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(w.z), 1), l->c->eta);
-	if (!(f.transmitted > 0 && f.cos_t > 0))
+	if (!(f.transmittance > 0 && f.cos_t > 0))
 		return false;
-	out->transmitted = transmitted_at(l, fabs(w.z));
-	out->inside = vec3_normalize((vec3){w.x / l->c->eta, w.y / l->c->eta, copysign(f.cos_t, w.z)});
-	return out->inside.z != 0;
+	out->transmittance = boundary_transmittance(l, fabs(w.z));
+	out->direction = vec3_normalize((vec3){w.x / l->c->eta, w.y / l->c->eta, copysign(f.cos_t, w.z)});
+	return out->direction.z != 0;
 }
 
-static spectrum absorbed_by(const struct coat *c, const struct bsdf_point *p, vec3 a, vec3 b)
+static spectrum absorption_transmittance(const struct coat *c, const struct bsdf_point *p, vec3 a, vec3 b)
 {
-	double way = c->thickness * (1 / fabs(a.z) + 1 / fabs(b.z));
+	double path_length = c->thickness * (1 / fabs(a.z) + 1 / fabs(b.z));
 	if (!(c->thickness > 0) || texture_max(&c->absorption) == 0)
-		return spectrum_of(1);
-	spectrum s = texture_eval(&c->absorption, &p->where, p->w);
+		return spectrum_constant(1);
+	spectrum s = texture_eval(&c->absorption, &p->texture_point, p->wavelengths);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		s.v[i] = s.v[i] > 0 ? exp(-fmin(s.v[i] * way, 800)) : 1;
+		s.v[i] = s.v[i] > 0 ? exp(-fmin(s.v[i] * path_length, 800)) : 1;
 	return s;
 }
 
 /* Returns whether wo and wi are on the same side of the surface, and light is scattered on that side. */
-static bool is_same_side(const struct bsdf *b, vec3 wo, vec3 wi)
+static bool scatters_between(const struct bsdf *b, vec3 wo, vec3 wi)
 {
-	return wo.z * wi.z > 0 && (wo.z > 0 || b->two_sided);
+	return wo.z * wi.z > 0 && (wo.z > 0 || b->is_two_sided);
 }
 
 static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!is_same_side(b, wo, wi))
-		return spectrum_of(0);
+	if (!scatters_between(b, wo, wi))
+		return spectrum_constant(0);
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
-	spectrum f = spectrum_of(0);
-	struct passage o, i;
+	spectrum f = spectrum_constant(0);
+	struct refracted_ray o, i;
 	double pdf;
 	if (c->rough)
-		f = spectrum_scale(boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &pdf),
-				   texture_eval(&c->specular, &p->where, p->w));
+		f = spectrum_scale(rough_boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &pdf),
+				   texture_eval(&c->specular, &p->texture_point, p->wavelengths));
 	if (!c->inner.has_smooth || !refract_into(&l, wo, &o) || !refract_into(&l, wi, &i))
 		return f;
-	spectrum below = spectrum_mul(c->inner.ops->eval(&c->inner, p, o.inside, i.inside),
-				      absorbed_by(c, p, o.inside, i.inside));
-	return spectrum_add(f, spectrum_scale(o.transmitted * i.transmitted / (c->eta * c->eta), below));
+	spectrum below = spectrum_mul(c->inner.ops->eval(&c->inner, p, o.direction, i.direction),
+				      absorption_transmittance(c, p, o.direction, i.direction));
+	return spectrum_add(f, spectrum_scale(o.transmittance * i.transmittance / (c->eta * c->eta), below));
 }
 
 /* Returns the probability of sampling the boundary's own reflection. */
-static double boundary_chance(const struct layer *l, vec3 wo)
+static double reflection_chance(const struct layer *l, vec3 wo)
 {
-	double t = transmitted_at(l, fabs(wo.z)), r = (1 - t) * l->c->specular_max;
+	double t = boundary_transmittance(l, fabs(wo.z)), r = (1 - t) * l->c->max_specular;
 	return r + t > 0 ? r / (r + t) : 0;
 }
 
 static double coat_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!is_same_side(b, wo, wi))
+	if (!scatters_between(b, wo, wi))
 		return 0;
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
-	struct passage o, i;
-	double chance = boundary_chance(&l, wo), lobe = 0, below = 0;
+	struct refracted_ray o, i;
+	double chance = reflection_chance(&l, wo), lobe = 0, below = 0;
 	if (c->rough)
-		boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &lobe);
+		rough_boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &lobe);
 	if (c->inner.has_smooth && refract_into(&l, wo, &o) && refract_into(&l, wi, &i))
-		below = c->inner.ops->pdf_solid(&c->inner, p, o.inside, i.inside) *
-			(wi.z / i.inside.z / (c->eta * c->eta));
+		below = c->inner.ops->pdf_solid(&c->inner, p, o.direction, i.direction) *
+			(wi.z / i.direction.z / (c->eta * c->eta));
 	return chance * lobe + (1 - chance) * below;
 }
 
@@ -135,27 +135,28 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 {
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
-	struct passage o;
+	struct refracted_ray o;
 	vec3 unused;
-	spectrum f = spectrum_of(0);
-	double one, all = 0;
-	if (!(mode & BSDF_REFLECT) || !(fabs(wo.z) >= DBL_MIN) || (wo.z < 0 && !b->two_sided))
+	spectrum f = spectrum_constant(0);
+	double inner_chance, total_chance = 0;
+	if (!(mode & BSDF_REFLECT) || !(fabs(wo.z) >= DBL_MIN) || (wo.z < 0 && !b->is_two_sided))
 		return f;
-	double first = boundary_chance(&l, wo);
+	double outer_chance = reflection_chance(&l, wo);
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
 	if (!c->rough) {
-		all = first;
-		f = spectrum_scale(1 - transmitted_at(&l, fabs(wo.z)), texture_eval(&c->specular, &p->where, p->w));
+		total_chance = outer_chance;
+		f = spectrum_scale(1 - boundary_transmittance(&l, fabs(wo.z)),
+				   texture_eval(&c->specular, &p->texture_point, p->wavelengths));
 	}
 	if (c->inner.has_delta && refract_into(&l, wo, &o)) {
-		spectrum below = bsdf_eval_delta(&c->inner, p, o.inside, BSDF_REFLECT, &unused, &one);
+		spectrum below = bsdf_eval_delta(&c->inner, p, o.direction, BSDF_REFLECT, &unused, &inner_chance);
 		if (!spectrum_is_zero(below)) {
-			all += (1 - first) * one;
-			below = spectrum_mul(below, absorbed_by(c, p, o.inside, o.inside));
-			f = spectrum_add(f, spectrum_scale(o.transmitted * o.transmitted, below));
+			total_chance += (1 - outer_chance) * inner_chance;
+			below = spectrum_mul(below, absorption_transmittance(c, p, o.direction, o.direction));
+			f = spectrum_add(f, spectrum_scale(o.transmittance * o.transmittance, below));
 		}
 	}
-	*chance = all;
+	*chance = total_chance;
 	return f;
 }
 
@@ -169,42 +170,42 @@ static bool refract_out(const struct coat *c, vec3 inside, vec3 *out)
 	return out->z != 0;
 }
 
-/* Samples the direction wi of a lobe that is not specular. Returns false if the sample is specular (*delta is set), or
- * absorbed. */
+/* Samples the direction wi of a lobe that is not specular. Returns false if the sample is specular (*is_delta is set),
+ * or absorbed. */
 static bool sample_lobe(const struct bsdf *b, const struct layer *l, const struct bsdf_point *p, vec3 wo,
-			const double u[3], bool *delta, vec3 *wi)
+			const double u[3], bool *is_delta, vec3 *wi)
 {
 	const struct coat *c = l->c;
 	struct bsdf_sample inner;
-	struct passage o;
-	double chance = boundary_chance(l, wo);
-	*delta = false;
+	struct refracted_ray o;
+	double chance = reflection_chance(l, wo);
+	*is_delta = false;
 	if (u[2] < chance) {
-		*delta = !c->rough;
-		if (*delta)
+		*is_delta = !c->rough;
+		if (*is_delta)
 			return false;
 		*wi = microfacet_sample_mirrored(&l->boundary.facets, facing_up(wo), u[0], u[1]);
 		wi->z = copysign(1, wo.z) * wi->z;
-		return is_same_side(b, wo, *wi);
+		return scatters_between(b, wo, *wi);
 	}
 	const double rest[3] = {u[0], u[1], fmin((u[2] - chance) / (1 - chance), 1 - 0x1p-53)};
-	if (!refract_into(l, wo, &o) || !c->inner.ops->sample(&c->inner, p, o.inside, rest, &inner))
+	if (!refract_into(l, wo, &o) || !c->inner.ops->sample(&c->inner, p, o.direction, rest, &inner))
 		return false;
-	*delta = inner.mode & BSDF_DELTA;
-	return !*delta && refract_out(c, inner.wi, wi) && is_same_side(b, wo, *wi);
+	*is_delta = inner.mode & BSDF_DELTA;
+	return !*is_delta && refract_out(c, inner.wi, wi) && scatters_between(b, wo, *wi);
 }
 
 static bool coat_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
-	bool delta;
+	bool is_delta;
 	vec3 wi;
-	if (!is_same_side(b, wo, wo))
+	if (!scatters_between(b, wo, wo))
 		return false;
 	struct layer l = layer_at(b, p);
-	if (sample_lobe(b, &l, p, wo, u, &delta, &wi))
+	if (sample_lobe(b, &l, p, wo, u, &is_delta, &wi))
 		return bsdf_sample_smooth(b, p, wo, wi, out);
-	return delta && bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out) && !spectrum_is_zero(out->f);
+	return is_delta && bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out) && !spectrum_is_zero(out->f);
 }
 
 static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
@@ -220,17 +221,17 @@ static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n
 	if (code)
 		return code;
 	b->relief = c->inner.relief;
-	b->uses_place = c->inner.uses_place;
+	b->uses_relief_frames = c->inner.uses_relief_frames;
 	b->modes = BSDF_REFLECT | c->inner.modes;
 	b->has_smooth = c->inner.has_smooth;
 	b->has_delta = c->inner.has_delta;
-	b->two_sided = c->inner.two_sided;
-	b->textured |= c->inner.textured;
+	b->is_two_sided = c->inner.is_two_sided;
+	b->is_textured |= c->inner.is_textured;
 	b->uses_tangents = c->inner.uses_tangents;
-	b->directed = c->inner.directed;
-	b->alpha = c->inner.has_smooth ? c->inner.alpha : INFINITY;
-	b->alpha_mean = c->inner.alpha_mean;
-	bsdf_add_shape(b, c->inner.shape);
+	b->is_nonreciprocal = c->inner.is_nonreciprocal;
+	b->min_alpha = c->inner.has_smooth ? c->inner.min_alpha : INFINITY;
+	b->mean_alpha = c->inner.mean_alpha;
+	bsdf_add_color_kind(b, c->inner.color_kind);
 	return 0;
 }
 
@@ -238,7 +239,7 @@ static int read_absorption(struct coat *c, struct bsdf *b, const struct scene_no
 			   struct error *e)
 {
 	c->thickness = node_float(n, "thickness", 1);
-	return bsdf_quantity(b, &c->absorption, n, "sigma_a", 0, false, build, e);
+	return bsdf_read_quantity(b, &c->absorption, n, "sigma_a", 0, false, build, e);
 }
 
 static int read_layer(struct coat *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
@@ -249,13 +250,13 @@ static int read_layer(struct coat *c, struct bsdf *b, const struct scene_node *n
 	if (!code)
 		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
 	if (!code)
-		code = bsdf_texture(b, &c->specular, n, "specular_reflectance", 1, build, e);
+		code = bsdf_read_texture(b, &c->specular, n, "specular_reflectance", 1, build, e);
 	if (!code)
 		code = read_absorption(c, b, n, build, e);
 	if (code)
 		return code;
 	c->eta = inside / outside;
-	c->specular_max = texture_max(&c->specular);
+	c->max_specular = texture_max(&c->specular);
 	return 0;
 }
 
@@ -268,7 +269,7 @@ static int coating_create(struct bsdf *b, const struct scene_node *n, const stru
 	b->modes |= BSDF_DELTA;
 	b->has_delta = true;
 	if (!b->has_smooth)
-		b->alpha = b->alpha_mean = 0;
+		b->min_alpha = b->mean_alpha = 0;
 	return code;
 }
 
@@ -278,15 +279,15 @@ static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const
 	struct coat *c = b->data;
 	c->rough = &c->boundary;
 	int code = read_inner(c, b, n, build, e);
-	double alpha = b->alpha, mean = b->alpha_mean;
+	double alpha = b->min_alpha, mean = b->mean_alpha;
 	if (!code)
 		code = read_layer(c, b, n, build, e);
 	if (!code)
-		code = rough_boundary_read(c->rough, c->eta, b, n, build, e); /* overwrites b->alpha */
+		code = rough_boundary_read(c->rough, c->eta, b, n, build, e); /* overwrites b->min_alpha */
 	if (code)
 		return code;
-	b->alpha = fmin(b->alpha, alpha);
-	b->alpha_mean = c->inner.has_smooth ? mean : b->alpha_mean; /* most light comes from below */
+	b->min_alpha = fmin(b->min_alpha, alpha);
+	b->mean_alpha = c->inner.has_smooth ? mean : b->mean_alpha; /* most light comes from below */
 	b->has_smooth = true;
 	return 0;
 }

@@ -9,7 +9,7 @@ static spectrum conductor_eval_delta(const struct bsdf *b, const struct bsdf_poi
 				     double *chance)
 {
 	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
 	*chance = 1;
 	return metal_fresnel(b->data, p, wo.z);
@@ -27,7 +27,7 @@ static int conductor_create(struct bsdf *b, const struct scene_node *n, const st
 	struct metal *m = b->data;
 	b->modes = BSDF_REFLECT | BSDF_DELTA;
 	b->has_delta = true;
-	b->alpha = 0;
+	b->min_alpha = 0;
 	return metal_read(m, b, n, build, e);
 }
 
@@ -35,8 +35,8 @@ const struct bsdf_ops bsdf_ops_conductor = {
 	.decl = PLUGIN(BSDF, "conductor", METAL_PARAMS, MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct metal),
 	.create = conductor_create,
-	.eval = bsdf_no_eval,
-	.pdf_solid = bsdf_no_pdf,
+	.eval = bsdf_eval_zero,
+	.pdf_solid = bsdf_pdf_zero,
 	.eval_delta = conductor_eval_delta,
 	.sample = conductor_sample,
 };

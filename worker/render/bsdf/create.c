@@ -39,13 +39,13 @@ bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	return true;
 }
 
-void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
+void bsdf_make_specular(struct bsdf *b, const struct bsdf_ops *ops)
 {
 	b->ops = ops;
 	b->modes |= BSDF_DELTA;
 	b->has_smooth = false;
 	b->has_delta = true;
-	b->alpha = b->alpha_mean = 0;
+	b->min_alpha = b->mean_alpha = 0;
 }
 
 int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
@@ -59,10 +59,10 @@ int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
 		sum);
 }
 
-void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
+void bsdf_add_color_kind(struct bsdf *b, enum color_kind kind)
 {
-	if (shape != COLOR_SHAPE_CONSTANT)
-		b->shape = COLOR_SHAPE_OTHER;
+	if (kind != COLOR_KIND_CONSTANT)
+		b->color_kind = COLOR_KIND_OTHER;
 }
 
 static int read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name,
@@ -71,84 +71,87 @@ static int read_texture(struct bsdf *b, struct texture *t, const struct scene_no
 	int code = texture_from_node(t, n, name, fallback, role, build, e);
 	if (code)
 		return code;
-	bsdf_add_shape(b, texture_shape(t));
-	b->textured |= !texture_is_constant(t);
+	bsdf_add_color_kind(b, texture_color_kind(t));
+	b->is_textured |= !texture_is_constant(t);
 	return 0;
 }
 
-int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		 const struct bsdf_build *build, struct error *e)
+int bsdf_read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      const struct bsdf_build *build, struct error *e)
 {
-	const struct texture_build inner = bsdf_texture_build(build);
-	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
+	const struct texture_build texture_build = bsdf_texture_build(build);
+	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &texture_build, e);
 }
 
-int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		const struct bsdf_build *build, struct error *e)
+int bsdf_read_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		     const struct bsdf_build *build, struct error *e)
 {
-	struct texture_build inner = bsdf_texture_build(build);
-	inner.number = true;
-	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
+	struct texture_build texture_build = bsdf_texture_build(build);
+	texture_build.is_number = true;
+	return read_texture(b, t, n, name, fallback, COLOR_REFLECTANCE, &texture_build, e);
 }
 
-int bsdf_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		  bool number, const struct bsdf_build *build, struct error *e)
+int bsdf_read_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		       bool is_number, const struct bsdf_build *build, struct error *e)
 {
-	struct texture_build inner = bsdf_texture_build(build);
-	inner.number = number;
-	return read_texture(b, t, n, name, fallback, COLOR_UNBOUNDED, &inner, e);
+	struct texture_build texture_build = bsdf_texture_build(build);
+	texture_build.is_number = is_number;
+	return read_texture(b, t, n, name, fallback, COLOR_UNBOUNDED, &texture_build, e);
 }
 
 enum { PROBE_SIDE = 64 };
 
-struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build)
+struct bsdf_probes bsdf_probes_make(const struct bsdf_build *build)
 {
 	const struct attribute_table *t = build->attributes;
-	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t, t ? (uint64_t)t->asked * t->triangle_count : 0};
-	if (p.points > p.count)
-		p.count = p.points < BSDF_PROBES_MAX ? (uint32_t)p.points : BSDF_PROBES_MAX;
+	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t,
+				t ? (uint64_t)t->probes_per_triangle * t->triangle_count : 0};
+	if (p.mesh_point_count > p.count)
+		p.count = p.mesh_point_count < BSDF_PROBES_MAX ? (uint32_t)p.mesh_point_count : BSDF_PROBES_MAX;
 	return p;
 }
 
 /* The point at equal distances from all three edges: its barycentric coordinates are proportional to the lengths of the
  * opposite edges. */
-static void put_middle(const struct attribute_table *t, struct texture_point *at)
+static void set_equidistant_point(const struct attribute_table *t, struct texture_point *point)
 {
 	vec3 side[3];
-	attribute_table_sides(t, at->prim, side);
-	double all = vec3_length(side[0]) + vec3_length(side[1]) + vec3_length(side[2]);
-	at->b1 = vec3_length(side[1]) / all;
-	at->b2 = vec3_length(side[2]) / all;
+	attribute_table_edges(t, point->prim, side);
+	double perimeter = vec3_length(side[0]) + vec3_length(side[1]) + vec3_length(side[2]);
+	point->b1 = vec3_length(side[1]) / perimeter;
+	point->b2 = vec3_length(side[2]) / perimeter;
 }
 
-struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
+struct bsdf_point bsdf_probe_point(const struct bsdf_probes *p, uint32_t i)
 {
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	uint32_t row = i / PROBE_SIDE % PROBE_SIDE, column = i % PROBE_SIDE;
-	struct bsdf_point at = {
-		.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE, .probe = true}, .w = &w};
-	if (p->points > 0) {
-		uint64_t point = p->points > p->count ? i * p->points / p->count : i % p->points;
-		unsigned which = (unsigned)(point % p->mesh->asked);
-		at.where.prim = (uint32_t)(point / p->mesh->asked);
-		at.where.b1 = which == 1;
-		at.where.b2 = which == 2;
-		if (which == ASKED_ATTRIBUTES)
-			put_middle(p->mesh, &at.where);
+	struct bsdf_point probe = {
+		.texture_point = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE, .is_probe = true},
+		.wavelengths = &w};
+	if (p->mesh_point_count > 0) {
+		uint64_t mesh_point =
+			p->mesh_point_count > p->count ? i * p->mesh_point_count / p->count : i % p->mesh_point_count;
+		unsigned corner = (unsigned)(mesh_point % p->mesh->probes_per_triangle);
+		probe.texture_point.prim = (uint32_t)(mesh_point / p->mesh->probes_per_triangle);
+		probe.texture_point.b1 = corner == 1;
+		probe.texture_point.b2 = corner == 2;
+		if (corner == TRIANGLE_PROBES_CORNERS)
+			set_equidistant_point(p->mesh, &probe.texture_point);
 	}
-	return at;
+	return probe;
 }
 
 struct bsdf_range bsdf_probe_range(const struct texture *t, const struct bsdf_build *build)
 {
-	const struct bsdf_probes probes = bsdf_probes_of(build);
-	struct bsdf_range r = {INFINITY, -INFINITY};
+	const struct bsdf_probes probes = bsdf_probes_make(build);
+	struct bsdf_range range = {INFINITY, -INFINITY};
 	uint32_t count = texture_is_constant(t) ? 1 : probes.count;
 	for (uint32_t i = 0; i < count; i++) {
-		const struct bsdf_point at = bsdf_probe(&probes, i);
-		double x = spectrum_mean(texture_eval(t, &at.where, at.w));
-		r.least = fmin(r.least, x);
-		r.most = fmax(r.most, x);
+		const struct bsdf_point probe = bsdf_probe_point(&probes, i);
+		double x = spectrum_mean(texture_eval(t, &probe.texture_point, probe.wavelengths));
+		range.min = fmin(range.min, x);
+		range.max = fmax(range.max, x);
 	}
-	return r;
+	return range;
 }

@@ -11,17 +11,17 @@ int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_nod
 
 /* Reads a reflectance into t and sets b's colour and texture flags. `fallback` is the value if the parameter is absent.
  * Returns 0 or a negative error code. */
-int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		 const struct bsdf_build *build, struct error *e);
+int bsdf_read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      const struct bsdf_build *build, struct error *e);
 
-/* Like bsdf_texture(), for a number from 0 to 1 (texture_build.number). */
-int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		const struct bsdf_build *build, struct error *e);
+/* Like bsdf_read_texture(), for a number from 0 to 1 (texture_build.number). */
+int bsdf_read_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		     const struct bsdf_build *build, struct error *e);
 
-/* Like bsdf_texture(), for a quantity that may exceed 1, such as an exponent or an absorption. number: it is no
+/* Like bsdf_read_texture(), for a quantity that may exceed 1, such as an exponent or an absorption. number: it is no
  * spectrum (texture_build.number). The caller checks its range. */
-int bsdf_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		  bool number, const struct bsdf_build *build, struct error *e);
+int bsdf_read_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		       bool number, const struct bsdf_build *build, struct error *e);
 
 /*
  * Points at which textures are evaluated to find their range: a grid over (u,v), combined with points of the mesh's
@@ -33,14 +33,14 @@ enum { BSDF_PROBES_MAX = 3 << 18 };
 struct bsdf_probes {
 	uint32_t count;
 	const struct attribute_table *mesh; /* NULL: no mesh */
-	uint64_t points;		    /* points of the mesh to be probed; 0: no texture depends on the mesh */
+	uint64_t mesh_point_count;	    /* points of the mesh to be probed; 0: no texture depends on the mesh */
 };
-struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
-struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
+struct bsdf_probes bsdf_probes_make(const struct bsdf_build *build);
+struct bsdf_point bsdf_probe_point(const struct bsdf_probes *p, uint32_t i);
 /* The smallest and the largest value of a texture at these points. A value is the mean over the lanes, which differ
  * only for colours that are not images. */
 struct bsdf_range {
-	double least, most;
+	double min, max;
 };
 struct bsdf_range bsdf_probe_range(const struct texture *t, const struct bsdf_build *build);
 
@@ -53,10 +53,10 @@ bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 
 /* Makes b a BSDF with specular lobes only, with the operations `ops`; b's data must begin with the data that these
  * expect. */
-void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
+void bsdf_make_specular(struct bsdf *b, const struct bsdf_ops *ops);
 
 /* Records that b has a part with a colour of this kind. */
-void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
+void bsdf_add_color_kind(struct bsdf *b, enum color_kind shape);
 
 /* Mitsuba 0.6 can be told to keep reflectances that add up to more than 1. Returns -ERANGE if `sum`, their sum, exceeds
  * 1 and the node requests that, otherwise 0. For BSDFs without this parameter it has no effect (scene.c). */

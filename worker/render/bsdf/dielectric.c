@@ -8,28 +8,29 @@
 
 /* Returns f |wi.z| of one lobe, given the Fresnel terms f at its angle. eta: index beyond over index on wo's side.
  * *chance is 0 if there is no such lobe. */
-static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
-		     const struct fresnel *f, vec3 *wi, double *chance)
+static spectrum eval_lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
+			  const struct fresnel *f, vec3 *wi, double *chance)
 {
 	*chance = 0;
 	if (mode & BSDF_REFLECT) {
-		if (!(fabs(wo.z) >= DBL_MIN && f->reflected > 0)) /* 1 / wo.z must be finite */
-			return spectrum_of(0);
+		if (!(fabs(wo.z) >= DBL_MIN && f->reflectance > 0)) /* 1 / wo.z must be finite */
+			return spectrum_constant(0);
 		*wi = (vec3){-wo.x, -wo.y, wo.z};
 		*chance = fresnel_chance(f, true);
-		return spectrum_scale(f->reflected, texture_eval(&g->reflectance, &p->where, p->w));
+		return spectrum_scale(f->reflectance, texture_eval(&g->reflectance, &p->texture_point, p->wavelengths));
 	}
-	if (!(f->cos_t >= DBL_MIN && f->transmitted > 0))
-		return spectrum_of(0);
+	if (!(f->cos_t >= DBL_MIN && f->transmittance > 0))
+		return spectrum_constant(0);
 	double scale = p->transport == TRANSPORT_RADIANCE ? 1 / (eta * eta) : 1;
 	*wi = (vec3){-wo.x / eta, -wo.y / eta, -copysign(f->cos_t, wo.z)};
 	*chance = fresnel_chance(f, false);
-	return spectrum_scale(f->transmitted * scale, texture_eval(&g->transmittance, &p->where, p->w));
+	return spectrum_scale(f->transmittance * scale,
+			      texture_eval(&g->transmittance, &p->texture_point, p->wavelengths));
 }
 
 static double eta_beyond(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
-	double eta = bsdf_eta(b, p->w);
+	double eta = bsdf_eta(b, p->wavelengths);
 	return wo.z > 0 ? eta : 1 / eta;
 }
 
@@ -38,7 +39,7 @@ static spectrum dielectric_eval_delta(const struct bsdf *b, const struct bsdf_po
 {
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
-	return lobe(b->data, p, wo, mode, eta, &f, wi, chance);
+	return eval_lobe(b->data, p, wo, mode, eta, &f, wi, chance);
 }
 
 static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -49,7 +50,7 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 	bool reflect = u[2] < fresnel_chance(&f, true);
 	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA,
 				    .eta = reflect ? 1 : eta};
-	spectrum weight = lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);
+	spectrum weight = eval_lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);
 	if (!(out->pdf > 0))
 		return false;
 	out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
@@ -62,7 +63,7 @@ static int dielectric_create(struct bsdf *b, const struct scene_node *n, const s
 	struct glass *g = b->data;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA;
 	b->has_delta = true;
-	b->alpha = 0;
+	b->min_alpha = 0;
 	return glass_read(g, b, n, build, e);
 }
 
@@ -70,8 +71,8 @@ const struct bsdf_ops bsdf_ops_dielectric = {
 	.decl = PLUGIN(BSDF, "dielectric", GLASS_PARAMS, MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct glass),
 	.create = dielectric_create,
-	.eval = bsdf_no_eval,
-	.pdf_solid = bsdf_no_pdf,
+	.eval = bsdf_eval_zero,
+	.pdf_solid = bsdf_pdf_zero,
 	.eval_delta = dielectric_eval_delta,
 	.sample = dielectric_sample,
 };

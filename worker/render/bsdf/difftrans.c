@@ -12,8 +12,8 @@ static spectrum difftrans_eval(const struct bsdf *b, const struct bsdf_point *p,
 {
 	const struct difftrans *d = b->data;
 	if (!(wo.z * wi.z < 0))
-		return spectrum_of(0);
-	return spectrum_scale(1 / WARP_PI, texture_eval(&d->transmittance, &p->where, p->w));
+		return spectrum_constant(0);
+	return spectrum_scale(1 / WARP_PI, texture_eval(&d->transmittance, &p->texture_point, p->wavelengths));
 }
 
 static double difftrans_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -34,12 +34,12 @@ static bool difftrans_sample(const struct bsdf *b, const struct bsdf_point *p, v
 static int difftrans_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct difftrans *d = b->data;
-	int code = bsdf_texture(b, &d->transmittance, n, "transmittance", 0.5, build, e);
-	b->black = !code && texture_max(&d->transmittance) == 0;
+	int code = bsdf_read_texture(b, &d->transmittance, n, "transmittance", 0.5, build, e);
+	b->is_black = !code && texture_max(&d->transmittance) == 0;
 	b->modes = BSDF_TRANSMIT;
 	b->has_smooth = true;
-	b->two_sided = true;
-	b->alpha_mean = 1;
+	b->is_two_sided = true;
+	b->mean_alpha = 1;
 	return code;
 }
 

@@ -7,8 +7,8 @@
 static spectrum diffuse_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	if (!(wo.z > 0 && wi.z > 0))
-		return spectrum_of(0);
-	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, &p->where, p->w));
+		return spectrum_constant(0);
+	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, &p->texture_point, p->wavelengths));
 }
 
 double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -28,9 +28,9 @@ static int diffuse_create(struct bsdf *b, const struct scene_node *n, const stru
 	struct texture *t = b->data;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha_mean = 1;
-	int code = bsdf_texture(b, t, n, "reflectance", 0.5, build, e);
-	b->black = !code && texture_max(t) == 0;
+	b->mean_alpha = 1;
+	int code = bsdf_read_texture(b, t, n, "reflectance", 0.5, build, e);
+	b->is_black = !code && texture_max(t) == 0;
 	return code;
 }
 
@@ -44,15 +44,15 @@ const struct bsdf_ops bsdf_ops_diffuse = {
 	.sample = diffuse_sample,
 };
 
-void bsdf_default(struct bsdf *b)
+void bsdf_make_default(struct bsdf *b)
 {
-	static struct texture half = {.color = {.shape = COLOR_SHAPE_CONSTANT, .scale = 0.5}};
+	static struct texture half = {.color = {.kind = COLOR_KIND_CONSTANT, .scale = 0.5}};
 	*b = (struct bsdf){.ops = &bsdf_ops_diffuse,
 			   .modes = BSDF_REFLECT,
 			   .has_smooth = true,
-			   .alpha = INFINITY,
-			   .alpha_mean = 1,
+			   .min_alpha = INFINITY,
+			   .mean_alpha = 1,
 			   .eta = 1,
-			   .shape = COLOR_SHAPE_CONSTANT,
+			   .color_kind = COLOR_KIND_CONSTANT,
 			   .data = &half};
 }

@@ -5,7 +5,7 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-void bsdf_default(struct bsdf *b); /* diffuse with a reflectance of 0.5 */
+void bsdf_make_default(struct bsdf *b); /* diffuse with a reflectance of 0.5 */
 
 /* Cosine-weighted density (per solid angle) and sampling, for other BSDFs that are nearly diffuse; f comes from
  * b->ops->eval. */

@@ -10,7 +10,7 @@
 
 /* The reflected and the transmitted share of light; both keep their precision where they are small. */
 struct fresnel {
-	double reflected, transmitted;
+	double reflectance, transmittance;
 	double cos_t; /* cosine of the refracted ray, 0 at total reflection */
 };
 
@@ -38,17 +38,17 @@ static inline struct fresnel fresnel_dielectric(double c, double eta)
 
 /* Returns the probability of following the reflection or the transmission at a smooth boundary. Water reflects two
  * per cent of the light of a lamp, but the mirrored lamp is much brighter than anything below the surface.
- * Reflection is therefore followed with a probability of at least FRESNEL_LEAST; but at most with FRESNEL_TIMES its
- * share of light, since a boundary between nearly equal indices would waste samples. Transmitted paths become rarer
- * by at most a tenth. */
-#define FRESNEL_LEAST 0.1
-#define FRESNEL_TIMES 8
+ * Reflection is therefore followed with a probability of at least FRESNEL_REFLECT_CHANCE_MIN; but at most with
+ * FRESNEL_REFLECT_BOOST_MAX its share of light, since a boundary between nearly equal indices would waste samples.
+ * Transmitted paths become rarer by at most a tenth. */
+#define FRESNEL_REFLECT_CHANCE_MIN 0.1
+#define FRESNEL_REFLECT_BOOST_MAX 8
 static inline double fresnel_chance(const struct fresnel *f, bool reflect)
 {
-	double often = fmin(FRESNEL_LEAST, FRESNEL_TIMES * f->reflected);
-	if (!(f->transmitted > 0) || !(f->reflected < often))
-		return reflect ? f->reflected : f->transmitted;
-	return reflect ? often : 1 - often;
+	double reflect_chance = fmin(FRESNEL_REFLECT_CHANCE_MIN, FRESNEL_REFLECT_BOOST_MAX * f->reflectance);
+	if (!(f->transmittance > 0) || !(f->reflectance < reflect_chance))
+		return reflect ? f->reflectance : f->transmittance;
+	return reflect ? reflect_chance : 1 - reflect_chance;
 }
 
 /* Returns the reflectance of a conductor with the index eta - i k, relative to the index here. eta = 0, k = 1 is a

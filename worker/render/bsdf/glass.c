@@ -17,19 +17,19 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 		code = ior_read_law(n, IOR_EXT, &g->side[IOR_EXT], e);
 	if (code)
 		return code;
-	if (node_bool(n, "dispersion", false) && !ior_has_coefficients(n) && !g->side[IOR_INT].terms &&
-	    !g->side[IOR_EXT].terms) {
-		char known[128];
+	if (node_bool(n, "dispersion", false) && !ior_has_coefficients(n) && !g->side[IOR_INT].term_count &&
+	    !g->side[IOR_EXT].term_count) {
+		char names[128];
 		return node_error(
 			n, e, EINVAL,
 			"dispersion: a number does not depend on the wavelength; name one of %s or give coefficients",
-			ior_dispersive_names(known, sizeof known));
+			ior_dispersive_names(names, sizeof names));
 	}
 	b->ior = g->side;
-	b->eta = ior_eta(b->ior, IOR_NM);
-	b->dispersive = varies_with_wavelength(b->ior, b->eta);
-	if (b->dispersive)
-		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
+	b->eta = ior_eta(b->ior, IOR_REFERENCE_NM);
+	b->is_dispersive = varies_with_wavelength(b->ior, b->eta);
+	if (b->is_dispersive)
+		bsdf_add_color_kind(b, COLOR_KIND_OTHER);
 	return 0;
 }
 
@@ -38,10 +38,10 @@ int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, cons
 {
 	int code = read_index(g, b, n, e);
 	if (!code)
-		code = bsdf_texture(b, &g->reflectance, n, "specular_reflectance", 1, build, e);
+		code = bsdf_read_texture(b, &g->reflectance, n, "specular_reflectance", 1, build, e);
 	if (!code)
-		code = bsdf_texture(b, &g->transmittance, n, "specular_transmittance", 1, build, e);
-	b->two_sided = true;
-	b->black = !code && texture_max(&g->reflectance) == 0 && texture_max(&g->transmittance) == 0;
+		code = bsdf_read_texture(b, &g->transmittance, n, "specular_transmittance", 1, build, e);
+	b->is_two_sided = true;
+	b->is_black = !code && texture_max(&g->reflectance) == 0 && texture_max(&g->transmittance) == 0;
 	return code;
 }

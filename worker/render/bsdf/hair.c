@@ -38,45 +38,48 @@
 
 #include <float.h>
 
-#define DEGREE (WARP_PI / 180)
+#define RADIANS_PER_DEGREE (WARP_PI / 180)
 #define IOR_AMBER 1.55
 
 /* The smallest cosine: its inverse times the density of the narrowest lobe is finite. */
-#define LEAST_COSINE 0x1p-900
+#define COSINE_MIN 0x1p-900
 
 /* Weight of the shares without absorption in the choice of a lobe. */
-#define WHITE 0x1p-6
+#define UNABSORBED_WEIGHT 0x1p-6
 
 /* For importance that arrives from outside: the probability of passing straight through, and those of choosing each
  * lobe. */
-#define PASSING 0.5
+#define STRAIGHT_CHANCE 0.5
 static const double adjoint_chance[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
 
 struct hair {
 	struct hair_fibre fibre;
-	bool pigments;			     /* absorption is given by the two pigments, not by sigma_a */
+	bool uses_pigments;		     /* absorption is given by the two pigments, not by sigma_a */
 	struct color eumelanin, pheomelanin; /* coefficients times concentrations */
 	struct texture sigma_a;
-	double scale;	 /* factor of sigma_a */
-	spectrum probes; /* absorption at the wavelengths `probed`; unused if sigma_a is textured */
+	double scale; /* factor of sigma_a */
+	spectrum
+		probe_absorption; /* absorption at the wavelengths `probe_wavelengths`; unused if sigma_a is textured */
 };
 
 /* The wavelengths at which lobes are weighted. They are fixed: a density that depended on the wavelengths of the path
  * would couple them. */
-static const struct wavelengths probed = {.nm = {450, 520, 580, 640}};
+static const struct wavelengths probe_wavelengths = {.nm = {450, 520, 580, 640}};
 
-static spectrum absorption(const struct hair *h, const struct texture_point *where, const struct wavelengths *w)
+static spectrum eval_absorption(const struct hair *h, const struct texture_point *point, const struct wavelengths *w)
 {
-	if (h->pigments)
+	if (h->uses_pigments)
 		return spectrum_add(color_eval(&h->eumelanin, w), color_eval(&h->pheomelanin, w));
-	return spectrum_scale(h->scale, texture_eval(&h->sigma_a, where, w));
+	return spectrum_scale(h->scale, texture_eval(&h->sigma_a, point, w));
 }
 
-static spectrum absorption_for_choice(const struct hair *h, const struct bsdf_point *p)
+static spectrum absorption_for_sampling(const struct hair *h, const struct bsdf_point *p)
 {
-	if (WAVELENGTHS_GREY(p->w) || p->w->rgb)
-		return absorption(h, &p->where, p->w);
-	return h->pigments || texture_is_constant(&h->sigma_a) ? h->probes : absorption(h, &p->where, &probed);
+	if (WAVELENGTHS_GREY(p->wavelengths) || p->wavelengths->is_rgb)
+		return eval_absorption(h, &p->texture_point, p->wavelengths);
+	return h->uses_pigments || texture_is_constant(&h->sigma_a)
+		       ? h->probe_absorption
+		       : eval_absorption(h, &p->texture_point, &probe_wavelengths);
 }
 
 /* The spherical coordinates of a direction. */
@@ -85,50 +88,52 @@ struct angles {
 	double phi;
 };
 
-static struct angles angles_of(vec3 w)
+static struct angles angles_from_direction(vec3 w)
 {
 	return (struct angles){{w.y, hypot(w.x, w.z)}, atan2(w.z, w.x)};
 }
 
-static vec3 direction_of(struct hair_angle theta, double cos_phi, double sin_phi)
+static vec3 direction_from_angles(struct hair_angle theta, double cos_phi, double sin_phi)
 {
 	return vec3_normalize((vec3){theta.cos * cos_phi, theta.sin, theta.cos * sin_phi});
 }
 
 /* The direction to the camera, and how its ray enters the fibre. */
-struct seen {
-	struct angles from;
+struct view {
+	struct angles angles;
 	double gamma;
 	struct hair_entry entry;
 };
 
-static struct seen seen_from(const struct hair *h, vec3 camera)
+static struct view view_from(const struct hair *h, vec3 camera)
 {
-	struct seen s = {.gamma = -atan2(camera.x, camera.z), .entry = hair_enter(&h->fibre, camera.x, camera.z)};
-	s.from = (struct angles){{camera.y, hypot(camera.x, camera.z)}, s.gamma + WARP_PI / 2};
+	struct view s = {.gamma = -atan2(camera.x, camera.z), .entry = hair_enter(&h->fibre, camera.x, camera.z)};
+	s.angles = (struct angles){{camera.y, hypot(camera.x, camera.z)}, s.gamma + WARP_PI / 2};
 	return s;
 }
 
 /* Computes M_p N_p of each lobe. */
-static void find_lobes(const struct hair *h, const struct seen *s, vec3 light, double lobe[HAIR_LOBES])
+static void eval_lobes(const struct hair *h, const struct view *s, vec3 light, double lobe[HAIR_LOBES])
 {
-	struct angles to = angles_of(light);
+	struct angles light_angles = angles_from_direction(light);
 	for (int p = 0; p < HAIR_LOBES; p++) {
-		double turn = to.phi - s->from.phi - hair_turn(p, s->gamma, s->entry.gamma_t);
-		double around = p < HAIR_LOBES - 1 ? hair_around(&h->fibre, turn) : 1 / (2 * WARP_PI);
-		lobe[p] = hair_along(&h->fibre, p, s->from.theta, to.theta) * around;
+		double azimuth_offset =
+			light_angles.phi - s->angles.phi - hair_azimuth_change(p, s->gamma, s->entry.gamma_t);
+		double azimuthal =
+			p < HAIR_LOBES - 1 ? hair_azimuthal_pdf(&h->fibre, azimuth_offset) : 1 / (2 * WARP_PI);
+		lobe[p] = hair_longitudinal_pdf(&h->fibre, p, s->angles.theta, light_angles.theta) * azimuthal;
 	}
 }
 
 /* Returns f |light.z| for a camera outside the fibre. */
-static spectrum scattered(const struct hair *h, const struct bsdf_point *p, vec3 camera, vec3 light)
+static spectrum eval_scattering(const struct hair *h, const struct bsdf_point *p, vec3 camera, vec3 light)
 {
-	struct seen s = seen_from(h, camera);
-	spectrum sigma = absorption(h, &p->where, p->w), sum = spectrum_of(0);
+	struct view s = view_from(h, camera);
+	spectrum sigma = eval_absorption(h, &p->texture_point, p->wavelengths), sum = spectrum_constant(0);
 	double lobe[HAIR_LOBES], share[HAIR_LOBES];
-	find_lobes(h, &s, light, lobe);
+	eval_lobes(h, &s, light, lobe);
 	for (int l = 0; l < SPECTRUM_LANES; l++) {
-		hair_shares(&s.entry, exp(-sigma.v[l] * s.entry.length), share);
+		hair_lobe_shares(&s.entry, exp(-sigma.v[l] * s.entry.passage_length), share);
 		for (int k = 0; k < HAIR_LOBES; k++)
 			sum.v[l] += share[k] * lobe[k];
 	}
@@ -137,23 +142,23 @@ static spectrum scattered(const struct hair *h, const struct bsdf_point *p, vec3
 
 static spectrum hair_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	bool radiance = p->transport == TRANSPORT_RADIANCE;
-	vec3 camera = radiance ? wo : wi, light = radiance ? wi : wo;
-	if (!(camera.z > 0 && fabs(light.z) >= LEAST_COSINE))
-		return spectrum_of(0);
-	return spectrum_scale(1 / fabs(light.z), scattered(b->data, p, camera, light));
+	bool is_radiance = p->transport == TRANSPORT_RADIANCE;
+	vec3 camera = is_radiance ? wo : wi, light = is_radiance ? wi : wo;
+	if (!(camera.z > 0 && fabs(light.z) >= COSINE_MIN))
+		return spectrum_constant(0);
+	return spectrum_scale(1 / fabs(light.z), eval_scattering(b->data, p, camera, light));
 }
 
-static void find_chances(const struct hair *h, const struct bsdf_point *p, const struct seen *s,
-			 double chance[HAIR_LOBES])
+static void compute_lobe_chances(const struct hair *h, const struct bsdf_point *p, const struct view *s,
+				 double chance[HAIR_LOBES])
 {
-	spectrum sigma = absorption_for_choice(h, p);
+	spectrum sigma = absorption_for_sampling(h, p);
 	double share[HAIR_LOBES], sum = 0;
-	hair_shares(&s->entry, 1, chance);
+	hair_lobe_shares(&s->entry, 1, chance);
 	for (int k = 0; k < HAIR_LOBES; k++)
-		chance[k] *= WHITE;
+		chance[k] *= UNABSORBED_WEIGHT;
 	for (int l = 0; l < SPECTRUM_LANES; l++) {
-		hair_shares(&s->entry, exp(-sigma.v[l] * s->entry.length), share);
+		hair_lobe_shares(&s->entry, exp(-sigma.v[l] * s->entry.passage_length), share);
 		for (int k = 0; k < HAIR_LOBES; k++)
 			chance[k] += share[k];
 	}
@@ -164,17 +169,19 @@ static void find_chances(const struct hair *h, const struct bsdf_point *p, const
 }
 
 /* Returns the density (solid angle) with which a path from a light continues towards a camera. */
-static double adjoint_pdf(const struct hair *h, bool culled, vec3 light, vec3 camera)
+static double adjoint_pdf(const struct hair *h, bool culls_backfaces, vec3 light, vec3 camera)
 {
-	struct angles from = angles_of(light), to = angles_of(camera);
-	double sum = 0, cosine = 0.5 * camera.z / to.theta.cos;
+	struct angles light_angles = angles_from_direction(light), camera_angles = angles_from_direction(camera);
+	double sum = 0, cosine = 0.5 * camera.z / camera_angles.theta.cos;
 	for (int p = 0; p < HAIR_LOBES; p++) {
-		double around = cosine;
+		double azimuthal = cosine;
 		if (p == 0 && light.z > 0)
-			around = 0.5 * (cosine + hair_around(&h->fibre, to.phi + from.phi - WARP_PI));
-		sum += adjoint_chance[p] * hair_along(&h->fibre, p, from.theta, to.theta) * around;
+			azimuthal = 0.5 * (cosine + hair_azimuthal_pdf(&h->fibre,
+								       camera_angles.phi + light_angles.phi - WARP_PI));
+		sum += adjoint_chance[p] *
+		       hair_longitudinal_pdf(&h->fibre, p, light_angles.theta, camera_angles.theta) * azimuthal;
 	}
-	return light.z > 0 && !culled ? (1 - PASSING) * sum : sum;
+	return light.z > 0 && !culls_backfaces ? (1 - STRAIGHT_CHANCE) * sum : sum;
 }
 
 static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -182,12 +189,12 @@ static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	const struct hair *h = b->data;
 	double chance[HAIR_LOBES], lobe[HAIR_LOBES], sum = 0;
 	if (p->transport == TRANSPORT_IMPORTANCE)
-		return wi.z > 0 && fabs(wo.z) >= LEAST_COSINE ? adjoint_pdf(h, p->culled, wo, wi) : 0;
-	if (!(wo.z > 0 && fabs(wi.z) >= LEAST_COSINE))
+		return wi.z > 0 && fabs(wo.z) >= COSINE_MIN ? adjoint_pdf(h, p->culls_backfaces, wo, wi) : 0;
+	if (!(wo.z > 0 && fabs(wi.z) >= COSINE_MIN))
 		return 0;
-	struct seen s = seen_from(h, wo);
-	find_chances(h, p, &s, chance);
-	find_lobes(h, &s, wi, lobe);
+	struct view s = view_from(h, wo);
+	compute_lobe_chances(h, p, &s, chance);
+	eval_lobes(h, &s, wi, lobe);
 	for (int k = 0; k < HAIR_LOBES; k++)
 		sum += chance[k] * lobe[k];
 	return sum;
@@ -205,60 +212,62 @@ static int pick_index(const double *chance, int count, double *u)
 
 static vec3 sample_radiance(const struct hair *h, const struct bsdf_point *p, vec3 wo, const double u[3])
 {
-	struct seen s = seen_from(h, wo);
+	struct view s = view_from(h, wo);
 	double chance[HAIR_LOBES], rest = u[2];
-	find_chances(h, p, &s, chance);
+	compute_lobe_chances(h, p, &s, chance);
 	int k = pick_index(chance, HAIR_LOBES, &rest);
-	double turn = k < HAIR_LOBES - 1 ? hair_turn(k, s.gamma, s.entry.gamma_t) + hair_around_sample(&h->fibre, rest)
-					 : 2 * WARP_PI * rest;
-	double phi = s.from.phi + turn;
-	return direction_of(hair_along_sample(&h->fibre, k, s.from.theta, u[0], u[1]), cos(phi), sin(phi));
+	double azimuth_change = k < HAIR_LOBES - 1 ? hair_azimuth_change(k, s.gamma, s.entry.gamma_t) +
+							     hair_sample_azimuthal(&h->fibre, rest)
+						   : 2 * WARP_PI * rest;
+	double phi = s.angles.phi + azimuth_change;
+	return direction_from_angles(hair_sample_longitudinal(&h->fibre, k, s.angles.theta, u[0], u[1]), cos(phi),
+				     sin(phi));
 }
 
 static vec3 sample_importance(const struct hair *h, vec3 wo, const double u[2], double rest)
 {
 	static const double halves[2] = {0.5, 0.5};
-	struct angles from = angles_of(wo);
+	struct angles light_angles = angles_from_direction(wo);
 	int k = pick_index(adjoint_chance, HAIR_LOBES, &rest);
-	struct hair_angle theta = hair_along_sample(&h->fibre, k, from.theta, u[0], u[1]);
+	struct hair_angle theta = hair_sample_longitudinal(&h->fibre, k, light_angles.theta, u[0], u[1]);
 	if (k == 0 && wo.z > 0 && pick_index(halves, 2, &rest) == 0) {
-		double phi = WARP_PI - from.phi + hair_around_sample(&h->fibre, rest);
-		return direction_of(theta, cos(phi), sin(phi));
+		double phi = WARP_PI - light_angles.phi + hair_sample_azimuthal(&h->fibre, rest);
+		return direction_from_angles(theta, cos(phi), sin(phi));
 	}
-	return direction_of(theta, 1 - 2 * rest, 2 * sqrt(rest * (1 - rest)));
+	return direction_from_angles(theta, 1 - 2 * rest, 2 * sqrt(rest * (1 - rest)));
 }
 
-static bool is_on_side(const struct bsdf_point *p, vec3 wo)
+static bool can_pass_straight(const struct bsdf_point *p, vec3 wo)
 {
-	return !p->culled && (p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN);
+	return !p->culls_backfaces && (p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN);
 }
 
 static spectrum hair_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				double *chance)
 {
 	(void)b;
-	if (!(mode & BSDF_STRAIGHT) || !is_on_side(p, wo))
-		return spectrum_of(0);
+	if (!(mode & BSDF_STRAIGHT) || !can_pass_straight(p, wo))
+		return spectrum_constant(0);
 	*wi = vec3_neg(wo);
-	*chance = p->transport == TRANSPORT_RADIANCE ? 1 : PASSING;
-	return spectrum_of(1);
+	*chance = p->transport == TRANSPORT_RADIANCE ? 1 : STRAIGHT_CHANCE;
+	return spectrum_constant(1);
 }
 
 static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
 	const struct hair *h = b->data;
-	bool radiance = p->transport == TRANSPORT_RADIANCE;
+	bool is_radiance = p->transport == TRANSPORT_RADIANCE;
 	double rest = u[2];
-	if (is_on_side(p, wo)) {
-		static const double ways[2] = {PASSING, 1 - PASSING};
-		if (radiance || pick_index(ways, 2, &rest) == 0)
+	if (can_pass_straight(p, wo)) {
+		static const double branch_chance[2] = {STRAIGHT_CHANCE, 1 - STRAIGHT_CHANCE};
+		if (is_radiance || pick_index(branch_chance, 2, &rest) == 0)
 			return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
-	} else if (!(radiance || p->culled ? wo.z >= LEAST_COSINE : wo.z < 0)) {
+	} else if (!(is_radiance || p->culls_backfaces ? wo.z >= COSINE_MIN : wo.z < 0)) {
 		return false;
 	}
-	return bsdf_sample_smooth(b, p, wo, radiance ? sample_radiance(h, p, wo, u) : sample_importance(h, wo, u, rest),
-				  out);
+	return bsdf_sample_smooth(b, p, wo,
+				  is_radiance ? sample_radiance(h, p, wo, u) : sample_importance(h, wo, u, rest), out);
 }
 
 /* Sets a pigment's coefficients, given per unit of concentration (d'Eon 2011, sec. 6.1). */
@@ -273,30 +282,30 @@ static int read_absorption(struct hair *h, struct bsdf *b, const struct scene_no
 			   struct error *e)
 {
 	static const double eumelanin[3] = {0.419, 0.697, 1.37}, pheomelanin[3] = {0.187, 0.4, 1.05};
-	h->pigments = !node_find(n, "sigma_a");
+	h->uses_pigments = !node_find_property(n, "sigma_a");
 	h->scale = node_float(n, "scale", 1);
-	if (!h->pigments) {
-		const struct texture_build inner = bsdf_texture_build(build);
-		if (node_find(n, "eumelanin") || node_find(n, "pheomelanin"))
+	if (!h->uses_pigments) {
+		const struct texture_build texture_build = bsdf_texture_build(build);
+		if (node_find_property(n, "eumelanin") || node_find_property(n, "pheomelanin"))
 			return node_error(
 				n, e, EINVAL,
 				"sigma_a and the pigments eumelanin and pheomelanin exclude each other; give one or the other");
-		int code = texture_from_node(&h->sigma_a, n, "sigma_a", 0, COLOR_UNBOUNDED, &inner, e);
+		int code = texture_from_node(&h->sigma_a, n, "sigma_a", 0, COLOR_UNBOUNDED, &texture_build, e);
 		if (code)
 			return code;
-		b->textured = !texture_is_constant(&h->sigma_a);
-		bsdf_add_shape(b, texture_shape(&h->sigma_a));
+		b->is_textured = !texture_is_constant(&h->sigma_a);
+		bsdf_add_color_kind(b, texture_color_kind(&h->sigma_a));
 	} else {
 		int code = set_pigment(&h->eumelanin, eumelanin, node_float(n, "eumelanin", 1.3));
 		if (!code)
 			code = set_pigment(&h->pheomelanin, pheomelanin, node_float(n, "pheomelanin", 0.2));
 		if (code)
 			return node_error(n, e, -code, "pigments");
-		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
+		bsdf_add_color_kind(b, COLOR_KIND_OTHER);
 	}
-	const struct texture_point nowhere = {.probe = true};
-	if (h->pigments || texture_is_constant(&h->sigma_a))
-		h->probes = absorption(h, &nowhere, &probed);
+	const struct texture_point probe_point = {.is_probe = true};
+	if (h->uses_pigments || texture_is_constant(&h->sigma_a))
+		h->probe_absorption = eval_absorption(h, &probe_point, &probe_wavelengths);
 	return 0;
 }
 
@@ -311,15 +320,15 @@ static int hair_create(struct bsdf *b, const struct scene_node *n, const struct 
 		return code;
 	if (inside == outside)
 		return node_error(n, e, EINVAL, "int_ior and ext_ior must differ");
-	hair_fibre_set(&h->fibre, inside / outside, node_float(n, "longitudinal_roughness", 0.3),
-		       node_float(n, "azimuthal_roughness", 0.3), DEGREE * node_float(n, "scale_tilt", 2));
+	hair_fibre_init(&h->fibre, inside / outside, node_float(n, "longitudinal_roughness", 0.3),
+			node_float(n, "azimuthal_roughness", 0.3), RADIANS_PER_DEGREE * node_float(n, "scale_tilt", 2));
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
 	b->has_smooth = b->has_delta = true;
-	b->two_sided = true;
-	b->directed = true;
-	b->culls = true;
+	b->is_two_sided = true;
+	b->is_nonreciprocal = true;
+	b->culls_backfaces = true;
 	b->uses_tangents = true;
-	b->alpha_mean = 1;
+	b->mean_alpha = 1;
 	return read_absorption(h, b, n, build, e);
 }
 

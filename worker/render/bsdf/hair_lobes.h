@@ -21,25 +21,25 @@ struct hair_angle {
 struct hair_fibre {
 	double eta; /* index inside over the one outside */
 	struct hair_lobe_width {
-		double v;     /* variance along the fibre */
-		double scale; /* 1 / (1 - exp(-2 / v)), over v */
-		double from;  /* exp(-2 / v) */
-	} along[HAIR_LOBES];
+		double variance;		  /* variance along the fibre */
+		double normalization;		  /* 1 / (1 - exp(-2 / v)), over v */
+		double exp_minus_2_over_variance; /* exp(-2 / v) */
+	} longitudinal[HAIR_LOBES];
 	struct hair_angle tilt[HAIR_LOBES]; /* angle by which the scales turn theta for lobe p */
-	double s;			    /* width of the logistic distribution around the fibre */
-	double end;			    /* exp(-pi / s) */
+	double azimuthal_width;		    /* width of the logistic distribution around the fibre */
+	double logistic_tail;		    /* exp(-pi / s) */
 };
 
 /* Sets f. along, around: roughness along and around the fibre, in [0,1]; values below HAIR_ROUGHNESS_MIN count as
  * HAIR_ROUGHNESS_MIN. tilt: angle of the scales, in radians. */
 #define HAIR_ROUGHNESS_MIN 1e-3
-void hair_fibre_set(struct hair_fibre *f, double eta, double along, double around, double tilt);
+void hair_fibre_init(struct hair_fibre *f, double eta, double along, double around, double tilt);
 
 /* How a ray enters the fibre, from the camera's side. */
 struct hair_entry {
-	double reflected, transmitted; /* Fresnel reflectance and transmittance */
-	double gamma_t;		       /* gamma inside the fibre; meaningless if nothing is transmitted */
-	double length;		       /* length of one passage through the fibre */
+	double reflectance, transmittance; /* Fresnel reflectance and transmittance */
+	double gamma_t;			   /* gamma inside the fibre; meaningless if nothing is transmitted */
+	double passage_length;		   /* length of one passage through the fibre */
 };
 
 /* x, z: components of a unit direction in the frame whose y axis runs along the fibre and whose z axis is the normal; z
@@ -47,20 +47,22 @@ struct hair_entry {
 struct hair_entry hair_enter(const struct hair_fibre *f, double x, double z);
 
 /* Computes A_p, the share of light in each lobe, where t in [0,1] is the transmittance of one passage. */
-void hair_shares(const struct hair_entry *e, double t, double share[HAIR_LOBES]);
+void hair_lobe_shares(const struct hair_entry *e, double t, double share[HAIR_LOBES]);
 
-/* M_p: returns the density of sin theta_o for light from theta_i; hair_along_sample draws theta_o with that density. */
-double hair_along(const struct hair_fibre *f, int p, struct hair_angle from, struct hair_angle to);
-struct hair_angle hair_along_sample(const struct hair_fibre *f, int p, struct hair_angle from, double u0, double u1);
+/* M_p: returns the density of sin theta_o for light from theta_i; hair_sample_longitudinal draws theta_o with that
+ * density. */
+double hair_longitudinal_pdf(const struct hair_fibre *f, int p, struct hair_angle from, struct hair_angle to);
+struct hair_angle hair_sample_longitudinal(const struct hair_fibre *f, int p, struct hair_angle from, double u0,
+					   double u1);
 
-/* N_p: returns the density of phi_o. turn: phi_o minus that of the ideal ray, hair_turn(). For p < HAIR_LOBES - 1; the
- * last lobe is uniform in phi_o. */
-double hair_around(const struct hair_fibre *f, double turn);
-double hair_around_sample(const struct hair_fibre *f, double u); /* within [-pi, pi] */
+/* N_p: returns the density of phi_o. turn: phi_o minus that of the ideal ray, hair_azimuth_change(). For p < HAIR_LOBES
+ * - 1; the last lobe is uniform in phi_o. */
+double hair_azimuthal_pdf(const struct hair_fibre *f, double turn);
+double hair_sample_azimuthal(const struct hair_fibre *f, double u); /* within [-pi, pi] */
 /* Returns phi_o - phi_i of lobe p in a smooth fibre. */
-double hair_turn(int p, double gamma_i, double gamma_t);
+double hair_azimuth_change(int p, double gamma_i, double gamma_t);
 
 /* Returns exp(-x) I0(x), with I0 the modified Bessel function and x >= 0; relative error below 1e-12. */
-double hair_bessel(double x);
+double hair_scaled_bessel_i0(double x);
 
 #endif

@@ -28,20 +28,21 @@
 
 struct layer {
 	struct texture first, second; /* sigma_a and sigma_s, or sigma_t and albedo */
-	bool by_albedo;
+	bool uses_albedo;
 	double thickness;
 	struct phase phase;
 };
 
 /* Returns the optical thickness at a point. *scattered: the share of the extinction that is scattered, not absorbed. */
-static spectrum depth_at(const struct layer *l, const struct bsdf_point *p, spectrum *scattered)
+static spectrum eval_optical_depth(const struct layer *l, const struct bsdf_point *p, spectrum *scattered)
 {
-	spectrum first = texture_eval(&l->first, &p->where, p->w), second = texture_eval(&l->second, &p->where, p->w);
+	spectrum first = texture_eval(&l->first, &p->texture_point, p->wavelengths),
+		 second = texture_eval(&l->second, &p->texture_point, p->wavelengths);
 	spectrum depth;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double s = second.v[i], t = l->by_albedo ? first.v[i] : first.v[i] + s;
+		double s = second.v[i], t = l->uses_albedo ? first.v[i] : first.v[i] + s;
 		depth.v[i] = t * l->thickness;
-		scattered->v[i] = (1 - l->phase.absorbed) * (l->by_albedo ? s : t > 0 ? s / t : 0);
+		scattered->v[i] = (1 - l->phase.absorbed_share) * (l->uses_albedo ? s : t > 0 ? s / t : 0);
 	}
 	return depth;
 }
@@ -53,18 +54,18 @@ static double transmittance(double t, double cosine)
 
 /* (exp(-t / a) - exp(-t / c)) / (a - c): computed, with d = t / min - t / max, as the transmittance at the larger
  * cosine times (1 - exp(-d)) / (max - min); the last factor is t / (a c) where both cosines are equal. */
-static double transmitted(double t, double a, double c)
+static double single_scatter_transmission(double t, double a, double c)
 {
-	double most = fmax(a, c), least = fmin(a, c), d = t * ((most - least) / most / least);
-	double direct = transmittance(t, most);
+	double larger = fmax(a, c), smaller = fmin(a, c), d = t * ((larger - smaller) / larger / smaller);
+	double direct = transmittance(t, larger);
 	if (!(direct > 0))
 		return 0;
 	if (d > 1)
-		return direct * -expm1(-d) / (most - least);
-	return direct * (d > 0 ? -expm1(-d) / d : 1) * (t / most / least);
+		return direct * -expm1(-d) / (larger - smaller);
+	return direct * (d > 0 ? -expm1(-d) / d : 1) * (t / larger / smaller);
 }
 
-static double reflected(double t, double a, double c)
+static double single_scatter_reflection(double t, double a, double c)
 {
 	return -expm1(-t / a - t / c) / (a + c);
 }
@@ -74,12 +75,13 @@ static spectrum hk_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	const struct layer *l = b->data;
 	double a = fabs(wo.z), c = fabs(wi.z);
 	if (!(a >= COSINE_MIN && c >= COSINE_MIN))
-		return spectrum_of(0);
-	spectrum f, depth = depth_at(l, p, &f);
+		return spectrum_constant(0);
+	spectrum f, depth = eval_optical_depth(l, p, &f);
 	bool same_side = wo.z * wi.z > 0;
-	double phase = phase_eval(&l->phase, p->where.p, wo, wi);
+	double phase = phase_eval(&l->phase, p->texture_point.p, wo, wi);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		f.v[i] *= phase * (same_side ? reflected : transmitted)(depth.v[i], a, c);
+		f.v[i] *=
+			phase * (same_side ? single_scatter_reflection : single_scatter_transmission)(depth.v[i], a, c);
 	return f;
 }
 
@@ -101,16 +103,16 @@ static double hk_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 	const struct layer *l = b->data;
 	if (!(fabs(wo.z) >= COSINE_MIN && fabs(wi.z) >= COSINE_MIN))
 		return 0;
-	spectrum scattered, depth = depth_at(l, p, &scattered);
-	return (1 - straight_chance(depth, scattered, fabs(wo.z))) * phase_eval(&l->phase, p->where.p, wo, wi);
+	spectrum scattered, depth = eval_optical_depth(l, p, &scattered);
+	return (1 - straight_chance(depth, scattered, fabs(wo.z))) * phase_eval(&l->phase, p->texture_point.p, wo, wi);
 }
 
 static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			      double *chance)
 {
 	if (!(mode & BSDF_STRAIGHT) || !(fabs(wo.z) >= COSINE_MIN))
-		return spectrum_of(0);
-	spectrum scattered, f = depth_at(b->data, p, &scattered);
+		return spectrum_constant(0);
+	spectrum scattered, f = eval_optical_depth(b->data, p, &scattered);
 	*wi = vec3_neg(wo);
 	*chance = straight_chance(f, scattered, fabs(wo.z));
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -125,55 +127,55 @@ static bool hk_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
 	double unused;
 	if (!(fabs(wo.z) >= COSINE_MIN))
 		return false;
-	spectrum scattered, depth = depth_at(l, p, &scattered);
+	spectrum scattered, depth = eval_optical_depth(l, p, &scattered);
 	if (u[2] < straight_chance(depth, scattered, fabs(wo.z)))
 		return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
-	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->where.p, wo, u, &unused), out);
+	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->texture_point.p, wo, u, &unused), out);
 }
 
 /* Reads a coefficient, which is the measured one unless the scene gives it. */
 static int read_coefficient(struct texture *t, struct bsdf *b, const struct scene_node *n, const char *name,
 			    const double measured[3], const struct bsdf_build *build, struct error *e)
 {
-	const struct texture_build inner = bsdf_texture_build(build);
+	const struct texture_build texture_build = bsdf_texture_build(build);
 	enum color_role role = strcmp(name, "albedo") == 0 ? COLOR_REFLECTANCE : COLOR_UNBOUNDED;
 	int code;
 	*t = (struct texture){.ops = NULL};
-	if (node_find(n, name))
-		code = texture_from_node(t, n, name, 0, role, &inner, e);
+	if (node_find_property(n, name))
+		code = texture_from_node(t, n, name, 0, role, &texture_build, e);
 	else
 		code = color_from_rgb(measured, role, &t->color);
 	if (code)
 		return code;
-	bsdf_add_shape(b, texture_shape(t));
-	b->textured |= !texture_is_constant(t);
+	bsdf_add_color_kind(b, texture_color_kind(t));
+	b->is_textured |= !texture_is_constant(t);
 	return 0;
 }
 
 static int read_coefficients(struct layer *l, struct bsdf *b, const struct scene_node *n,
 			     const struct bsdf_build *build, struct error *e)
 {
-	bool apart = node_find(n, "sigma_s") || node_find(n, "sigma_a");
-	l->by_albedo = node_find(n, "sigma_t") || node_find(n, "albedo");
-	if (l->by_albedo && (apart || !(node_find(n, "sigma_t") && node_find(n, "albedo"))))
+	bool separate = node_find_property(n, "sigma_s") || node_find_property(n, "sigma_a");
+	l->uses_albedo = node_find_property(n, "sigma_t") || node_find_property(n, "albedo");
+	if (l->uses_albedo && (separate || !(node_find_property(n, "sigma_t") && node_find_property(n, "albedo"))))
 		return node_error(n, e, EINVAL, "either sigma_s and sigma_a, or sigma_t and albedo");
 	double a[3], s[3];
-	int code = medium_measured(n, node_string(n, "material", MEASURED_DEFAULT), true, a, s, e);
+	int code = medium_look_up_measured(n, node_string(n, "material", MEASURED_MEDIUM_DEFAULT), true, a, s, e);
 	if (code)
 		return code;
-	code = read_coefficient(&l->first, b, n, l->by_albedo ? "sigma_t" : "sigma_a", a, build, e);
-	return code ? code : read_coefficient(&l->second, b, n, l->by_albedo ? "albedo" : "sigma_s", s, build, e);
+	code = read_coefficient(&l->first, b, n, l->uses_albedo ? "sigma_t" : "sigma_a", a, build, e);
+	return code ? code : read_coefficient(&l->second, b, n, l->uses_albedo ? "albedo" : "sigma_s", s, build, e);
 }
 
 static int hk_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct layer *l = b->data;
-	const struct volume_build alone = {
-		.assets = build->assets, .arena = build->arena, .dialect_3 = build->dialect_3, .scale = 1};
+	const struct volume_build default_build = {
+		.assets = build->assets, .arena = build->arena, .dialect_3 = build->dialect_3, .world_scale = 1};
 	int code = read_coefficients(l, b, n, build, e);
 	if (!code)
-		code = phase_create(&l->phase, node_child(n, PLUGIN_PHASE, 0), build->volumes ? build->volumes : &alone,
-				    e);
+		code = phase_create(&l->phase, node_child(n, PLUGIN_PHASE, 0),
+				    build->volumes ? build->volumes : &default_build, e);
 	if (!code && l->phase.ops->area)
 		code = node_error(n, e, ENOTSUP, "microflakes are not supported in a layer");
 	if (code)
@@ -182,8 +184,8 @@ static int hk_create(struct bsdf *b, const struct scene_node *n, const struct bs
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
 	b->has_smooth = true;
 	b->has_delta = true;
-	b->two_sided = true;
-	b->alpha_mean = 1;
+	b->is_two_sided = true;
+	b->mean_alpha = 1;
 	return 0;
 }
 

@@ -13,7 +13,7 @@
 static const struct {
 	const char *name;
 	double n;
-} named[] = {
+} named_indices[] = {
 	{"vacuum", 1.0},	   {"helium", 1.000036},	{"hydrogen", 1.000132},
 	{"air", 1.000277},	   {"carbon dioxide", 1.00045}, {"water", 1.3330},
 	{"acetone", 1.36},	   {"ethanol", 1.361},		{"carbon tetrachloride", 1.461},
@@ -29,9 +29,9 @@ static const struct {
  * Daimon and Masumura 2007 at 20 C (water), Malitson and Dodge 1972 (sapphire, ordinary ray). */
 static const struct {
 	const char *name;
-	int terms;
+	int term_count;
 	double b[IOR_TERMS], c[IOR_TERMS];
-} laws[] = {
+} sellmeier_laws[] = {
 	{"bk7", 3, {1.03961212, 0.231792344, 1.01046945}, {0.00600069867, 0.0200179144, 103.560653}},
 	{"sf11", 3, {1.73759695, 0.313747346, 1.89878101}, {0.013188707, 0.0623068142, 155.23629}},
 	{"fused quartz", 3, {0.6961663, 0.4079426, 0.8974794}, {0.004679148258, 0.01351206307, 97.93400254}},
@@ -44,29 +44,29 @@ static const struct {
 };
 
 /* Indices below this one are those of gases, which refract so little that a constant suffices even with dispersion. */
-#define NEARLY_VACUUM 1.001
+#define GAS_IOR_MAX 1.001
 
 static int refuse_name(const struct scene_node *n, const char *property, const char *material, struct error *e)
 {
-	char hint[128], known[512] = "";
+	char hint[128], list[512] = "";
 	struct spelling s = {.wanted = material};
-	for (size_t i = 0; i < sizeof named / sizeof *named; i++) {
-		spelling_offer(&s, named[i].name);
-		spelling_list(known, sizeof known, named[i].name);
+	for (size_t i = 0; i < sizeof named_indices / sizeof *named_indices; i++) {
+		spelling_offer(&s, named_indices[i].name);
+		spelling_append_to_list(list, sizeof list, named_indices[i].name);
 	}
 	if (!s.best && strcasestr(material, "glas")) /* the usual crown glass */
 		s.best = "bk7";
 	return node_error(n, e, ENOTSUP, "%s: unknown material \"%.64s\"%s; a number is accepted, too (known: %s)",
-			  property, material, spelling_hint(&s, hint, sizeof hint), known);
+			  property, material, spelling_hint(&s, hint, sizeof hint), list);
 }
 
 int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	if (p && p->value.type == VALUE_STRING) {
-		for (size_t i = 0; i < sizeof named / sizeof *named; i++)
-			if (strcasecmp(named[i].name, p->value.as.string) == 0) {
-				*out = named[i].n;
+		for (size_t i = 0; i < sizeof named_indices / sizeof *named_indices; i++)
+			if (strcasecmp(named_indices[i].name, p->value.as.string) == 0) {
+				*out = named_indices[i].n;
 				return 0;
 			}
 		return refuse_name(n, name, p->value.as.string, e);
@@ -75,35 +75,35 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 	return 0;
 }
 
-static double ior_at(const struct ior *i, double nm)
+static double ior_eval(const struct ior *i, double nm)
 {
-	if (i->terms == 0) {
-		double k = 1e6 / (nm * nm), d = 1e6 / (IOR_NM * IOR_NM);
+	if (i->term_count == 0) {
+		double k = 1e6 / (nm * nm), d = 1e6 / (IOR_REFERENCE_NM * IOR_REFERENCE_NM);
 		return i->n + i->cauchy * (k - d);
 	}
 	double l2 = nm * nm * 1e-6, n2 = 1;
-	for (int t = 0; t < i->terms; t++)
+	for (int t = 0; t < i->term_count; t++)
 		n2 += i->b[t] * l2 / (l2 - i->c[t]);
 	return sqrt(fmax(n2, 0));
 }
 
 double ior_eta(const struct ior side[2], double nm)
 {
-	return ior_at(&side[IOR_INT], nm) / ior_at(&side[IOR_EXT], nm);
+	return ior_eval(&side[IOR_INT], nm) / ior_eval(&side[IOR_EXT], nm);
 }
 
 const char *ior_dispersive_names(char *text, size_t size)
 {
 	struct text t = {text, size};
-	for (size_t i = 0; i < sizeof laws / sizeof *laws; i++)
-		text_put(&t, "%s%s", i ? ", " : "", laws[i].name);
+	for (size_t i = 0; i < sizeof sellmeier_laws / sizeof *sellmeier_laws; i++)
+		text_appendf(&t, "%s%s", i ? ", " : "", sellmeier_laws[i].name);
 	return text;
 }
 
-struct names {
+struct ior_params {
 	const char *ior, *cauchy, *sellmeier;
 };
-static const struct names side_names[] = {
+static const struct ior_params side_params[] = {
 	[IOR_INT] = {"int_ior", "int_cauchy_b", "int_sellmeier"},
 	[IOR_EXT] = {"ext_ior", "ext_cauchy_b", "ext_sellmeier"},
 };
@@ -115,15 +115,15 @@ static int parse_sellmeier(struct ior *out, const struct scene_node *n, const ch
 {
 	double list[2 * IOR_TERMS], shortest = WAVELENGTH_MIN * WAVELENGTH_MIN * 1e-6,
 				    longest = WAVELENGTH_MAX * WAVELENGTH_MAX * 1e-6;
-	int count = number_list(text, list, 2 * IOR_TERMS);
+	int count = number_parse_list(text, list, 2 * IOR_TERMS);
 	if (count < 2 || count % 2)
 		return node_error(n, e, EINVAL,
 				  "%s takes 1 to %d numbers B and as many C (micrometres squared) after them", name,
 				  IOR_TERMS);
-	out->terms = count / 2;
-	for (int t = 0; t < out->terms; t++) {
+	out->term_count = count / 2;
+	for (int t = 0; t < out->term_count; t++) {
 		out->b[t] = list[t];
-		out->c[t] = list[out->terms + t];
+		out->c[t] = list[out->term_count + t];
 		if (!(out->b[t] >= 0 && out->c[t] >= 0))
 			return node_error(n, e, EINVAL, "%s: no coefficient may be negative", name);
 		if (out->c[t] >= shortest && out->c[t] <= longest)
@@ -137,37 +137,37 @@ static int parse_sellmeier(struct ior *out, const struct scene_node *n, const ch
 static int look_up_law(struct ior *out, const struct scene_node *n, const char *property, const char *material,
 		       struct error *e)
 {
-	for (size_t i = 0; i < sizeof laws / sizeof *laws; i++) {
-		if (strcasecmp(laws[i].name, material) != 0)
+	for (size_t i = 0; i < sizeof sellmeier_laws / sizeof *sellmeier_laws; i++) {
+		if (strcasecmp(sellmeier_laws[i].name, material) != 0)
 			continue;
-		out->terms = laws[i].terms;
-		for (int t = 0; t < out->terms; t++) {
-			out->b[t] = laws[i].b[t];
-			out->c[t] = laws[i].c[t];
+		out->term_count = sellmeier_laws[i].term_count;
+		for (int t = 0; t < out->term_count; t++) {
+			out->b[t] = sellmeier_laws[i].b[t];
+			out->c[t] = sellmeier_laws[i].c[t];
 		}
 		return 0;
 	}
-	char known[128];
-	if (out->n < NEARLY_VACUUM)
+	char list[128];
+	if (out->n < GAS_IOR_MAX)
 		return 0;
 	return node_error(n, e, ENOTSUP,
 			  "%s: the dispersion of \"%s\" is not known, only that of %s; coefficients are accepted, too",
-			  property, material, ior_dispersive_names(known, sizeof known));
+			  property, material, ior_dispersive_names(list, sizeof list));
 }
 
 bool ior_has_coefficients(const struct scene_node *n)
 {
 	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (node_find(n, names[i]))
+		if (node_find_property(n, names[i]))
 			return true;
 	return false;
 }
 
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e)
 {
-	const struct names *name = &side_names[side];
-	const struct property *ior = node_find(n, name->ior), *cauchy = node_find(n, name->cauchy);
+	const struct ior_params *name = &side_params[side];
+	const struct property *ior = node_find_property(n, name->ior), *cauchy = node_find_property(n, name->cauchy);
 	const char *sellmeier = node_string(n, name->sellmeier, NULL);
 	*out = (struct ior){.cauchy = node_float(n, name->cauchy, 0)};
 	if (sellmeier && (ior || cauchy))
@@ -180,12 +180,12 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 		code = look_up_law(out, n, name->ior, ior->value.as.string, e);
 	if (code)
 		return code;
-	double most = ior_at(out, WAVELENGTH_MIN), least = ior_at(out, WAVELENGTH_MAX);
-	if (!(fmax(most, least) <= PARAM_IOR_MAX && fmin(most, least) >= PARAM_IOR_MIN))
+	double shortest_ior = ior_eval(out, WAVELENGTH_MIN), longest_ior = ior_eval(out, WAVELENGTH_MAX);
+	if (!(fmax(shortest_ior, longest_ior) <= PARAM_IOR_MAX && fmin(shortest_ior, longest_ior) >= PARAM_IOR_MIN))
 		return node_error(n, e, ERANGE,
 				  "%s: the index of refraction is %g at %g nm and %g at %g nm, outside [%g, %g]",
-				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least,
+				  sellmeier ? name->sellmeier : name->cauchy, shortest_ior, WAVELENGTH_MIN, longest_ior,
 				  WAVELENGTH_MAX, PARAM_IOR_MIN, PARAM_IOR_MAX);
-	out->n = ior_at(out, IOR_NM);
+	out->n = ior_eval(out, IOR_REFERENCE_NM);
 	return 0;
 }

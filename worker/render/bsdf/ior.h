@@ -10,14 +10,14 @@
 
 #include "worker/render/scene/scene.h"
 
-#define IOR_NM 587.6 /* helium's yellow line, near sodium's: the wavelength of constant indices */
+#define IOR_REFERENCE_NM 587.6 /* helium's yellow line, near sodium's: the wavelength of constant indices */
 
 enum { IOR_TERMS = 4 };
 
 struct ior {
-	double n;      /* index at IOR_NM */
-	double cauchy; /* index n + cauchy (1 / L^2 - 1 / L_d^2) at the wavelength L, with L_d = IOR_NM */
-	int terms;     /* if > 0, n^2 = 1 + sum b L^2 / (L^2 - c) instead */
+	double n;	/* index at IOR_REFERENCE_NM */
+	double cauchy;	/* index n + cauchy (1 / L^2 - 1 / L_d^2) at the wavelength L, with L_d = IOR_REFERENCE_NM */
+	int term_count; /* if > 0, n^2 = 1 + sum b L^2 / (L^2 - c) instead */
 	double b[IOR_TERMS], c[IOR_TERMS];
 };
 

@@ -28,46 +28,46 @@
 
 #include <float.h>
 
-#define LEAST_COSINE 0x1p-500 /* as for `measured` */
+#define COSINE_MIN 0x1p-500 /* as for `measured` */
 #define ALL_WAVELENGTHS (-1)
 #define COSINE_SHARE 0.1 /* share of samples drawn in proportion to the cosine */
 
-enum { AXES = 4, MUELLER = 16, TICK_INTERVAL = 1 << 16 };
+enum { AXIS_COUNT = 4, MUELLER_ELEMENTS = 16, TICK_INTERVAL = 1 << 16 };
 
 /* Marks a missing measurement: so far below 0 that interpolating it with any values around it gives a negative value,
  * which counts as 0. */
-static const float nothing = -FLT_MAX;
+static const float missing_value = -FLT_MAX;
 
 struct axis {
 	uint32_t count;
-	const double *at;
+	const double *value;
 };
 
 struct polarized {
-	struct axis axis[AXES];	  /* phi_d, theta_d, theta_h, and wavelengths in nm, which vary fastest */
-	const float *value;	  /* f */
-	const double (*rgb)[3];	  /* weight of each wavelength in linear Rec. 709 under D65 */
-	double nm;		  /* the only wavelength, or ALL_WAVELENGTHS */
-	struct microfacet facets; /* only for sampling */
+	struct axis axis[AXIS_COUNT]; /* phi_d, theta_d, theta_h, and wavelengths in nm, which vary fastest */
+	const float *value;	      /* f */
+	const double (*rgb)[3];	      /* weight of each wavelength in linear Rec. 709 under D65 */
+	double nm;		      /* the only wavelength, or ALL_WAVELENGTHS */
+	struct microfacet facets;     /* only for sampling */
 };
 
 /* ---- the table ---- */
 
-/* A position between the values i and next of an axis; part: share of the way from the one to the other. */
+/* A position between the values i and next of an axis; fraction: share of the way from the one to the other. */
 struct cell {
 	uint32_t i, next;
-	double part;
+	double fraction;
 };
 
-static struct cell cell_of(const struct axis *a, double x)
+static struct cell find_cell(const struct axis *a, double x)
 {
 	uint32_t last = a->count - 1;
-	if (!(x > a->at[0]))
+	if (!(x > a->value[0]))
 		return (struct cell){0, 0, 0};
-	if (!(x < a->at[last]))
+	if (!(x < a->value[last]))
 		return (struct cell){last, last, 0};
-	uint32_t i = search_cell(a->at, last, x);
-	return (struct cell){i, i + 1, (x - a->at[i]) / (a->at[i + 1] - a->at[i])};
+	uint32_t i = search_cell(a->value, last, x);
+	return (struct cell){i, i + 1, (x - a->value[i]) / (a->value[i + 1] - a->value[i])};
 }
 
 /* The values around a pair of directions, each at its first wavelength, and the weight of each. */
@@ -77,7 +77,7 @@ struct nodes {
 	double weight[8];
 };
 
-static struct nodes nodes_at(const struct polarized *m, vec3 light, vec3 h)
+static struct nodes find_nodes(const struct polarized *m, vec3 light, vec3 h)
 {
 	/* Tangents at h: b across the meridian, t down along it. */
 	double across = hypot(h.x, h.y);
@@ -87,71 +87,72 @@ static struct nodes nodes_at(const struct polarized *m, vec3 light, vec3 h)
 	struct cell c[3];
 	struct nodes n = {.count = 0};
 	for (int i = 0; i < 3; i++)
-		c[i] = cell_of(&m->axis[i], angle[i]);
+		c[i] = find_cell(&m->axis[i], angle[i]);
 	for (unsigned k = 0; k < 8; k++) {
-		size_t at = 0;
+		size_t node = 0;
 		double weight = 1;
 		for (unsigned i = 0; i < 3; i++) {
 			bool next = k >> i & 1;
-			at = at * m->axis[i].count + (next ? c[i].next : c[i].i);
-			weight *= next ? c[i].part : 1 - c[i].part;
+			node = node * m->axis[i].count + (next ? c[i].next : c[i].i);
+			weight *= next ? c[i].fraction : 1 - c[i].fraction;
 		}
 		if (weight > 0) {
-			n.value[n.count] = m->value + at * m->axis[3].count;
+			n.value[n.count] = m->value + node * m->axis[3].count;
 			n.weight[n.count++] = weight;
 		}
 	}
 	return n;
 }
 
-static double at_wavelength(const struct polarized *m, const struct nodes *n, double nm)
+static double eval_at_wavelength(const struct polarized *m, const struct nodes *n, double nm)
 {
-	struct cell c = cell_of(&m->axis[3], nm);
+	struct cell c = find_cell(&m->axis[3], nm);
 	double sum = 0;
 	for (int i = 0; i < n->count; i++)
-		sum += n->weight[i] * ((1 - c.part) * (double)n->value[i][c.i] + c.part * (double)n->value[i][c.next]);
+		sum += n->weight[i] *
+		       ((1 - c.fraction) * (double)n->value[i][c.i] + c.fraction * (double)n->value[i][c.next]);
 	return max_of(sum, 0);
 }
 
 /* Returns f for light that travels from `light` to `camera`. */
-static spectrum reflected(const struct polarized *m, const struct wavelengths *w, vec3 camera, vec3 light)
+static spectrum eval_reflected(const struct polarized *m, const struct wavelengths *w, vec3 camera, vec3 light)
 {
 	vec3 h;
 	double length, rgb[3] = {0, 0, 0};
-	if (!microfacet_half(camera, 1, light, &h, &length))
-		return spectrum_of(0);
-	struct nodes n = nodes_at(m, light, h);
+	if (!microfacet_half_vector(camera, 1, light, &h, &length))
+		return spectrum_constant(0);
+	struct nodes n = find_nodes(m, light, h);
 	if (m->nm != ALL_WAVELENGTHS)
-		return spectrum_of(at_wavelength(m, &n, m->nm));
-	if (!w->rgb) {
+		return spectrum_constant(eval_at_wavelength(m, &n, m->nm));
+	if (!w->is_rgb) {
 		spectrum f;
 		for (int i = 0; i < SPECTRUM_LANES; i++)
-			f.v[i] = at_wavelength(m, &n, w->nm[i]);
+			f.v[i] = eval_at_wavelength(m, &n, w->nm[i]);
 		return f;
 	}
 	for (uint32_t k = 0; k < m->axis[3].count; k++) {
-		double f = at_wavelength(m, &n, m->axis[3].at[k]);
+		double f = eval_at_wavelength(m, &n, m->axis[3].value[k]);
 		for (int i = 0; i < 3; i++)
 			rgb[i] += m->rgb[k][i] * f;
 	}
 	for (int i = 0; i < 3; i++)
 		rgb[i] = max_of(rgb[i], 0);
-	return spectrum_of_rgb(rgb);
+	return spectrum_from_rgb(rgb);
 }
 
 /* ---- the material ---- */
 
 static bool both_above(vec3 wo, vec3 wi)
 {
-	return wo.z >= LEAST_COSINE && wi.z >= LEAST_COSINE;
+	return wo.z >= COSINE_MIN && wi.z >= COSINE_MIN;
 }
 
 static spectrum polarized_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	if (!both_above(wo, wi))
-		return spectrum_of(0);
-	return p->transport == TRANSPORT_IMPORTANCE ? reflected(b->data, p->w, wi, wo)
-						    : reflected(b->data, p->w, wo, wi);
+		return spectrum_constant(0);
+	return p->transport == TRANSPORT_IMPORTANCE ? eval_reflected(b->data, p->wavelengths, wi, wo)
+						    : eval_reflected(b->data, p->wavelengths, wo, wi);
 }
 
 static double polarized_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -160,17 +161,17 @@ static double polarized_pdf(const struct bsdf *b, const struct bsdf_point *p, ve
 	vec3 h;
 	double length;
 	(void)p;
-	if (!both_above(wo, wi) || !microfacet_half(wo, 1, wi, &h, &length))
+	if (!both_above(wo, wi) || !microfacet_half_vector(wo, 1, wi, &h, &length))
 		return 0;
-	double mirrored = 0.25 * microfacet_d(&m->facets, h) * microfacet_g1_over_cos(&m->facets, wo);
-	return COSINE_SHARE * wi.z / WARP_PI + (1 - COSINE_SHARE) * mirrored;
+	double facet_pdf = 0.25 * microfacet_d(&m->facets, h) * microfacet_g1_over_cos(&m->facets, wo);
+	return COSINE_SHARE * wi.z / WARP_PI + (1 - COSINE_SHARE) * facet_pdf;
 }
 
 static bool polarized_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			     struct bsdf_sample *out)
 {
 	const struct polarized *m = b->data;
-	if (!(wo.z >= LEAST_COSINE))
+	if (!(wo.z >= COSINE_MIN))
 		return false;
 	vec3 wi = u[2] < COSINE_SHARE ? warp_cosine_hemisphere(u[0], u[1])
 				      : microfacet_sample_mirrored(&m->facets, wo, u[0], u[1]);
@@ -182,19 +183,21 @@ static bool polarized_sample(const struct bsdf *b, const struct bsdf_point *p, v
 static int read_table(const struct tensor_input *in, struct polarized *m)
 {
 	struct tensor t;
-	int rc = tensor_input_find(in, "M", TENSOR_FLOATS, AXES + 2, &t);
+	int rc = tensor_input_find(in, "M", TENSOR_FLOATS, AXIS_COUNT + 2, &t);
 	if (rc)
 		return rc;
-	for (int i = 0; i < AXES; i++)
+	for (int i = 0; i < AXIS_COUNT; i++)
 		if (t.shape[i] != m->axis[i].count)
-			return tensor_fault(in, EINVAL, "M", "has other sizes than phi_d, theta_d, theta_h and wvls");
-	if (t.shape[AXES] != 4 || t.shape[AXES + 1] != 4)
-		return tensor_fault(in, EINVAL, "M", "needs matrices of 4 x 4");
-	float *value = arena_alloc(in->arena, t.count / MUELLER, sizeof *value);
+			return tensor_input_error(in, EINVAL, "M",
+						  "has other sizes than phi_d, theta_d, theta_h and wvls");
+	if (t.shape[AXIS_COUNT] != 4 || t.shape[AXIS_COUNT + 1] != 4)
+		return tensor_input_error(in, EINVAL, "M", "needs matrices of 4 x 4");
+	float *value = arena_alloc(in->arena, t.count / MUELLER_ELEMENTS, sizeof *value);
 	if (!value)
-		return tensor_fault(in, ENOMEM, "M", "does not fit into memory");
-	for (uint64_t i = 0; i < t.count / MUELLER; i++) {
-		value[i] = tensor_is_usable(&t, MUELLER * i) ? (float)tensor_value(&t, MUELLER * i) : nothing;
+		return tensor_input_error(in, ENOMEM, "M", "does not fit into memory");
+	for (uint64_t i = 0; i < t.count / MUELLER_ELEMENTS; i++) {
+		value[i] = tensor_is_usable(&t, MUELLER_ELEMENTS * i) ? (float)tensor_value(&t, MUELLER_ELEMENTS * i)
+								      : missing_value;
 		if (i % TICK_INTERVAL == 0)
 			liveness_tick();
 	}
@@ -204,14 +207,14 @@ static int read_table(const struct tensor_input *in, struct polarized *m)
 
 static int read_material(const struct tensor_input *in, struct polarized *m)
 {
-	static const char *const names[AXES] = {"phi_d", "theta_d", "theta_h", "wvls"};
+	static const char *const names[AXIS_COUNT] = {"phi_d", "theta_d", "theta_h", "wvls"};
 	double(*rgb)[3] = NULL;
 	int rc = 0;
-	for (int i = 0; i < AXES && !rc; i++)
-		rc = tensor_axis(in, names[i], i < 3 ? TENSOR_FLOATS : TENSOR_SHORTS, i < 3 ? 2 : 1, &m->axis[i].count,
-				 &m->axis[i].at);
+	for (int i = 0; i < AXIS_COUNT && !rc; i++)
+		rc = tensor_read_axis(in, names[i], i < 3 ? TENSOR_FLOATS : TENSOR_SHORTS, i < 3 ? 2 : 1,
+				      &m->axis[i].count, &m->axis[i].value);
 	if (!rc)
-		rc = tensor_rgb_weights(in, m->axis[3].at, m->axis[3].count, &rgb);
+		rc = tensor_rgb_weights(in, m->axis[3].value, m->axis[3].count, &rgb);
 	m->rgb = (const double(*)[3])rgb;
 	return rc ? rc : read_table(in, m);
 }
@@ -222,7 +225,7 @@ static int polarized_create(struct bsdf *b, const struct scene_node *n, const st
 	struct asset_range a;
 	m->nm = node_float(n, "wavelength", ALL_WAVELENGTHS);
 	double alpha = node_float(n, "alpha_sample", 0.1);
-	microfacet_set(&m->facets, true, alpha, alpha);
+	microfacet_init(&m->facets, true, alpha, alpha);
 	int rc = asset_part_open(&a, n, build->assets, e);
 	if (rc)
 		return rc;
@@ -231,9 +234,9 @@ static int polarized_create(struct bsdf *b, const struct scene_node *n, const st
 	asset_range_close(&a, build->assets);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->directed = true;
-	b->alpha = b->alpha_mean = alpha;
-	bsdf_add_shape(b, m->nm == ALL_WAVELENGTHS ? COLOR_SHAPE_OTHER : COLOR_SHAPE_CONSTANT);
+	b->is_nonreciprocal = true;
+	b->min_alpha = b->mean_alpha = alpha;
+	bsdf_add_color_kind(b, m->nm == ALL_WAVELENGTHS ? COLOR_KIND_OTHER : COLOR_KIND_CONSTANT);
 	return rc;
 }
 

@@ -11,7 +11,7 @@ enum { METAL_ROWS = 95 };
 
 static const struct {
 	const char *name;
-	double row[METAL_ROWS][3]; /* nm, n, k */
+	double samples[METAL_ROWS][3]; /* nm, n, k */
 } metals[] = {
 #include "conductors.inc"
 };
@@ -25,7 +25,7 @@ static bool is_named(const char *name, const char *metal)
 }
 
 /* Returns the chemical symbol of a metal given by its English name, for hints; NULL if the name is not known. */
-static const char *symbol(const char *name)
+static const char *chemical_symbol(const char *name)
 {
 	static const struct {
 		const char *word, *symbol;
@@ -43,16 +43,16 @@ static const char *symbol(const char *name)
 
 static int refuse_name(const char *name, const struct scene_node *n, struct error *e)
 {
-	char hint[128], list[512] = "";
+	char hint[128], known[512] = "";
 	struct spelling s = {.wanted = name};
 	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
 		spelling_offer(&s, metals[i].name);
-		spelling_list(list, sizeof list, metals[i].name);
+		spelling_append_to_list(known, sizeof known, metals[i].name);
 	}
-	spelling_list(list, sizeof list, "none");
-	s.best = symbol(name) ? symbol(name) : s.best;
+	spelling_append_to_list(known, sizeof known, "none");
+	s.best = chemical_symbol(name) ? chemical_symbol(name) : s.best;
 	return node_error(n, e, ENOTSUP, "unknown conductor \"%.64s\"%s; eta and k are accepted, too (known: %s)", name,
-			  spelling_hint(&s, hint, sizeof hint), list);
+			  spelling_hint(&s, hint, sizeof hint), known);
 }
 
 static int set_named_metal(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena,
@@ -66,29 +66,29 @@ static int set_named_metal(struct metal *m, const char *name, const struct scene
 	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
 		if (!is_named(name, metals[i].name))
 			continue;
-		double *room = arena_alloc(arena, 3 * METAL_ROWS, sizeof *room);
-		if (!room)
+		double *samples = arena_alloc(arena, 3 * METAL_ROWS, sizeof *samples);
+		if (!samples)
 			return node_error(n, e, ENOMEM, "out of memory");
 		for (size_t c = 0; c < 3; c++)
 			for (size_t r = 0; r < METAL_ROWS; r++)
-				room[c * METAL_ROWS + r] = metals[i].row[r][c];
+				samples[c * METAL_ROWS + r] = metals[i].samples[r][c];
 		/* If colours are RGB, n and k are converted as if they were light, without D65, as in Mitsuba. */
-		m->eta.color = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
-		m->k.color = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
+		m->eta.color = color_from_samples(METAL_ROWS, samples, samples + METAL_ROWS, false, false);
+		m->k.color = color_from_samples(METAL_ROWS, samples, samples + 2 * METAL_ROWS, false, false);
 		return 0;
 	}
 	return refuse_name(name, n, e);
 }
 
-static int read_if_given(struct texture *t, const struct scene_node *n, const char *name,
+static int read_optional(struct texture *t, const struct scene_node *n, const char *name,
 			 const struct bsdf_build *build, struct error *e)
 {
-	const struct texture_build inner = bsdf_texture_build(build);
-	return node_find(n, name) ? texture_from_node(t, n, name, 0, COLOR_UNBOUNDED, &inner, e) : 0;
+	const struct texture_build texture_build = bsdf_texture_build(build);
+	return node_find_property(n, name) ? texture_from_node(t, n, name, 0, COLOR_UNBOUNDED, &texture_build, e) : 0;
 }
 
 /* Divides t by the index outside now if t is constant. Returns the divisor that remains to be applied at each point. */
-static double set_outside(struct texture *t, double outside)
+static double divide_by_outside_index(struct texture *t, double outside)
 {
 	if (!texture_is_constant(t))
 		return outside;
@@ -102,38 +102,38 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	double outside;
 	int code = set_named_metal(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
 	if (!code)
-		code = read_if_given(&m->eta, n, "eta", build, e);
+		code = read_optional(&m->eta, n, "eta", build, e);
 	if (!code)
-		code = read_if_given(&m->k, n, "k", build, e);
+		code = read_optional(&m->k, n, "k", build, e);
 	if (!code)
 		code = ior_read(n, "ext_eta", build->dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
 	if (!code)
-		code = bsdf_texture(b, &m->reflectance, n, "specular_reflectance", 1, build, e);
+		code = bsdf_read_texture(b, &m->reflectance, n, "specular_reflectance", 1, build, e);
 	if (code)
 		return code;
-	b->black = texture_max(&m->reflectance) == 0;
-	m->eta_over = set_outside(&m->eta, outside);
-	m->k_over = set_outside(&m->k, outside);
-	m->varies = !texture_is_constant(&m->eta) || !texture_is_constant(&m->k);
-	b->textured |= m->varies;
-	m->perfect = !m->varies && texture_max(&m->eta) == 0 && texture_max(&m->k) > 0;
-	if (!m->perfect) {
-		bsdf_add_shape(b, texture_shape(&m->eta));
-		bsdf_add_shape(b, texture_shape(&m->k));
+	b->is_black = texture_max(&m->reflectance) == 0;
+	m->eta_divisor = divide_by_outside_index(&m->eta, outside);
+	m->k_divisor = divide_by_outside_index(&m->k, outside);
+	m->is_textured = !texture_is_constant(&m->eta) || !texture_is_constant(&m->k);
+	b->is_textured |= m->is_textured;
+	m->is_perfect_mirror = !m->is_textured && texture_max(&m->eta) == 0 && texture_max(&m->k) > 0;
+	if (!m->is_perfect_mirror) {
+		bsdf_add_color_kind(b, texture_color_kind(&m->eta));
+		bsdf_add_color_kind(b, texture_color_kind(&m->k));
 	}
 	return 0;
 }
 
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine)
 {
-	spectrum r = texture_eval(&m->reflectance, &p->where, p->w), index[2], f;
-	if (m->perfect)
+	spectrum r = texture_eval(&m->reflectance, &p->texture_point, p->wavelengths), index[2], f;
+	if (m->is_perfect_mirror)
 		return r;
-	if (m->varies) {
-		index[0] = spectrum_scale(1 / m->eta_over, texture_eval(&m->eta, &p->where, p->w));
-		index[1] = spectrum_scale(1 / m->k_over, texture_eval(&m->k, &p->where, p->w));
+	if (m->is_textured) {
+		index[0] = spectrum_scale(1 / m->eta_divisor, texture_eval(&m->eta, &p->texture_point, p->wavelengths));
+		index[1] = spectrum_scale(1 / m->k_divisor, texture_eval(&m->k, &p->texture_point, p->wavelengths));
 	} else {
-		color_eval_both(&m->eta.color, &m->k.color, p->w, index);
+		color_eval_pair(&m->eta.color, &m->k.color, p->wavelengths, index);
 	}
 	double c = !(cosine > 0) ? 0 : cosine < 1 ? cosine : 1;
 	for (int i = 0; i < SPECTRUM_LANES; i++)

@@ -8,10 +8,10 @@
 
 struct metal {
 	struct texture eta, k;
-	bool varies;		    /* eta or k is textured; a textured one is not yet divided by the index outside */
-	double eta_over, k_over;    /* divisors of eta and k: the index outside for a textured one, otherwise 1 */
-	struct texture reflectance; /* factor of the Fresnel term */
-	bool perfect;		    /* reflects all light: the Fresnel factor is 1 */
+	bool is_textured; /* eta or k is textured; a textured one is not yet divided by the index outside */
+	double eta_divisor, k_divisor; /* divisors of eta and k: the index outside for a textured one, otherwise 1 */
+	struct texture reflectance;    /* factor of the Fresnel term */
+	bool is_perfect_mirror;	       /* reflects all light: the Fresnel factor is 1 */
 };
 
 /* Reads material, eta, k, ext_eta and specular_reflectance. The default material is Cu in the 0.5/0.6 dialect and none

@@ -20,7 +20,7 @@ double microfacet_d(const struct microfacet *m, vec3 h)
 		return 0;
 	/* a2 = alpha_u alpha_v; s2 / c2 is a2 times the sum of the squared slopes, each over its squared roughness. */
 	double a2 = m->alpha * m->alpha * m->ratio, c2 = h.z * h.z, s2 = h.x * h.x * m->ratio + h.y * h.y / m->ratio;
-	if (m->ggx) {
+	if (m->is_ggx) {
 		double d = a2 * c2 + s2;
 		return a2 / (WARP_PI * d * d);
 	}
@@ -32,7 +32,7 @@ double microfacet_d(const struct microfacet *m, vec3 h)
 double microfacet_g1_over_cos(const struct microfacet *m, vec3 v)
 {
 	double c = v.z, s = m->alpha * stretched_sine(m, v);
-	if (m->ggx)
+	if (m->is_ggx)
 		return 2 / (c + sqrt(c * c + s * s));
 	if (c >= 6 * s) /* 1 - G1 is below the rounding of double */
 		return 1 / c;
@@ -73,7 +73,7 @@ static double erf_inverse(double x)
 }
 
 /* Samples a slope x below c/s with density proportional to (c - s x) exp(-x^2), by Newton's method inside a bracket. */
-static double visible_slope(double c, double s, double u)
+static double sample_visible_slope(double c, double s, double u)
 {
 	const double half_root = 0.5 * sqrt(WARP_PI);
 	double low = -6, high = c < 6 * s ? c / s : 6;
@@ -98,17 +98,17 @@ static double visible_slope(double c, double s, double u)
 	return x;
 }
 
-static vec3 beckmann_visible(const struct microfacet *m, vec3 v, double u0, double u1)
+static vec3 sample_beckmann_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
 	double sv = stretched_sine(m, v), s = m->alpha * sv, r = sqrt(s * s + v.z * v.z), along_v = m->alpha * m->ratio;
-	double x = visible_slope(v.z / r, s / r, u0);
+	double x = sample_visible_slope(v.z / r, s / r, u0);
 	double y = erf_inverse(fmin(fmax(2 * u1 - 1, -1 + 0x1p-52), 1 - 0x1p-52));
 	double cos_phi = sv > 0 ? v.x / sv : 1, sin_phi = sv > 0 ? m->ratio * v.y / sv : 0;
 	return vec3_normalize(
 		(vec3){-m->alpha * (cos_phi * x - sin_phi * y), -along_v * (sin_phi * x + cos_phi * y), 1});
 }
 
-static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1)
+static vec3 sample_ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
 	double along_v = m->alpha * m->ratio;
 	vec3 stretched = vec3_normalize((vec3){m->alpha * v.x, along_v * v.y, v.z});
@@ -122,7 +122,7 @@ static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1
 
 vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
-	return m->ggx ? ggx_visible(m, v, u0, u1) : beckmann_visible(m, v, u0, u1);
+	return m->is_ggx ? sample_ggx_visible(m, v, u0, u1) : sample_beckmann_visible(m, v, u0, u1);
 }
 
 double microfacet_reflect(const struct microfacet *m, double eta, vec3 wo, vec3 wi, double *pdf)
@@ -130,25 +130,25 @@ double microfacet_reflect(const struct microfacet *m, double eta, vec3 wo, vec3 
 	double length;
 	vec3 h;
 	*pdf = 0;
-	if (!microfacet_half(wo, 1, wi, &h, &length))
+	if (!microfacet_half_vector(wo, 1, wi, &h, &length))
 		return 0;
 	*pdf = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, wo);
-	return *pdf * microfacet_g1_over_cos(m, wi) * fresnel_dielectric(fmin(0.5 * length, 1), eta).reflected;
+	return *pdf * microfacet_g1_over_cos(m, wi) * fresnel_dielectric(fmin(0.5 * length, 1), eta).reflectance;
 }
 
-void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v)
+void microfacet_init(struct microfacet *m, bool is_ggx, double alpha_u, double alpha_v)
 {
-	m->ggx = ggx;
+	m->is_ggx = is_ggx;
 	m->alpha = fmax(alpha_u, MICROFACET_ALPHA_MIN);
 	m->ratio = fmax(alpha_v, MICROFACET_ALPHA_MIN) / m->alpha;
 }
 
-double microfacet_least(const struct microfacet *m)
+double microfacet_min_alpha(const struct microfacet *m)
 {
 	return m->alpha * fmin(m->ratio, 1);
 }
 
-double microfacet_mean(const struct microfacet *m)
+double microfacet_mean_alpha(const struct microfacet *m)
 {
 	return m->alpha * sqrt(m->ratio);
 }
@@ -156,8 +156,8 @@ double microfacet_mean(const struct microfacet *m)
 int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e)
 {
 	double alpha = node_float(n, "alpha", 0.1);
-	bool ggx = strcmp(node_string(n, "distribution", "beckmann"), "ggx") == 0;
-	microfacet_set(m, ggx, node_float(n, "alpha_u", alpha), node_float(n, "alpha_v", alpha));
+	bool is_ggx = strcmp(node_string(n, "distribution", "beckmann"), "ggx") == 0;
+	microfacet_init(m, is_ggx, node_float(n, "alpha_u", alpha), node_float(n, "alpha_v", alpha));
 	if (m->ratio > MICROFACET_RATIO_MAX || m->ratio < 1 / MICROFACET_RATIO_MAX)
 		return node_error(n, e, ERANGE, "alpha_u = %g and alpha_v = %g are more than a factor of %g apart",
 				  m->alpha, m->alpha * m->ratio, MICROFACET_RATIO_MAX);

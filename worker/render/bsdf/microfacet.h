@@ -18,15 +18,15 @@
 #define MICROFACET_RATIO_MAX 1e4
 
 struct microfacet {
-	bool ggx;
+	bool is_ggx;
 	double alpha; /* roughness along u */
 	double ratio; /* roughness along v over that along u */
 };
 
 /* Sets m, raising roughness to at least MICROFACET_ALPHA_MIN. */
-void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v);
-double microfacet_least(const struct microfacet *m); /* the smaller of the two roughnesses */
-double microfacet_mean(const struct microfacet *m);  /* their geometric mean */
+void microfacet_init(struct microfacet *m, bool ggx, double alpha_u, double alpha_v);
+double microfacet_min_alpha(const struct microfacet *m);  /* the smaller of the two roughnesses */
+double microfacet_mean_alpha(const struct microfacet *m); /* their geometric mean */
 
 /* Returns the density of microfacet normals (1/sr): the integral of D(h) h.z over the hemisphere is 1. h: a unit
  * vector. */
@@ -41,7 +41,7 @@ vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, do
 
 /* Computes the direction and the length of the half vector wo + eta wi. Returns false if it is too short to have a
  * direction. */
-static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
+static inline bool microfacet_half_vector(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
 {
 	vec3 sum = vec3_madd(wo, eta, wi);
 	double largest = max_of(fabs(sum.x), max_of(fabs(sum.y), fabs(sum.z)));

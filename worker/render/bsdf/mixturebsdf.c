@@ -9,18 +9,18 @@ static int read_weights(struct blend *m, const struct scene_node *n, struct erro
 {
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
-	if (number_weights(text, m->fixed, BLEND_PARTS_MAX) != (int)m->count)
+	if (number_parse_weights(text, m->fixed_weight, BLEND_PARTS_MAX) != (int)m->count)
 		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weight%s, one for each BSDF", text, m->count,
 				  m->count == 1 ? "" : "s");
 	for (uint32_t k = 0; k < m->count; k++) {
-		if (!(m->fixed[k] >= 0 && m->fixed[k] <= 1e6))
+		if (!(m->fixed_weight[k] >= 0 && m->fixed_weight[k] <= 1e6))
 			return node_error(n, e, ERANGE, "weights=\"%s\": must be within [0, 1e6]", text);
-		sum += m->fixed[k];
+		sum += m->fixed_weight[k];
 	}
 	if (!(sum > 0))
 		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
 	for (uint32_t k = 0; k < m->count && sum > 1; k++)
-		m->fixed[k] /= sum;
+		m->fixed_weight[k] /= sum;
 	return bsdf_check_energy(n, sum, e);
 }
 
@@ -34,16 +34,16 @@ static int mixturebsdf_create(struct bsdf *b, const struct scene_node *n, const 
 	if (count == 0)
 		return node_error(n, e, EINVAL, "needs BSDFs inside");
 	struct blend *m = blend_begin(b, count);
-	m->is_fixed = true;
+	m->has_fixed_weights = true;
 	int code = read_weights(m, n, e);
 	if (!code)
 		code = blend_read_parts(m, b, n, build, e);
 	double sum = 0;
 	for (uint32_t k = 0; k < m->count && !code; k++)
-		sum += m->fixed[k];
-	b->alpha_mean = 0;
+		sum += m->fixed_weight[k];
+	b->mean_alpha = 0;
 	for (uint32_t k = 0; k < m->count && !code; k++)
-		b->alpha_mean += m->fixed[k] / sum * m->part[k].alpha_mean;
+		b->mean_alpha += m->fixed_weight[k] / sum * m->part[k].mean_alpha;
 	return code;
 }
 

@@ -17,7 +17,7 @@ struct phong {
 };
 
 /* Returns the lobe without its normalisation; zero at more than 90 degrees from the mirror direction. */
-static double lobe_of(double exponent, vec3 wo, vec3 wi)
+static double unnormalized_lobe(double exponent, vec3 wo, vec3 wi)
 {
 	double c = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;
 	return c > 0 ? pow(c, exponent) : 0;
@@ -27,16 +27,19 @@ static double exponent_at(const struct phong *ph, const struct bsdf_point *p)
 {
 	if (texture_is_constant(&ph->exponent))
 		return ph->exponent.color.scale;
-	return fmin(fmax(spectrum_mean(texture_eval(&ph->exponent, &p->where, p->w)), 0), EXPONENT_MAX);
+	return fmin(fmax(spectrum_mean(texture_eval(&ph->exponent, &p->texture_point, p->wavelengths)), 0),
+		    EXPONENT_MAX);
 }
 
 static spectrum phong_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
-		return spectrum_of(0);
-	double exponent = exponent_at(ph, p), lobe = (exponent + 2) / (2 * WARP_PI) * lobe_of(exponent, wo, wi);
-	spectrum d = texture_eval(&ph->diffuse, &p->where, p->w), s = texture_eval(&ph->specular, &p->where, p->w);
+		return spectrum_constant(0);
+	double exponent = exponent_at(ph, p),
+	       lobe = (exponent + 2) / (2 * WARP_PI) * unnormalized_lobe(exponent, wo, wi);
+	spectrum d = texture_eval(&ph->diffuse, &p->texture_point, p->wavelengths),
+		 s = texture_eval(&ph->specular, &p->texture_point, p->wavelengths);
 	return spectrum_scale(ph->scale, spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe, s)));
 }
 
@@ -45,7 +48,8 @@ static double phong_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
-	double exponent = exponent_at(ph, p), lobe = (exponent + 1) / (2 * WARP_PI) * lobe_of(exponent, wo, wi);
+	double exponent = exponent_at(ph, p),
+	       lobe = (exponent + 1) / (2 * WARP_PI) * unnormalized_lobe(exponent, wo, wi);
 	return ph->specular_chance * lobe + (1 - ph->specular_chance) * wi.z / WARP_PI;
 }
 
@@ -70,40 +74,40 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 
 /* Reads the exponent. *most: its largest value, which is that of the sharpest lobe. Returns 0 or a negative error
  * code. */
-static int read_exponent(struct phong *ph, struct bsdf *b, double *most, const struct scene_node *n,
+static int read_exponent(struct phong *ph, struct bsdf *b, double *max_exponent, const struct scene_node *n,
 			 const struct bsdf_build *build, struct error *e)
 {
-	int code = bsdf_quantity(b, &ph->exponent, n, "exponent", 30, true, build, e);
+	int code = bsdf_read_quantity(b, &ph->exponent, n, "exponent", 30, true, build, e);
 	if (code)
 		return code;
 	if (!(texture_max(&ph->exponent) <= EXPONENT_MAX))
 		return node_error(n, e, ERANGE, "exponent=%g is outside [0, %g]", texture_max(&ph->exponent),
 				  EXPONENT_MAX);
-	*most = fmax(bsdf_probe_range(&ph->exponent, build).most, 0);
+	*max_exponent = fmax(bsdf_probe_range(&ph->exponent, build).max, 0);
 	return 0;
 }
 
 static int phong_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct phong *ph = b->data;
-	int code = bsdf_texture(b, &ph->diffuse, n, "diffuse_reflectance", 0.5, build, e);
+	int code = bsdf_read_texture(b, &ph->diffuse, n, "diffuse_reflectance", 0.5, build, e);
 	if (!code)
-		code = bsdf_texture(b, &ph->specular, n, "specular_reflectance", 0.2, build, e);
+		code = bsdf_read_texture(b, &ph->specular, n, "specular_reflectance", 0.2, build, e);
 	double exponent = 0;
 	if (!code)
 		code = read_exponent(ph, b, &exponent, n, build, e);
 	if (code)
 		return code;
 	double d = texture_max(&ph->diffuse), s = texture_max(&ph->specular);
-	b->black = d + s == 0;
+	b->is_black = d + s == 0;
 	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
 	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
 	code = bsdf_check_energy(n, d + s, e);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	double alpha = sqrt(2 / (exponent + 2));
-	b->alpha = s > 0 ? alpha : INFINITY;
-	b->alpha_mean = ph->specular_chance * alpha + (1 - ph->specular_chance);
+	b->min_alpha = s > 0 ? alpha : INFINITY;
+	b->mean_alpha = ph->specular_chance * alpha + (1 - ph->specular_chance);
 	return code;
 }
 

@@ -8,13 +8,13 @@
  *
  * Only the side of the normal reflects. Light that the boundary reflects back inside is lost, unlike in `roughplastic`.
  */
-#include "worker/render/bsdf/coating.h"
+#include "worker/render/bsdf/coated_diffuse.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/rough_map.h"
 #include "worker/render/bsdf/warp.h"
 
 struct pplastic {
-	struct coating coating;
+	struct coated_diffuse coating;
 	struct rough_map roughness;
 };
 
@@ -27,17 +27,18 @@ static spectrum pplastic_eval(const struct bsdf *b, const struct bsdf_point *p, 
 {
 	const struct pplastic *s = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	struct microfacet m = rough_map_at(&s->roughness, p);
 	double pdf, lobe = microfacet_reflect(&m, s->coating.eta, wo, wi, &pdf),
-		    passes = fresnel_at(s, wo.z).transmitted * fresnel_at(s, wi.z).transmitted / WARP_PI;
-	return spectrum_add(spectrum_scale(lobe, texture_eval(&s->coating.specular, &p->where, p->w)),
-			    spectrum_scale(passes, texture_eval(&s->coating.diffuse, &p->where, p->w)));
+		    passes = fresnel_at(s, wo.z).transmittance * fresnel_at(s, wi.z).transmittance / WARP_PI;
+	return spectrum_add(
+		spectrum_scale(lobe, texture_eval(&s->coating.specular, &p->texture_point, p->wavelengths)),
+		spectrum_scale(passes, texture_eval(&s->coating.diffuse, &p->texture_point, p->wavelengths)));
 }
 
 static double specular_chance(const struct pplastic *s, vec3 wo)
 {
-	return coating_specular_chance(&s->coating, fresnel_at(s, wo.z).reflected);
+	return coated_diffuse_specular_chance(&s->coating, fresnel_at(s, wo.z).reflectance);
 }
 
 static double pplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -70,15 +71,15 @@ static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 static int pplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct pplastic *s = b->data;
-	int code = coating_read(&s->coating, b, n, build, e);
+	int code = coated_diffuse_read(&s->coating, b, n, build, e);
 	if (!code)
 		code = rough_map_read(&s->roughness, b, n, build, e);
 	if (code)
 		return code;
 	double chance = s->coating.specular_weight;
 	if (!(chance > 0))
-		b->alpha = INFINITY;
-	b->alpha_mean = chance * b->alpha_mean + (1 - chance);
+		b->min_alpha = INFINITY;
+	b->mean_alpha = chance * b->mean_alpha + (1 - chance);
 	return 0;
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Disney's "principled" BSDF (Burley 2012, Physically Based Shading at Disney, and 2015, Extending the Disney BRDF to a
- * BSDF), with the parameters and defaults of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c = base_color,
- * and a rough GGX boundary of index eta,
+ * BSDF), with the parameters and defaults of Mitsuba 3's plug-in. With m = min_metallic, t = spec_trans, c =
+ * base_color, and a rough GGX boundary of index eta,
  *
  *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
  *
@@ -34,85 +34,85 @@
 #define PRINCIPLED_ALPHA_MIN 1e-3
 #define CLEARCOAT_REFLECTANCE 0.04 /* at normal incidence, of an index of 1.5 */
 
-enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_COAT, LOBE_TRANSMIT, LOBES };
+enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_COAT, LOBE_TRANSMIT, LOBE_COUNT };
 
 /* Returns base_color over its luminance, computed from eight wavelengths weighted by the eye's sensitivity, or from
  * RGB. */
-static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
+static spectrum compute_tint(const struct principled *p, const struct bsdf_point *point, spectrum base)
 {
-	static const struct wavelengths seen[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
+	static const struct wavelengths sampled[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
 	static const double weight[2][SPECTRUM_LANES] = {{0.023, 0.710, 0.995, 0.381}, {0.139, 0.954, 0.870, 0.061}};
-	double sum = 0, all = 0;
-	if (WAVELENGTHS_GREY(at->w))
-		return spectrum_of(1);
-	if (at->w->rgb) {
+	double sum = 0, total_weight = 0;
+	if (WAVELENGTHS_GREY(point->wavelengths))
+		return spectrum_constant(1);
+	if (point->wavelengths->is_rgb) {
 		double luminance = rec709_luminance(base.v);
-		return luminance > 0 ? spectrum_scale(1 / luminance, base) : spectrum_of(1);
+		return luminance > 0 ? spectrum_scale(1 / luminance, base) : spectrum_constant(1);
 	}
 	for (int k = 0; k < 2; k++) {
-		spectrum c = texture_eval(&p->base, &at->where, &seen[k]);
+		spectrum c = texture_eval(&p->base, &point->texture_point, &sampled[k]);
 		for (int l = 0; l < SPECTRUM_LANES; l++) {
 			sum += weight[k][l] * c.v[l];
-			all += weight[k][l];
+			total_weight += weight[k][l];
 		}
 	}
-	return sum > 0 ? spectrum_scale(all / sum, base) : spectrum_of(1);
+	return sum > 0 ? spectrum_scale(total_weight / sum, base) : spectrum_constant(1);
 }
 
 struct microfacet principled_facets(double anisotropic, double roughness)
 {
 	struct microfacet m;
 	double a = roughness * roughness, aspect = sqrt(1 - 0.9 * anisotropic);
-	microfacet_set(&m, true, max_of(PRINCIPLED_ALPHA_MIN, a / aspect), max_of(PRINCIPLED_ALPHA_MIN, a * aspect));
+	microfacet_init(&m, true, max_of(PRINCIPLED_ALPHA_MIN, a / aspect), max_of(PRINCIPLED_ALPHA_MIN, a * aspect));
 	return m;
 }
 
 /* Returns the value of a share at a point, clamped to [0,1]: the mean over the lanes, since textures of shares are
  * grey. */
-static double principled_share_at(const struct texture *t, const struct bsdf_point *at)
+static double eval_share(const struct texture *t, const struct bsdf_point *point)
 {
-	return min_of(max_of(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
+	return min_of(max_of(spectrum_mean(texture_eval(t, &point->texture_point, point->wavelengths)), 0), 1);
 }
 
 /* Evaluates all parameters but the colours. */
-static void read_numbers(const struct principled *p, const struct bsdf_point *at, struct principled_point *s)
+static void eval_numbers(const struct principled *p, const struct bsdf_point *point, struct principled_point *s)
 {
-	s->roughness = principled_share_at(&p->roughness, at);
-	s->metallic = principled_share_at(&p->metallic, at);
-	for (int i = 0; i < SHARES; i++)
-		s->share[i] = p->share[i].ops ? principled_share_at(&p->share[i], at) : p->most[i];
+	s->roughness = eval_share(&p->roughness, point);
+	s->metallic = eval_share(&p->metallic, point);
+	for (int i = 0; i < PRINCIPLED_SHARE_COUNT; i++)
+		s->share[i] = p->share[i].ops ? eval_share(&p->share[i], point) : p->max_share[i];
 	if (p->has_specular)
-		s->share[SPEC_TINT] = 1;
-	s->facets = principled_facets(s->share[ANISOTROPIC], s->roughness);
-	if (s->share[COAT] > 0)
-		s->coat = principled_facets(0, s->share[COAT_ROUGHNESS]);
+		s->share[PRINCIPLED_SPEC_TINT] = 1;
+	s->facets = principled_facets(s->share[PRINCIPLED_ANISOTROPIC], s->roughness);
+	if (s->share[PRINCIPLED_COAT] > 0)
+		s->coat = principled_facets(0, s->share[PRINCIPLED_COAT_ROUGHNESS]);
 }
 
 static bool is_number(const struct texture *t)
 {
-	return texture_is_constant(t) && texture_shape(t) == COLOR_SHAPE_CONSTANT;
+	return texture_is_constant(t) && texture_color_kind(t) == COLOR_KIND_CONSTANT;
 }
 
-void principled_know(struct principled *p, const struct bsdf_build *build)
+void principled_precompute(struct principled *p, const struct bsdf_build *build)
 {
-	const struct bsdf_probes probes = bsdf_probes_of(build);
-	const struct bsdf_point at = bsdf_probe(&probes, 0);
+	const struct bsdf_probes probes = bsdf_probes_make(build);
+	const struct bsdf_point probe = bsdf_probe_point(&probes, 0);
 	p->varies = !is_number(&p->roughness) || !is_number(&p->metallic);
-	for (int i = 0; i < SHARES; i++)
+	for (int i = 0; i < PRINCIPLED_SHARE_COUNT; i++)
 		p->varies |= p->share[i].ops != NULL;
-	p->known = (struct principled_point){.p = p, .eta = p->eta};
-	read_numbers(p, &at, &p->known);
+	p->precomputed = (struct principled_point){.principled = p, .eta = p->eta};
+	eval_numbers(p, &probe, &p->precomputed);
 }
 
-struct principled_point principled_at(const struct principled *p, const struct bsdf_point *at)
+struct principled_point principled_point_at(const struct principled *p, const struct bsdf_point *point)
 {
-	struct principled_point s = p->known;
-	s.base = texture_eval(&p->base, &at->where, at->w);
+	struct principled_point s = p->precomputed;
+	s.base = texture_eval(&p->base, &point->texture_point, point->wavelengths);
 	if (p->varies)
-		read_numbers(p, at, &s);
-	bool tinted = (!p->has_specular && s.share[SPEC_TINT] > 0) || s.share[SHEEN_TINT] > 0;
-	s.tint = tinted ? tint_of(p, at, s.base) : spectrum_of(1);
-	s.specular = p->has_specular ? texture_eval(&p->specular, &at->where, at->w) : s.tint;
+		eval_numbers(p, point, &s);
+	bool tinted = (!p->has_specular && s.share[PRINCIPLED_SPEC_TINT] > 0) || s.share[PRINCIPLED_SHEEN_TINT] > 0;
+	s.tint = tinted ? compute_tint(p, point, s.base) : spectrum_constant(1);
+	s.specular = p->has_specular ? texture_eval(&p->specular, &point->texture_point, point->wavelengths) : s.tint;
 	return s;
 }
 
@@ -122,14 +122,14 @@ static double schlick(double cosine)
 	return x * x * x * x * x;
 }
 
-spectrum principled_boundary(const struct principled_point *s, double cosine)
+spectrum principled_boundary_fresnel(const struct principled_point *s, double cosine)
 {
-	double rest = schlick(cosine), root = (s->eta - 1) / (s->eta + 1), tint = s->share[SPEC_TINT];
-	double plain = (1 - tint) * fresnel_dielectric(min_of(cosine, 1), s->eta).reflected;
+	double rest = schlick(cosine), root = (s->eta - 1) / (s->eta + 1), tint = s->share[PRINCIPLED_SPEC_TINT];
+	double plain = (1 - tint) * fresnel_dielectric(min_of(cosine, 1), s->eta).reflectance;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = min_of(s->specular.v[i] * root * root, 1);
-		f.v[i] = s->share[SPECULAR_STRENGTH] * (plain + tint * (tinted + (1 - tinted) * rest));
+		f.v[i] = s->share[PRINCIPLED_SPECULAR_STRENGTH] * (plain + tint * (tinted + (1 - tinted) * rest));
 	}
 	return f;
 }
@@ -146,19 +146,19 @@ spectrum principled_fresnel(const struct principled_point *s, spectrum boundary,
 
 /* Burley 2012, section 5.3, with Burley's approximation of subsurface scattering (flatness), and the sheen of section
  * 5.6. The caller has made sure that wi is above the surface. */
-spectrum principled_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
+spectrum principled_eval_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
 {
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
 	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
 	double flat = 1.25 * (ss * (1 / max_of(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
-	double most = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) / WARP_PI,
-	       burley = base + s->share[FLATNESS] * (flat - base);
-	double sheen = (1 - s->metallic) * s->share[SHEEN] * schlick(cos_d);
+	double diffuse_scale = (1 - s->metallic) * (1 - s->share[PRINCIPLED_TRANSMISSION]) / WARP_PI,
+	       burley = base + s->share[PRINCIPLED_FLATNESS] * (flat - base);
+	double sheen = (1 - s->metallic) * s->share[PRINCIPLED_SHEEN] * schlick(cos_d);
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double diffuse = most * (s->p->lambertian ? 1 - boundary.v[i] : burley);
-		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[SHEEN_TINT] * (s->tint.v[i] - 1));
+		double diffuse = diffuse_scale * (s->principled->lambertian ? 1 - boundary.v[i] : burley);
+		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[PRINCIPLED_SHEEN_TINT] * (s->tint.v[i] - 1));
 	}
 	return f;
 }
@@ -171,74 +171,75 @@ static double clearcoat_alpha(double gloss)
 /* GTR1: Burley 2012, appendix B.2. */
 static double clearcoat_d(const struct principled_point *s, double cos_h)
 {
-	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
+	double alpha = clearcoat_alpha(s->share[PRINCIPLED_CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	return (a2 - 1) / (WARP_PI * log(a2) * (a2 * cos_h * cos_h + (1 - cos_h) * (1 + cos_h)));
 }
 
 /* Without the factor 1 / (4 cos cos) of microfacets, as in Mitsuba: four times as bright as Burley's seen from straight
  * above. */
-static double clearcoat_of(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
+static double eval_clearcoat(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
 {
 	struct microfacet shadow;
-	microfacet_set(&shadow, true, 0.25, 0.25);
+	microfacet_init(&shadow, true, 0.25, 0.25);
 	double f = CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cos_d);
 	double g = microfacet_g1_over_cos(&shadow, wo) * wo.z * microfacet_g1_over_cos(&shadow, wi) * wi.z;
-	return 0.25 * s->share[CLEARCOAT] * f * clearcoat_d(s, h.z) * g;
+	return 0.25 * s->share[PRINCIPLED_CLEARCOAT] * f * clearcoat_d(s, h.z) * g;
 }
 
 /* Returns the share of light at an angle that the coat reflects. */
-static double coat_reflects(const struct principled_point *s, double cosine)
+static double coat_reflectance(const struct principled_point *s, double cosine)
 {
-	return s->share[COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
+	return s->share[PRINCIPLED_COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
 }
 
 /* Returns about the share of the boundary's facets on which light from below is reflected totally: those whose slope
  * towards wo takes it beyond the critical angle. GGX slopes along a line have the cumulative distribution
  * (1 + x / sqrt(a^2 + x^2)) / 2. */
-static double totally_reflects(const struct principled_point *s, vec3 wo)
+static double total_reflection_share(const struct principled_point *s, vec3 wo)
 {
 	double cosine = min_of(fabs(wo.z), 1), sine = sqrt((1 - cosine) * (1 + cosine)), critical = 1 / s->eta,
 	       below = sqrt((1 - critical) * (1 + critical)), over = sine * below - cosine * critical,
-	       along = cosine * below + sine * critical, spread = microfacet_mean(&s->facets) * along;
+	       along = cosine * below + sine * critical, spread = microfacet_mean_alpha(&s->facets) * along;
 	return 0.5 + 0.5 * over / sqrt(over * over + spread * spread);
 }
 
 /* Computes the probabilities of sampling each lobe for light from wo. */
-static void lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
+static void compute_lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBE_COUNT])
 {
-	const struct principled *p = s->p;
+	const struct principled *p = s->principled;
 	bool below = wo.z < 0;
-	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
-	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
+	double clear = 1 - s->metallic, glass = clear * s->share[PRINCIPLED_TRANSMISSION];
+	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflectance, sum = 0;
 	/* The strength does not scale total reflection, which some facets may have where the plane does not. */
-	if (p->scaled) {
-		double total = below ? totally_reflects(s, wo) : 0;
-		reflected = total + (1 - total) * reflected * s->share[SPECULAR_STRENGTH];
+	if (p->scales_boundary) {
+		double total = below ? total_reflection_share(s, wo) : 0;
+		reflected = total + (1 - total) * reflected * s->share[PRINCIPLED_SPECULAR_STRENGTH];
 	}
 	/* Never 0: where the plane reflects totally, some facets still transmit. */
 	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
-	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->base_max, 0.04);
-	chance[LOBE_DIFFUSE] =
-		below ? 0
-		      : clear * max_of((1 - s->share[TRANSMISSION]) * p->base_max, min_of(s->share[SHEEN], 1) * 0.2);
-	chance[LOBE_CLEARCOAT] = below ? 0 : s->share[CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z)) * wo.z;
-	double coat = below ? 0 : coat_reflects(s, wo.z);
-	for (int i = 0; i < LOBES; i++) {
+	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->max_base, 0.04);
+	chance[LOBE_DIFFUSE] = below ? 0
+				     : clear * max_of((1 - s->share[PRINCIPLED_TRANSMISSION]) * p->max_base,
+						      min_of(s->share[PRINCIPLED_SHEEN], 1) * 0.2);
+	chance[LOBE_CLEARCOAT] =
+		below ? 0 : s->share[PRINCIPLED_CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z)) * wo.z;
+	double coat = below ? 0 : coat_reflectance(s, wo.z);
+	for (int i = 0; i < LOBE_COUNT; i++) {
 		chance[i] = i == LOBE_COAT ? coat : chance[i] * (1 - coat);
 		sum += chance[i];
 	}
-	for (int i = 0; i < LOBES; i++)
+	for (int i = 0; i < LOBE_COUNT; i++)
 		chance[i] = sum > 0 ? chance[i] / sum : 0;
 }
 
-static vec3 mirror(vec3 v, bool below)
+static vec3 mirror_if_below(vec3 v, bool below)
 {
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
 /* The value and the density for a pair of directions, computed together because they share most terms. wo.z is not
  * 0. */
-struct pair {
+struct evaluation {
 	spectrum f;
 	double pdf;
 };
@@ -246,11 +247,11 @@ struct pair {
 /* Adds refracted light to the pair: Walter et al. 2007, eq. 21, as in roughdielectric. wo is above; eta: index beyond
  * over index on wo's side. */
 static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double chance,
-			  enum transport transport, struct pair *out)
+			  enum transport transport, struct evaluation *out)
 {
 	vec3 h;
 	double length;
-	if (!microfacet_half(wo, eta, wi, &h, &length))
+	if (!microfacet_half_vector(wo, eta, wi, &h, &length))
 		return;
 	if (h.z < 0)
 		h = vec3_neg(h);
@@ -258,20 +259,20 @@ static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, do
 	if (!(co > 0 && ci < 0))
 		return;
 	double spread = co * -ci * (eta / length) * (eta / length);
-	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
-	double passes = (1 - s->metallic) * s->share[TRANSMISSION];
-	spectrum boundary = spectrum_of(0);
-	if (s->p->scaled)
-		boundary = principled_boundary(s, min_of(eta > 1 ? co : -ci, 1));
+	double facet_pdf = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
+	double passes = (1 - s->metallic) * s->share[PRINCIPLED_TRANSMISSION];
+	spectrum boundary = spectrum_constant(0);
+	if (s->principled->scales_boundary)
+		boundary = principled_boundary_fresnel(s, min_of(eta > 1 ? co : -ci, 1));
 	else
-		passes *= fresnel_between(min_of(co, 1), min_of(-ci, 1), eta).transmitted;
-	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
-	f *= 1 - coat_reflects(s, eta > 1 ? wo.z : -wi.z);
+		passes *= fresnel_between(min_of(co, 1), min_of(-ci, 1), eta).transmittance;
+	double f = facet_pdf * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
+	f *= 1 - coat_reflectance(s, eta > 1 ? wo.z : -wi.z);
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		out->f.v[i] += f * sqrt(s->base.v[i]) * (1 - boundary.v[i]);
-	out->pdf += chance * seen;
+	out->pdf += chance * facet_pdf;
 }
 
 /* Returns the coat's reflection without its Fresnel factor and G1(wi), which is also the density of sampling it. */
@@ -282,93 +283,95 @@ static double coat_lobe(const struct principled_point *s, vec3 wo, vec3 h)
 
 /* Returns the density (solid angle) of reflected directions. seen: that of sampling the boundary's facets; cos_d:
  * cosine of either direction to the half vector h. */
-static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
-			    bool below, const double chance[LOBES])
+static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double facet_pdf,
+			    bool below, const double chance[LOBE_COUNT])
 {
-	double pdf = chance[LOBE_SPECULAR] * seen;
+	double pdf = chance[LOBE_SPECULAR] * facet_pdf;
 	if (below)
 		return pdf;
 	pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
-	if (s->share[CLEARCOAT] > 0)
+	if (s->share[PRINCIPLED_CLEARCOAT] > 0)
 		pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
-	if (s->share[COAT] > 0)
+	if (s->share[PRINCIPLED_COAT] > 0)
 		pdf += chance[LOBE_COAT] * coat_lobe(s, wo, h);
 	return pdf;
 }
 
 /* Of light from below, at the cosine to the facet. */
-static spectrum reflected_inside(const struct principled_point *s, double cosine)
+static spectrum inner_reflectance(const struct principled_point *s, double cosine)
 {
-	struct fresnel f = fresnel_dielectric(cosine, 1 / s->p->eta);
-	return s->p->scaled && f.transmitted > 0 ? principled_boundary(s, f.cos_t) : spectrum_of(f.reflected);
+	struct fresnel f = fresnel_dielectric(cosine, 1 / s->principled->eta);
+	return s->principled->scales_boundary && f.transmittance > 0 ? principled_boundary_fresnel(s, f.cos_t)
+								     : spectrum_constant(f.reflectance);
 }
 
-static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
-				bool below)
+static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d,
+				double facet_pdf, bool below)
 {
-	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
+	double both = facet_pdf * microfacet_g1_over_cos(&s->facets, wi);
 	if (below)
-		return spectrum_scale(both * (1 - s->metallic) * s->share[TRANSMISSION], reflected_inside(s, cos_d));
-	spectrum boundary = principled_boundary(s, cos_d);
+		return spectrum_scale(both * (1 - s->metallic) * s->share[PRINCIPLED_TRANSMISSION],
+				      inner_reflectance(s, cos_d));
+	spectrum boundary = principled_boundary_fresnel(s, cos_d);
 	spectrum f = spectrum_add(spectrum_scale(both, principled_fresnel(s, boundary, cos_d)),
-				  principled_diffuse(s, boundary, wo, wi, cos_d));
-	if (s->share[CLEARCOAT] > 0)
-		f = spectrum_add(f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
-	if (s->share[COAT] > 0) {
-		double through = (1 - coat_reflects(s, wo.z)) * (1 - coat_reflects(s, wi.z));
-		double coat = coat_reflects(s, cos_d) * coat_lobe(s, wo, h) * microfacet_g1_over_cos(&s->coat, wi);
-		f = spectrum_add(spectrum_scale(through, f), spectrum_of(coat));
+				  principled_eval_diffuse(s, boundary, wo, wi, cos_d));
+	if (s->share[PRINCIPLED_CLEARCOAT] > 0)
+		f = spectrum_add(f, spectrum_constant(eval_clearcoat(s, wo, wi, h, cos_d)));
+	if (s->share[PRINCIPLED_COAT] > 0) {
+		double through = (1 - coat_reflectance(s, wo.z)) * (1 - coat_reflectance(s, wi.z));
+		double coat = coat_reflectance(s, cos_d) * coat_lobe(s, wo, h) * microfacet_g1_over_cos(&s->coat, wi);
+		f = spectrum_add(spectrum_scale(through, f), spectrum_constant(coat));
 	}
 	return f;
 }
 
-/* Computes the value if `value` is set, and the density if the probabilities of the lobes are given. */
-static struct pair pair_of(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport, bool value,
-			   const double *chance)
+/* Computes the value if `wants_value` is set, and the density if the probabilities of the lobes are given. */
+static struct evaluation evaluate(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport,
+				  bool wants_value, const double *chance)
 {
-	struct pair out = {spectrum_of(0), 0};
-	bool below = wo.z<0, glass = s->share[TRANSMISSION]> 0 && s->metallic < 1;
+	struct evaluation out = {spectrum_constant(0), 0};
+	bool below = wo.z<0, glass = s->share[PRINCIPLED_TRANSMISSION]> 0 && s->metallic < 1;
 	if (wo.z == 0 || wi.z == 0 || (below && !glass))
 		return out;
-	wo = mirror(wo, below);
-	wi = mirror(wi, below);
+	wo = mirror_if_below(wo, below);
+	wi = mirror_if_below(wi, below);
 	if (wi.z < 0) {
 		if (glass)
-			add_refracted(s, wo, wi, below ? 1 / s->p->eta : s->p->eta, chance ? chance[LOBE_TRANSMIT] : 0,
-				      transport, &out);
+			add_refracted(s, wo, wi, below ? 1 / s->principled->eta : s->principled->eta,
+				      chance ? chance[LOBE_TRANSMIT] : 0, transport, &out);
 		return out;
 	}
 	vec3 h;
 	double length;
-	if (!microfacet_half(wo, 1, wi, &h, &length))
+	if (!microfacet_half_vector(wo, 1, wi, &h, &length))
 		return out;
 	double cos_d = min_of(0.5 * length, 1);
-	double seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
-	if (value)
-		out.f = reflected_value(s, wo, wi, h, cos_d, seen, below);
+	double facet_pdf = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
+	if (wants_value)
+		out.f = reflected_value(s, wo, wi, h, cos_d, facet_pdf, below);
 	if (chance)
-		out.pdf = reflected_pdf(s, wo, wi, h, cos_d, seen, below, chance);
+		out.pdf = reflected_pdf(s, wo, wi, h, cos_d, facet_pdf, below, chance);
 	return out;
 }
 
-static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
+static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *point, vec3 wo, vec3 wi)
 {
-	struct principled_point s = principled_at(b->data, at);
-	return pair_of(&s, wo, wi, at->transport, true, NULL).f;
+	struct principled_point s = principled_point_at(b->data, point);
+	return evaluate(&s, wo, wi, point->transport, true, NULL).f;
 }
 
-static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
+static double principled_pdf(const struct bsdf *b, const struct bsdf_point *point, vec3 wo, vec3 wi)
 {
-	struct principled_point s = principled_at(b->data, at);
-	double chance[LOBES];
-	lobe_chances(&s, wo, chance);
-	return pair_of(&s, wo, wi, at->transport, false, chance).pdf;
+	struct principled_point s = principled_point_at(b->data, point);
+	double chance[LOBE_COUNT];
+	compute_lobe_chances(&s, wo, chance);
+	return evaluate(&s, wo, wi, point->transport, false, chance).pdf;
 }
 
 /* Samples a half vector of GTR1 by inverting its cumulative distribution exactly. */
-static vec3 clearcoat_normal(const struct principled_point *s, double u0, double u1)
+static vec3 sample_clearcoat_normal(const struct principled_point *s, double u0, double u1)
 {
-	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
+	double alpha = clearcoat_alpha(s->share[PRINCIPLED_CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	double cos2 = fmin(fmax((1 - pow(a2, 1 - u0)) / (1 - a2), 0), 1), sine = sqrt(1 - cos2), phi = 2 * WARP_PI * u1;
 	return (vec3){sine * cos(phi), sine * sin(phi), sqrt(cos2)};
 }
@@ -382,7 +385,7 @@ static bool sample_lobe(const struct principled_point *s, int lobe, vec3 wo, dou
 		return wi->z > 0;
 	}
 	vec3 h = lobe == LOBE_CLEARCOAT
-			 ? clearcoat_normal(s, u[0], u[1])
+			 ? sample_clearcoat_normal(s, u[0], u[1])
 			 : microfacet_sample_visible(lobe == LOBE_COAT ? &s->coat : &s->facets, wo, u[0], u[1]);
 	double c = min_of(vec3_dot(wo, h), 1);
 	if (!(c > 0))
@@ -393,86 +396,86 @@ static bool sample_lobe(const struct principled_point *s, int lobe, vec3 wo, dou
 	}
 	struct fresnel at_h = fresnel_dielectric(c, eta);
 	*wi = vec3_normalize(vec3_madd(vec3_scale(-1 / eta, wo), c / eta - at_h.cos_t, h));
-	return at_h.transmitted > 0 && wi->z < 0;
+	return at_h.transmittance > 0 && wi->z < 0;
 }
 
-static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3],
+static bool principled_sample(const struct bsdf *b, const struct bsdf_point *point, vec3 wo, const double u[3],
 			      struct bsdf_sample *out)
 {
-	struct principled_point s = principled_at(b->data, at);
+	struct principled_point s = principled_point_at(b->data, point);
 	bool below = wo.z < 0;
-	double chance[LOBES], rest = u[2], eta = below ? 1 / s.p->eta : s.p->eta;
+	double chance[LOBE_COUNT], rest = u[2], eta = below ? 1 / s.principled->eta : s.principled->eta;
 	vec3 wi;
 	if (wo.z == 0)
 		return false;
-	lobe_chances(&s, wo, chance);
+	compute_lobe_chances(&s, wo, chance);
 	int lobe = 0;
-	while (lobe < LOBES - 1 && rest >= chance[lobe])
+	while (lobe < LOBE_COUNT - 1 && rest >= chance[lobe])
 		rest -= chance[lobe++];
-	if (!(chance[lobe] > 0) || !sample_lobe(&s, lobe, mirror(wo, below), eta, u, &wi))
+	if (!(chance[lobe] > 0) || !sample_lobe(&s, lobe, mirror_if_below(wo, below), eta, u, &wi))
 		return false;
-	wi = mirror(wi, below);
-	struct pair pair = pair_of(&s, wo, wi, at->transport, true, chance);
-	if (!(pair.pdf > 0))
+	wi = mirror_if_below(wi, below);
+	struct evaluation evaluation = evaluate(&s, wo, wi, point->transport, true, chance);
+	if (!(evaluation.pdf > 0))
 		return false;
 	bool reflect = wo.z * wi.z > 0;
 	*out = (struct bsdf_sample){.wi = wi,
 				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
-				    .pdf = pair.pdf,
-				    .f = pair.f,
+				    .pdf = evaluation.pdf,
+				    .f = evaluation.f,
 				    .eta = reflect ? 1 : eta};
 	return true;
 }
 
-static double range_of(const struct texture *t, const struct bsdf_build *build, bool largest)
+static double clamped_extreme(const struct texture *t, const struct bsdf_build *build, bool wants_max)
 {
 	const struct bsdf_range r = bsdf_probe_range(t, build);
-	return fmin(fmax(largest ? r.most : r.least, 0), 1);
+	return fmin(fmax(wants_max ? r.max : r.min, 0), 1);
 }
 
-double principled_least(const struct texture *t, const struct bsdf_build *build)
+double principled_min_value(const struct texture *t, const struct bsdf_build *build)
 {
-	return range_of(t, build, false);
+	return clamped_extreme(t, build, false);
 }
 
-int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
-		      struct error *e)
+int principled_read_shares(struct principled *p, struct bsdf *b, const struct scene_node *n,
+			   const struct bsdf_build *build, struct error *e)
 {
-	static const char *const names[SHARES] = {[TRANSMISSION] = "spec_trans",
-						  [SPEC_TINT] = "spec_tint",
-						  [SHEEN] = "sheen",
-						  [SHEEN_TINT] = "sheen_tint",
-						  [FLATNESS] = "flatness",
-						  [CLEARCOAT] = "clearcoat",
-						  [CLEARCOAT_GLOSS] = "clearcoat_gloss",
-						  [ANISOTROPIC] = "anisotropic",
-						  [COAT] = "coat",
-						  [COAT_ROUGHNESS] = "coat_roughness",
-						  [SPECULAR_STRENGTH] = "specular_strength"};
-	for (int i = 0; i < SHARES; i++) {
+	static const char *const names[PRINCIPLED_SHARE_COUNT] = {[PRINCIPLED_TRANSMISSION] = "spec_trans",
+								  [PRINCIPLED_SPEC_TINT] = "spec_tint",
+								  [PRINCIPLED_SHEEN] = "sheen",
+								  [PRINCIPLED_SHEEN_TINT] = "sheen_tint",
+								  [PRINCIPLED_FLATNESS] = "flatness",
+								  [PRINCIPLED_CLEARCOAT] = "clearcoat",
+								  [PRINCIPLED_CLEARCOAT_GLOSS] = "clearcoat_gloss",
+								  [PRINCIPLED_ANISOTROPIC] = "anisotropic",
+								  [PRINCIPLED_COAT] = "coat",
+								  [PRINCIPLED_COAT_ROUGHNESS] = "coat_roughness",
+								  [PRINCIPLED_SPECULAR_STRENGTH] = "specular_strength"};
+	for (int i = 0; i < PRINCIPLED_SHARE_COUNT; i++) {
 		p->share[i] = (struct texture){.ops = NULL};
 		if (!node_ref(n, names[i])) {
-			p->most[i] = node_float(n, names[i], i == SPECULAR_STRENGTH ? 1 : 0);
+			p->max_share[i] = node_float(n, names[i], i == PRINCIPLED_SPECULAR_STRENGTH ? 1 : 0);
 			continue;
 		}
-		int code = bsdf_number(b, &p->share[i], n, names[i], 0, build, e);
+		int code = bsdf_read_number(b, &p->share[i], n, names[i], 0, build, e);
 		if (code)
 			return code;
-		p->most[i] = range_of(&p->share[i], build, true);
+		p->max_share[i] = clamped_extreme(&p->share[i], build, true);
 	}
-	b->uses_tangents = p->most[ANISOTROPIC] > 0;
+	b->uses_tangents = p->max_share[PRINCIPLED_ANISOTROPIC] > 0;
 	return 0;
 }
 
 static int read_index(struct principled *p, const struct scene_node *n, struct error *e)
 {
 	double specular = node_float(n, "specular", 0.5);
-	if (node_find(n, "eta") && node_find(n, "specular"))
+	if (node_find_property(n, "eta") && node_find_property(n, "specular"))
 		return node_error(n, e, EINVAL, "eta and specular exclude each other; give one of them");
-	if (p->most[TRANSMISSION] > 0 && specular == 0)
+	if (p->max_share[PRINCIPLED_TRANSMISSION] > 0 && specular == 0)
 		specular = 1e-3; /* Mitsuba's minimum, for the same reason as that of eta below */
 	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */
-	p->eta = node_find(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
+	p->eta = node_find_property(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
 	p->eta = fmax(p->eta, 1 + 1e-3); /* Mitsuba's minimum: without a difference of indices nothing is refracted */
 	return 0;
 }
@@ -481,41 +484,44 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 			     struct error *e)
 {
 	struct principled *p = b->data;
-	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
+	int code = bsdf_read_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
-		code = bsdf_number(b, &p->roughness, n, "roughness", 0.5, build, e);
+		code = bsdf_read_number(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
-		code = bsdf_number(b, &p->metallic, n, "metallic", 0, build, e);
+		code = bsdf_read_number(b, &p->metallic, n, "metallic", 0, build, e);
 	if (!code)
-		code = principled_shares(p, b, n, build, e);
-	p->has_specular = node_find(n, "specular_color") != NULL;
+		code = principled_read_shares(p, b, n, build, e);
+	p->has_specular = node_find_property(n, "specular_color") != NULL;
 	if (!code && p->has_specular)
-		code = bsdf_texture(b, &p->specular, n, "specular_color", 1, build, e);
+		code = bsdf_read_texture(b, &p->specular, n, "specular_color", 1, build, e);
 	if (!code)
 		code = read_index(p, n, e);
 	if (code)
 		return code;
 	p->lambertian = node_bool(n, "lambertian", false);
-	p->scaled = p->has_specular || node_find(n, "specular_strength");
-	p->base_max = texture_max(&p->base);
-	principled_know(p, build);
-	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness, build));
-	double metallic = principled_least(&p->metallic, build);
-	bool glass = p->most[TRANSMISSION] > 0 && metallic < 1;
+	p->scales_boundary = p->has_specular || node_find_property(n, "specular_strength");
+	p->max_base = texture_max(&p->base);
+	principled_precompute(p, build);
+	struct microfacet narrowest =
+		principled_facets(p->max_share[PRINCIPLED_ANISOTROPIC], principled_min_value(&p->roughness, build));
+	double min_metallic = principled_min_value(&p->metallic, build);
+	bool glass = p->max_share[PRINCIPLED_TRANSMISSION] > 0 && min_metallic < 1;
 	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
-	b->two_sided = glass;
+	b->is_two_sided = glass;
 	b->eta = glass ? p->eta : 1;
-	b->alpha = fmin(microfacet_least(&least),
-			p->most[CLEARCOAT] > 0 ? clearcoat_alpha(p->most[CLEARCOAT_GLOSS]) : INFINITY);
-	if (p->most[COAT] > 0) {
-		const struct texture *t = &p->share[COAT_ROUGHNESS];
-		struct microfacet coat =
-			principled_facets(0, t->ops ? principled_least(t, build) : p->most[COAT_ROUGHNESS]);
-		b->alpha = fmin(b->alpha, microfacet_least(&coat));
+	b->min_alpha =
+		fmin(microfacet_min_alpha(&narrowest),
+		     p->max_share[PRINCIPLED_CLEARCOAT] > 0 ? clearcoat_alpha(p->max_share[PRINCIPLED_CLEARCOAT_GLOSS])
+							    : INFINITY);
+	if (p->max_share[PRINCIPLED_COAT] > 0) {
+		const struct texture *t = &p->share[PRINCIPLED_COAT_ROUGHNESS];
+		struct microfacet coat = principled_facets(0, t->ops ? principled_min_value(t, build)
+								     : p->max_share[PRINCIPLED_COAT_ROUGHNESS]);
+		b->min_alpha = fmin(b->min_alpha, microfacet_min_alpha(&coat));
 	}
-	double diffuse = (1 - metallic) * (1 - p->most[TRANSMISSION]);
-	b->alpha_mean = diffuse + (1 - diffuse) * microfacet_mean(&least);
+	double diffuse = (1 - min_metallic) * (1 - p->max_share[PRINCIPLED_TRANSMISSION]);
+	b->mean_alpha = diffuse + (1 - diffuse) * microfacet_mean_alpha(&narrowest);
 	return 0;
 }
 

@@ -19,29 +19,30 @@
 
 #include <string.h>
 
-enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
+enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE_REFLECT, THIN_DIFFUSE_TRANSMIT, THIN_LOBES };
 
 #define THIN_ETA_MIN 1
 #define THIN_ETA_MAX 10
 
 struct thin {
 	struct principled p;
-	struct texture diff_trans; /* without ops: the constant `through` is used instead */
-	double through;		   /* d of the comment at the top */
-	struct texture eta;	   /* without ops: the constant p.eta is used instead */
+	struct texture diff_trans;  /* without ops: the constant `through` is used instead */
+	double diffuse_transmitted; /* d of the comment at the top */
+	struct texture eta;	    /* without ops: the constant p.eta is used instead */
 };
 
-static double through_at(const struct thin *t, const struct bsdf_point *p)
+static double eval_diffuse_transmitted(const struct thin *t, const struct bsdf_point *p)
 {
-	return 0.5 * fmin(fmax(spectrum_mean(texture_eval(&t->diff_trans, &p->where, p->w)), 0), 2);
+	return 0.5 * fmin(fmax(spectrum_mean(texture_eval(&t->diff_trans, &p->texture_point, p->wavelengths)), 0), 2);
 }
 
-static double eta_at(const struct thin *t, const struct bsdf_point *p)
+static double eval_eta(const struct thin *t, const struct bsdf_point *p)
 {
-	return fmin(fmax(spectrum_mean(texture_eval(&t->eta, &p->where, p->w)), THIN_ETA_MIN), THIN_ETA_MAX);
+	return fmin(fmax(spectrum_mean(texture_eval(&t->eta, &p->texture_point, p->wavelengths)), THIN_ETA_MIN),
+		    THIN_ETA_MAX);
 }
 
-static double passing_roughness(double eta, double roughness)
+static double transmit_roughness(double eta, double roughness)
 {
 	return (0.65 * eta - 0.35) * roughness;
 }
@@ -50,40 +51,42 @@ static double passing_roughness(double eta, double roughness)
 struct thin_point {
 	const struct thin *t;
 	struct principled_point s;
-	double spec_trans, through; /* t and d of the comment at the top */
-	struct microfacet passing;  /* D' */
-	double chance[THIN_LOBES];  /* probability of sampling each lobe */
+	double spec_trans, diffuse_transmitted; /* t and d of the comment at the top */
+	struct microfacet transmit_facets;	/* D' */
+	double chance[THIN_LOBES];		/* probability of sampling each lobe */
 };
 
-static void find_chances(struct thin_point *x, double cosine)
+static void compute_lobe_chances(struct thin_point *x, double cosine)
 {
 	const struct thin *t = x->t;
-	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
-	double reflected = fresnel_dielectric(min_of(cosine, 1), x->s.eta).reflected;
+	double base = t->p.max_base, diffuse = 1 - x->spec_trans, sum = 0;
+	double reflected = fresnel_dielectric(min_of(cosine, 1), x->s.eta).reflectance;
 	/* Facets reflect a different share than the plane of the surface, so neither lobe may have a probability of
 	 * 0. */
 	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
-	x->chance[THIN_DIFFUSE] = diffuse * (1 - x->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
-	x->chance[THIN_THROUGH] = diffuse * x->through * base;
+	x->chance[THIN_DIFFUSE_REFLECT] =
+		diffuse * (1 - x->diffuse_transmitted) * fmax(base, 0.2 * x->s.share[PRINCIPLED_SHEEN]);
+	x->chance[THIN_DIFFUSE_TRANSMIT] = diffuse * x->diffuse_transmitted * base;
 	for (int i = 0; i < THIN_LOBES; i++)
 		sum += x->chance[i];
 	for (int i = 0; i < THIN_LOBES; i++)
 		x->chance[i] = sum > 0 ? x->chance[i] / sum : 0;
 }
 
-static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+static struct thin_point thin_point_at(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
 	const struct thin *t = b->data;
-	struct thin_point x = {.t = t, .s = principled_at(&t->p, p)};
-	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
+	struct thin_point x = {.t = t, .s = principled_point_at(&t->p, p)};
+	x.diffuse_transmitted = t->diff_trans.ops ? eval_diffuse_transmitted(t, p) : t->diffuse_transmitted;
 	if (t->eta.ops)
-		x.s.eta = eta_at(t, p);
-	/* principled_diffuse must not multiply by 1 - spec_trans: pair_of does. */
-	x.spec_trans = x.s.share[TRANSMISSION];
-	x.s.share[TRANSMISSION] = 0;
-	x.passing = principled_facets(x.s.share[ANISOTROPIC], passing_roughness(x.s.eta, x.s.roughness));
-	find_chances(&x, fabs(wo.z));
+		x.s.eta = eval_eta(t, p);
+	/* principled_eval_diffuse must not multiply by 1 - spec_trans: evaluate does. */
+	x.spec_trans = x.s.share[PRINCIPLED_TRANSMISSION];
+	x.s.share[PRINCIPLED_TRANSMISSION] = 0;
+	x.transmit_facets =
+		principled_facets(x.s.share[PRINCIPLED_ANISOTROPIC], transmit_roughness(x.s.eta, x.s.roughness));
+	compute_lobe_chances(&x, fabs(wo.z));
 	return x;
 }
 
@@ -93,52 +96,52 @@ static vec3 facing_up(vec3 v)
 }
 
 /* The value and the density for a pair of directions. */
-struct pair {
+struct evaluation {
 	spectrum f;
 	double pdf;
 };
 
-static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
+static struct evaluation evaluate(const struct thin_point *x, vec3 wo, vec3 wi)
 {
-	struct pair out = {spectrum_of(0), 0};
+	struct evaluation out = {spectrum_constant(0), 0};
 	bool reflect = wo.z * wi.z > 0;
-	const struct microfacet *m = reflect ? &x->s.facets : &x->passing;
+	const struct microfacet *m = reflect ? &x->s.facets : &x->transmit_facets;
 	vec3 h, o = facing_up(wo), i = facing_up(wi);
 	double length;
-	if (!(o.z > 0 && i.z > 0) || !microfacet_half(o, 1, i, &h, &length))
+	if (!(o.z > 0 && i.z > 0) || !microfacet_half_vector(o, 1, i, &h, &length))
 		return out;
-	double cosine = min_of(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
-	       both = x->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - x->spec_trans;
+	double cosine = min_of(0.5 * length, 1), facet_pdf = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
+	       both = x->spec_trans * facet_pdf * microfacet_g1_over_cos(m, i), diffuse = 1 - x->spec_trans;
 	if (reflect) {
-		spectrum boundary = principled_boundary(&x->s, cosine),
-			 d = principled_diffuse(&x->s, boundary, o, i, cosine);
+		spectrum boundary = principled_boundary_fresnel(&x->s, cosine),
+			 d = principled_eval_diffuse(&x->s, boundary, o, i, cosine);
 		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, boundary, cosine)),
-				     spectrum_scale(diffuse * (1 - x->through), d));
-		out.pdf = x->chance[THIN_REFLECT] * seen + x->chance[THIN_DIFFUSE] * i.z / WARP_PI;
+				     spectrum_scale(diffuse * (1 - x->diffuse_transmitted), d));
+		out.pdf = x->chance[THIN_REFLECT] * facet_pdf + x->chance[THIN_DIFFUSE_REFLECT] * i.z / WARP_PI;
 	} else {
-		double passes = both * fresnel_dielectric(cosine, x->s.eta).transmitted;
-		out.f = spectrum_scale(passes + diffuse * x->through / WARP_PI, x->s.base);
-		out.pdf = x->chance[THIN_TRANSMIT] * seen + x->chance[THIN_THROUGH] * i.z / WARP_PI;
+		double passes = both * fresnel_dielectric(cosine, x->s.eta).transmittance;
+		out.f = spectrum_scale(passes + diffuse * x->diffuse_transmitted / WARP_PI, x->s.base);
+		out.pdf = x->chance[THIN_TRANSMIT] * facet_pdf + x->chance[THIN_DIFFUSE_TRANSMIT] * i.z / WARP_PI;
 	}
 	return out;
 }
 
 static spectrum thin_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	struct thin_point x = thin_at(b, p, wo);
-	return pair_of(&x, wo, wi).f;
+	struct thin_point x = thin_point_at(b, p, wo);
+	return evaluate(&x, wo, wi).f;
 }
 
 static double thin_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	struct thin_point x = thin_at(b, p, wo);
-	return pair_of(&x, wo, wi).pdf;
+	struct thin_point x = thin_point_at(b, p, wo);
+	return evaluate(&x, wo, wi).pdf;
 }
 
 static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
-	struct thin_point x = thin_at(b, p, wo);
+	struct thin_point x = thin_point_at(b, p, wo);
 	vec3 o = facing_up(wo), wi;
 	double rest = u[2];
 	int lobe = 0;
@@ -148,37 +151,40 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 		rest -= x.chance[lobe++];
 	if (!(x.chance[lobe] > 0))
 		return false;
-	if (lobe == THIN_DIFFUSE || lobe == THIN_THROUGH) {
+	if (lobe == THIN_DIFFUSE_REFLECT || lobe == THIN_DIFFUSE_TRANSMIT) {
 		wi = warp_cosine_hemisphere(u[0], u[1]);
 	} else {
-		wi = microfacet_sample_mirrored(lobe == THIN_REFLECT ? &x.s.facets : &x.passing, o, u[0], u[1]);
+		wi = microfacet_sample_mirrored(lobe == THIN_REFLECT ? &x.s.facets : &x.transmit_facets, o, u[0], u[1]);
 	}
-	bool through = lobe == THIN_TRANSMIT || lobe == THIN_THROUGH;
+	bool transmits = lobe == THIN_TRANSMIT || lobe == THIN_DIFFUSE_TRANSMIT;
 	if (!(wi.z > 0))
 		return false;
-	wi.z = (wo.z > 0) == through ? -wi.z : wi.z;
-	struct pair pair = pair_of(&x, wo, wi);
-	*out = (struct bsdf_sample){
-		.wi = wi, .mode = through ? BSDF_TRANSMIT : BSDF_REFLECT, .pdf = pair.pdf, .f = pair.f, .eta = 1};
-	return pair.pdf > 0;
+	wi.z = (wo.z > 0) == transmits ? -wi.z : wi.z;
+	struct evaluation evaluation = evaluate(&x, wo, wi);
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = transmits ? BSDF_TRANSMIT : BSDF_REFLECT,
+				    .pdf = evaluation.pdf,
+				    .f = evaluation.f,
+				    .eta = 1};
+	return evaluation.pdf > 0;
 }
 
 /* The values of textures are limited to 1, except those of a checkerboard, which may go up to 2 like the parameter
  * itself. */
-static int read_through(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
-			struct error *e)
+static int read_diffuse_transmitted(struct bsdf *b, struct thin *t, const struct scene_node *n,
+				    const struct bsdf_build *build, struct error *e)
 {
 	const struct scene_node *texture = node_ref(n, "diff_trans");
-	t->through = 0.5 * node_float(n, "diff_trans", 0);
+	t->diffuse_transmitted = 0.5 * node_float(n, "diff_trans", 0);
 	if (!texture)
 		return 0;
 	if (strcmp(texture->type, "checkerboard") != 0)
-		return bsdf_number(b, &t->diff_trans, n, "diff_trans", 0, build, e);
-	int code = bsdf_quantity(b, &t->diff_trans, n, "diff_trans", 0, true, build, e);
+		return bsdf_read_number(b, &t->diff_trans, n, "diff_trans", 0, build, e);
+	int code = bsdf_read_quantity(b, &t->diff_trans, n, "diff_trans", 0, true, build, e);
 	if (code)
 		return code;
-	double most = texture_max(&t->diff_trans);
-	return most <= 2 ? 0 : node_error(n, e, ERANGE, "diff_trans=%g is outside [0, 2]", most);
+	double max_value = texture_max(&t->diff_trans);
+	return max_value <= 2 ? 0 : node_error(n, e, ERANGE, "diff_trans=%g is outside [0, 2]", max_value);
 }
 
 /* Reads eta. p.eta becomes the smallest index, at which transmission is sharpest. */
@@ -189,14 +195,14 @@ static int read_index(struct bsdf *b, struct thin *t, const struct scene_node *n
 		t->p.eta = node_float(n, "eta", 1.5);
 		return 0;
 	}
-	int code = bsdf_quantity(b, &t->eta, n, "eta", 0, true, build, e);
+	int code = bsdf_read_quantity(b, &t->eta, n, "eta", 0, true, build, e);
 	if (code)
 		return code;
 	const struct bsdf_range r = bsdf_probe_range(&t->eta, build);
-	if (!(r.least >= THIN_ETA_MIN && texture_max(&t->eta) <= THIN_ETA_MAX))
+	if (!(r.min >= THIN_ETA_MIN && texture_max(&t->eta) <= THIN_ETA_MAX))
 		return node_error(n, e, ERANGE, "eta=%g is outside [%d, %d]",
-				  r.least >= THIN_ETA_MIN ? texture_max(&t->eta) : r.least, THIN_ETA_MIN, THIN_ETA_MAX);
-	t->p.eta = r.least;
+				  r.min >= THIN_ETA_MIN ? texture_max(&t->eta) : r.min, THIN_ETA_MIN, THIN_ETA_MAX);
+	t->p.eta = r.min;
 	return 0;
 }
 
@@ -204,29 +210,33 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 {
 	struct thin *t = b->data;
 	struct principled *p = &t->p;
-	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
+	int code = bsdf_read_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
-		code = bsdf_number(b, &p->roughness, n, "roughness", 0.5, build, e);
+		code = bsdf_read_number(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
-		code = principled_shares(p, b, n, build, e);
+		code = principled_read_shares(p, b, n, build, e);
 	if (!code)
-		code = read_through(b, t, n, build, e);
+		code = read_diffuse_transmitted(b, t, n, build, e);
 	if (!code)
 		code = read_index(b, t, n, build, e);
 	if (code)
 		return code;
 	p->metallic = (struct texture){.color = color_constant(0)};
-	p->base_max = texture_max(&p->base);
-	principled_know(p, build);
-	double spec_trans = p->most[TRANSMISSION];
-	double rough = principled_least(&p->roughness, build);
-	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
-			  passing = principled_facets(p->most[ANISOTROPIC], passing_roughness(p->eta, rough));
-	b->modes = BSDF_REFLECT | (spec_trans > 0 || t->diff_trans.ops || t->through > 0 ? BSDF_TRANSMIT : 0);
+	p->max_base = texture_max(&p->base);
+	principled_precompute(p, build);
+	double spec_trans = p->max_share[PRINCIPLED_TRANSMISSION];
+	double min_roughness = principled_min_value(&p->roughness, build);
+	struct microfacet reflect_facets = principled_facets(p->max_share[PRINCIPLED_ANISOTROPIC], min_roughness),
+			  transmit_facets = principled_facets(p->max_share[PRINCIPLED_ANISOTROPIC],
+							      transmit_roughness(p->eta, min_roughness));
+	b->modes =
+		BSDF_REFLECT | (spec_trans > 0 || t->diff_trans.ops || t->diffuse_transmitted > 0 ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
-	b->two_sided = true;
-	b->alpha = spec_trans > 0 ? fmin(microfacet_least(&facets), microfacet_least(&passing)) : INFINITY;
-	b->alpha_mean = 1 - spec_trans + spec_trans * microfacet_mean(&facets);
+	b->is_two_sided = true;
+	b->min_alpha = spec_trans > 0
+			       ? fmin(microfacet_min_alpha(&reflect_facets), microfacet_min_alpha(&transmit_facets))
+			       : INFINITY;
+	b->mean_alpha = 1 - spec_trans + spec_trans * microfacet_mean_alpha(&reflect_facets);
 	return 0;
 }
 

@@ -3,23 +3,24 @@
 
 #include "worker/render/bsdf/fresnel.h"
 
-enum { SIDE = 16, STEPS = 1024 };
+enum { NORMALS_PER_SIDE = 16, STEPS = 1024 };
 
 /* Returns the share of light at an angle that the boundary reflects to the same side: the integral over visible
  * normals, by the midpoint rule. */
-static double reflected_by(const struct microfacet *m, double eta, double cosine)
+static double boundary_reflectance(const struct microfacet *m, double eta, double cosine)
 {
 	double sum = 0;
 	vec3 v = {sqrt((1 - cosine) * (1 + cosine)), 0, cosine};
-	for (int i = 0; i < SIDE * SIDE; i++) {
-		vec3 h = microfacet_sample_visible(m, v, (i / SIDE + 0.5) / SIDE, (i % SIDE + 0.5) / SIDE);
+	for (int i = 0; i < NORMALS_PER_SIDE * NORMALS_PER_SIDE; i++) {
+		vec3 h = microfacet_sample_visible(m, v, (i / NORMALS_PER_SIDE + 0.5) / NORMALS_PER_SIDE,
+						   (i % NORMALS_PER_SIDE + 0.5) / NORMALS_PER_SIDE);
 		double c = fmin(vec3_dot(v, h), 1);
 		vec3 w = vec3_sub(vec3_scale(2 * c, h), v);
 		if (c > 0 && w.z > 0)
-			sum += fresnel_dielectric(c, eta).reflected *
+			sum += fresnel_dielectric(c, eta).reflectance *
 			       fmin(microfacet_g1_over_cos(m, vec3_normalize(w)) * w.z, 1);
 	}
-	return sum / (SIDE * SIDE);
+	return sum / (NORMALS_PER_SIDE * NORMALS_PER_SIDE);
 }
 
 static double node_cosine(int i)
@@ -28,7 +29,7 @@ static double node_cosine(int i)
 	return x * x;
 }
 
-static double look_up(const double row[BOUNDARY_NODES], double cosine)
+static double interpolate_row(const double row[BOUNDARY_NODES], double cosine)
 {
 	double x = sqrt(fmin(cosine, 1)) * (BOUNDARY_NODES - 1);
 	int i = x < BOUNDARY_NODES - 2 ? (int)x : BOUNDARY_NODES - 2;
@@ -36,55 +37,55 @@ static double look_up(const double row[BOUNDARY_NODES], double cosine)
 	return (1 - t) * row[i] + t * row[i + 1];
 }
 
-static void tabulate(const struct boundary_table *t, int row)
+static void tabulate_row(const struct boundary_table *t, int row)
 {
 	struct microfacet m;
 	struct boundary_row *r = &t->row[row];
-	double alpha = t->least * exp(row * t->step), sum = 0;
-	microfacet_set(&m, t->ggx, alpha, alpha);
+	double alpha = t->min_alpha * exp(row * t->log_step), sum = 0;
+	microfacet_init(&m, t->is_ggx, alpha, alpha);
 	for (int i = 0; i < BOUNDARY_NODES; i++)
-		r->transmitted[i] = 1 - reflected_by(&m, t->eta, node_cosine(i));
+		r->transmittance[i] = 1 - boundary_reflectance(&m, t->eta, node_cosine(i));
 	for (int i = 0; i < STEPS; i++) {
 		double c = (i + 0.5) / STEPS;
-		sum += look_up(r->transmitted, c) * 2 * c;
+		sum += interpolate_row(r->transmittance, c) * 2 * c;
 	}
 	r->escape = sum / STEPS;
 }
 
-static const struct boundary_table *find_table(const struct boundary_table *like, const struct boundary_table *made)
+static const struct boundary_table *find_table(const struct boundary_table *wanted, const struct boundary_table *tables)
 {
-	for (const struct boundary_table *t = made; t; t = t->next)
-		if (t->ggx == like->ggx && t->eta == like->eta && t->least == like->least && t->step == like->step &&
-		    t->rows == like->rows)
+	for (const struct boundary_table *t = tables; t; t = t->next)
+		if (t->is_ggx == wanted->is_ggx && t->eta == wanted->eta && t->min_alpha == wanted->min_alpha &&
+		    t->log_step == wanted->log_step && t->row_count == wanted->row_count)
 			return t;
 	return NULL;
 }
 
 /* Returns a table that the scene has already, or a new one. NULL if out of memory. */
-static const struct boundary_table *table_of(const struct rough_map *roughness, double eta,
-					     const struct bsdf_build *build)
+static const struct boundary_table *get_table(const struct rough_map *roughness, double eta,
+					      const struct bsdf_build *build)
 {
-	struct boundary_table wanted = {.ggx = roughness->fixed.ggx,
+	struct boundary_table wanted = {.is_ggx = roughness->narrowest_facets.is_ggx,
 					.eta = eta,
-					.least = roughness->fixed.alpha,
-					.rows = 1,
-					.next = build->boundaries ? *build->boundaries : NULL};
-	if (roughness->varies && roughness->most > wanted.least) {
-		wanted.rows = BOUNDARY_ROWS;
-		wanted.step = log(roughness->most / wanted.least) / (BOUNDARY_ROWS - 1);
+					.min_alpha = roughness->narrowest_facets.alpha,
+					.row_count = 1,
+					.next = build->boundary_tables ? *build->boundary_tables : NULL};
+	if (roughness->varies && roughness->max_alpha > wanted.min_alpha) {
+		wanted.row_count = BOUNDARY_ROWS;
+		wanted.log_step = log(roughness->max_alpha / wanted.min_alpha) / (BOUNDARY_ROWS - 1);
 	}
 	const struct boundary_table *found = find_table(&wanted, wanted.next);
 	if (found)
 		return found;
 	struct boundary_table *t = arena_alloc(build->arena, 1, sizeof *t);
-	wanted.row = arena_alloc(build->arena, (size_t)wanted.rows, sizeof *wanted.row);
+	wanted.row = arena_alloc(build->arena, (size_t)wanted.row_count, sizeof *wanted.row);
 	if (!t || !wanted.row)
 		return NULL;
 	*t = wanted;
-	for (int i = 0; i < t->rows; i++)
-		tabulate(t, i);
-	if (build->boundaries)
-		*build->boundaries = t;
+	for (int i = 0; i < t->row_count; i++)
+		tabulate_row(t, i);
+	if (build->boundary_tables)
+		*build->boundary_tables = t;
 	return t;
 }
 
@@ -92,46 +93,47 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 			const struct bsdf_build *build, struct error *e)
 {
 	int code = rough_map_read(&r->roughness, b, n, build, e);
-	bool both = node_find(n, "alpha_u") || node_find(n, "alpha_v");
-	if (!code && (r->roughness.fixed.ratio != 1 || (r->roughness.varies && both)))
+	bool has_alpha_uv = node_find_property(n, "alpha_u") || node_find_property(n, "alpha_v");
+	if (!code && (r->roughness.narrowest_facets.ratio != 1 || (r->roughness.varies && has_alpha_uv)))
 		code = node_error(n, e, ENOTSUP, "alpha_u and alpha_v differ; only isotropic coatings are supported");
 	if (code)
 		return code;
-	r->table = table_of(&r->roughness, eta, build);
+	r->table = get_table(&r->roughness, eta, build);
 	return r->table ? 0 : node_error(n, e, ENOMEM, "out of memory");
 }
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p)
 {
 	const struct boundary_table *t = r->table;
-	struct boundary_point at = {.of = t, .facets = rough_map_at(&r->roughness, p)};
-	if (t->rows > 1) {
-		double x = fmin(fmax(log(at.facets.alpha / t->least) / t->step, 0), t->rows - 1);
-		at.row = x < t->rows - 2 ? (int)x : t->rows - 2;
-		at.rest = x - at.row;
+	struct boundary_point point = {.table = t, .facets = rough_map_at(&r->roughness, p)};
+	if (t->row_count > 1) {
+		double x = fmin(fmax(log(point.facets.alpha / t->min_alpha) / t->log_step, 0), t->row_count - 1);
+		point.row = x < t->row_count - 2 ? (int)x : t->row_count - 2;
+		point.row_fraction = x - point.row;
 	}
-	return at;
+	return point;
 }
 
-static double lerp(double rest, double here, double next)
+static double lerp(double t, double a, double b)
 {
-	return rest > 0 ? (1 - rest) * here + rest * next : here;
+	return t > 0 ? (1 - t) * a + t * b : a;
 }
 
-double boundary_transmitted(const struct boundary_point *at, double cosine)
+double rough_boundary_transmittance(const struct boundary_point *point, double cosine)
 {
-	const struct boundary_row *r = &at->of->row[at->row];
-	double here = look_up(r->transmitted, cosine);
-	return at->rest > 0 ? lerp(at->rest, here, look_up(r[1].transmitted, cosine)) : here;
+	const struct boundary_row *r = &point->table->row[point->row];
+	double value = interpolate_row(r->transmittance, cosine);
+	return point->row_fraction > 0 ? lerp(point->row_fraction, value, interpolate_row(r[1].transmittance, cosine))
+				       : value;
 }
 
-double boundary_escape(const struct boundary_point *at)
+double rough_boundary_escape(const struct boundary_point *point)
 {
-	const struct boundary_row *r = &at->of->row[at->row];
-	return at->rest > 0 ? lerp(at->rest, r->escape, r[1].escape) : r->escape;
+	const struct boundary_row *r = &point->table->row[point->row];
+	return point->row_fraction > 0 ? lerp(point->row_fraction, r->escape, r[1].escape) : r->escape;
 }
 
-double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf)
+double rough_boundary_reflect(const struct boundary_point *point, vec3 wo, vec3 wi, double *pdf)
 {
-	return microfacet_reflect(&at->facets, at->of->eta, wo, wi, pdf);
+	return microfacet_reflect(&point->facets, point->table->eta, wo, wi, pdf);
 }

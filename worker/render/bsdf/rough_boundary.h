@@ -14,15 +14,15 @@
 enum { BOUNDARY_NODES = 48, BOUNDARY_ROWS = 12 };
 
 struct boundary_row {
-	double transmitted[BOUNDARY_NODES]; /* of light from outside, at the cosines (i / (BOUNDARY_NODES - 1))^2 */
+	double transmittance[BOUNDARY_NODES]; /* of light from outside, at the cosines (i / (BOUNDARY_NODES - 1))^2 */
 	double escape; /* twice the integral of that transmittance times the cosine, over the cosine */
 };
 
 struct boundary_table {
-	bool ggx;
-	double eta;	    /* index below over index above */
-	double least, step; /* row i has the roughness least * exp(i * step) */
-	int rows;
+	bool is_ggx;
+	double eta;		    /* index below over index above */
+	double min_alpha, log_step; /* row i has the roughness least * exp(i * step) */
+	int row_count;
 	struct boundary_row *row;
 	struct boundary_table *next; /* the next table of the scene */
 };
@@ -34,10 +34,10 @@ struct rough_boundary {
 
 /* The boundary at a point of the surface. */
 struct boundary_point {
-	const struct boundary_table *of;
+	const struct boundary_table *table;
 	struct microfacet facets;
 	int row;
-	double rest; /* fraction towards the next row */
+	double row_fraction; /* fraction towards the next row */
 };
 
 /* Reads alpha, alpha_u, alpha_v and distribution; sets b's texture flags and roughness. -ENOTSUP if the roughness is
@@ -54,11 +54,11 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p);
 /* Returns the share of light from outside, at this cosine, that the boundary transmits. */
-double boundary_transmitted(const struct boundary_point *at, double cosine);
+double rough_boundary_transmittance(const struct boundary_point *at, double cosine);
 /* Returns the share of diffuse light from inside that leaves, times eta^2. */
-double boundary_escape(const struct boundary_point *at);
+double rough_boundary_escape(const struct boundary_point *at);
 
 /* Calls microfacet_reflect() with the facets and the index of this boundary. */
-double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf);
+double rough_boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf);
 
 #endif

@@ -7,11 +7,11 @@
 #include "worker/render/bsdf/microfacet.h"
 
 struct rough_map {
-	struct microfacet
-		fixed; /* if `varies`, those of the smallest roughness that bsdf_probe finds: step sizes depend on it */
-	double most;   /* if `varies`: the largest alpha_u found */
+	struct microfacet narrowest_facets; /* if `varies`, those of the smallest roughness that bsdf_probe_point finds:
+					       step sizes depend on it */
+	double max_alpha;		    /* if `varies`: the largest alpha_u found */
 	bool varies;
-	struct texture u, v; /* if `varies`: the roughness along u and v */
+	struct texture alpha_u, alpha_v; /* if `varies`: the roughness along u and v */
 };
 
 /* Reads alpha, alpha_u, alpha_v and distribution. Sets b's texture flags and roughness. Returns 0 or a negative error
@@ -29,11 +29,11 @@ int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node 
 		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED       \
 	}
 
-struct microfacet rough_map_look_up(const struct rough_map *r, const struct bsdf_point *p);
+struct microfacet rough_map_eval(const struct rough_map *r, const struct bsdf_point *p);
 
 static inline struct microfacet rough_map_at(const struct rough_map *r, const struct bsdf_point *p)
 {
-	return r->varies ? rough_map_look_up(r, p) : r->fixed;
+	return r->varies ? rough_map_eval(r, p) : r->narrowest_facets;
 }
 
 #endif

@@ -15,18 +15,18 @@ struct facet {
 	double pdf;    /* D G1(wo) / 4 wo.z, the density of wi */
 };
 
-static bool facet_of(const struct microfacet *m, vec3 wo, vec3 wi, struct facet *f)
+static bool find_facet(const struct microfacet *m, vec3 wo, vec3 wi, struct facet *f)
 {
 	double length;
-	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(wo, 1, wi, &f->h, &length))
+	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half_vector(wo, 1, wi, &f->h, &length))
 		return false;
 	f->cosine = 0.5 * length;
 	f->pdf = 0.25 * microfacet_d(m, f->h) * microfacet_g1_over_cos(m, wo);
 	return f->pdf > 0;
 }
 
-static spectrum facet_f(const struct roughconductor *r, const struct microfacet *m, const struct bsdf_point *p, vec3 wi,
-			const struct facet *f)
+static spectrum eval_facet(const struct roughconductor *r, const struct microfacet *m, const struct bsdf_point *p,
+			   vec3 wi, const struct facet *f)
 {
 	return spectrum_scale(f->pdf * microfacet_g1_over_cos(m, wi), metal_fresnel(&r->metal, p, f->cosine));
 }
@@ -36,7 +36,7 @@ static spectrum roughconductor_eval(const struct bsdf *b, const struct bsdf_poin
 	const struct roughconductor *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_of(&m, wo, wi, &f) ? facet_f(r, &m, p, wi, &f) : spectrum_of(0);
+	return find_facet(&m, wo, wi, &f) ? eval_facet(r, &m, p, wi, &f) : spectrum_constant(0);
 }
 
 static spectrum roughconductor_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -44,9 +44,9 @@ static spectrum roughconductor_eval_halfvec(const struct bsdf *b, const struct b
 	const struct roughconductor *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	if (!facet_of(&m, wo, wi, &f))
-		return spectrum_of(0);
-	return spectrum_scale(4 * f.cosine * f.h.z * f.h.z * f.h.z * wi.z, facet_f(r, &m, p, wi, &f));
+	if (!find_facet(&m, wo, wi, &f))
+		return spectrum_constant(0);
+	return spectrum_scale(4 * f.cosine * f.h.z * f.h.z * f.h.z * wi.z, eval_facet(r, &m, p, wi, &f));
 }
 
 static double roughconductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -54,7 +54,7 @@ static double roughconductor_pdf(const struct bsdf *b, const struct bsdf_point *
 	const struct roughconductor *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_of(&m, wo, wi, &f) ? f.pdf : 0;
+	return find_facet(&m, wo, wi, &f) ? f.pdf : 0;
 }
 
 static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -66,10 +66,10 @@ static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point 
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	vec3 wi = microfacet_sample_mirrored(&m, wo, u[0], u[1]);
 	struct facet f;
-	if (!facet_of(&m, wo, wi, &f))
+	if (!find_facet(&m, wo, wi, &f))
 		return false;
 	*out = (struct bsdf_sample){
-		.wi = wi, .mode = BSDF_REFLECT, .pdf = f.pdf, .f = facet_f(r, &m, p, wi, &f), .eta = 1};
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = f.pdf, .f = eval_facet(r, &m, p, wi, &f), .eta = 1};
 	return true;
 }
 
@@ -82,9 +82,9 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 		return code;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	if (!r->roughness.varies && b->alpha < build->least_roughness) {
+	if (!r->roughness.varies && b->min_alpha < build->min_roughness) {
 		extern const struct bsdf_ops bsdf_ops_conductor;
-		bsdf_make_smooth(b, &bsdf_ops_conductor);
+		bsdf_make_specular(b, &bsdf_ops_conductor);
 	}
 	return metal_read(&r->metal, b, n, build, e);
 }

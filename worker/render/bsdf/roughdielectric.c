@@ -25,10 +25,11 @@ struct facet {
 
 /* Finds the facet that scatters light between wo, with wo.z > 0, and wi. Returns false if there is none. The Fresnel
  * factors are computed from both cosines: near the critical angle, neither determines the other precisely. */
-static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
+static bool find_facet(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
 	bool reflect = wi.z > 0;
-	if (wi.z == 0 || (!reflect && eta == 1) || !microfacet_half(wo, reflect ? 1 : eta, wi, &f->h, &f->length))
+	if (wi.z == 0 || (!reflect && eta == 1) ||
+	    !microfacet_half_vector(wo, reflect ? 1 : eta, wi, &f->h, &f->length))
 		return false;
 	if (f->h.z < 0)
 		f->h = vec3_neg(f->h);
@@ -57,7 +58,7 @@ static double facet_spread(const struct facet *f, bool reflect)
 	return f->cos_o * -f->cos_i * root * root;
 }
 
-static vec3 mirror(vec3 v, bool below)
+static vec3 mirror_if_below(vec3 v, bool below)
 {
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
@@ -67,9 +68,11 @@ static spectrum fresnel_factor(const struct roughdielectric *r, const struct bsd
 			       bool reflect, enum transport transport)
 {
 	if (reflect)
-		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, &p->where, p->w));
+		return spectrum_scale(f->fresnel.reflectance,
+				      texture_eval(&r->glass.reflectance, &p->texture_point, p->wavelengths));
 	double scale = transport == TRANSPORT_RADIANCE ? 1 / (f->eta * f->eta) : 1;
-	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, &p->where, p->w));
+	return spectrum_scale(f->fresnel.transmittance * scale,
+			      texture_eval(&r->glass.transmittance, &p->texture_point, p->wavelengths));
 }
 
 /* Returns G1(wi) / |wi.z| for wi on either side. */
@@ -78,8 +81,8 @@ static double g1_over_cos(const struct microfacet *m, vec3 wi)
 	return microfacet_g1_over_cos(m, (vec3){wi.x, wi.y, fabs(wi.z)});
 }
 
-static spectrum facet_f(const struct roughdielectric *r, const struct microfacet *m, const struct bsdf_point *p,
-			const struct facet *f, vec3 wi)
+static spectrum eval_facet(const struct roughdielectric *r, const struct microfacet *m, const struct bsdf_point *p,
+			   const struct facet *f, vec3 wi)
 {
 	double common = f->d * g1_over_cos(m, wi) * facet_spread(f, wi.z > 0);
 	return spectrum_scale(common, fresnel_factor(r, p, f, wi.z > 0, p->transport));
@@ -87,17 +90,17 @@ static spectrum facet_f(const struct roughdielectric *r, const struct microfacet
 
 static double facet_pdf(const struct facet *f, vec3 wi)
 {
-	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
+	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflectance : f->fresnel.transmittance);
 }
 
-/* Calls facet_of() for directions on any side; mirrors *wi such that wo is on the side of the normal. */
-static bool facet_between(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p, vec3 wo,
-			  vec3 *wi, struct facet *f)
+/* Calls find_facet() for directions on any side; mirrors *wi such that wo is on the side of the normal. */
+static bool find_facet_on_any_side(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p,
+				   vec3 wo, vec3 *wi, struct facet *f)
 {
 	bool below = wo.z < 0;
-	double eta = bsdf_eta(b, p->w);
-	*wi = mirror(*wi, below);
-	return wo.z != 0 && facet_of(m, below ? 1 / eta : eta, mirror(wo, below), *wi, f);
+	double eta = bsdf_eta(b, p->wavelengths);
+	*wi = mirror_if_below(*wi, below);
+	return wo.z != 0 && find_facet(m, below ? 1 / eta : eta, mirror_if_below(wo, below), *wi, f);
 }
 
 static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -105,7 +108,7 @@ static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_poi
 	const struct roughdielectric *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_between(b, &m, p, wo, &wi, &f) ? facet_f(r, &m, p, &f, wi) : spectrum_of(0);
+	return find_facet_on_any_side(b, &m, p, wo, &wi, &f) ? eval_facet(r, &m, p, &f, wi) : spectrum_constant(0);
 }
 
 /* The solid angle of h over that of wi has been cancelled with its inverse: they diverge or vanish as eta approaches
@@ -115,8 +118,8 @@ static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct 
 	const struct roughdielectric *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	if (!facet_between(b, &m, p, wo, &wi, &f))
-		return spectrum_of(0);
+	if (!find_facet_on_any_side(b, &m, p, wo, &wi, &f))
+		return spectrum_constant(0);
 	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(&m, wi) * fabs(wi.z);
 	return spectrum_scale(common, fresnel_factor(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
 }
@@ -126,7 +129,7 @@ static double roughdielectric_pdf(const struct bsdf *b, const struct bsdf_point 
 	const struct roughdielectric *r = b->data;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_between(b, &m, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
+	return find_facet_on_any_side(b, &m, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
 }
 
 static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -136,30 +139,30 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 	bool below = wo.z < 0;
 	if (wo.z == 0)
 		return false;
-	wo = mirror(wo, below);
-	double ratio = bsdf_eta(b, p->w), eta = below ? 1 / ratio : ratio;
+	wo = mirror_if_below(wo, below);
+	double ratio = bsdf_eta(b, p->wavelengths), eta = below ? 1 / ratio : ratio;
 	struct microfacet m = rough_map_at(&r->roughness, p);
 	vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]), wi;
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
 		return false;
 	struct fresnel at_h = fresnel_dielectric(c, eta);
-	bool reflect = u[2] < at_h.reflected;
+	bool reflect = u[2] < at_h.reflectance;
 	if (reflect)
 		wi = vec3_sub(vec3_scale(2 * c, h), wo);
 	else
 		wi = vec3_madd(vec3_scale(-1 / eta, wo), c / eta - at_h.cos_t, h);
 	wi = vec3_normalize(wi);
 	struct facet f;
-	if (reflect != (wi.z > 0) || !facet_of(&m, eta, wo, wi, &f))
+	if (reflect != (wi.z > 0) || !find_facet(&m, eta, wo, wi, &f))
 		return false;
 	double pdf = facet_pdf(&f, wi);
 	if (!(pdf > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = mirror(wi, below),
+	*out = (struct bsdf_sample){.wi = mirror_if_below(wi, below),
 				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
 				    .pdf = pdf,
-				    .f = facet_f(r, &m, p, &f, wi),
+				    .f = eval_facet(r, &m, p, &f, wi),
 				    .eta = reflect ? 1 : eta};
 	return true;
 }
@@ -176,9 +179,9 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
 	/* With equal indices no facet refracts: all light passes straight through. */
-	if ((b->eta == 1 && !b->dispersive) || (!r->roughness.varies && b->alpha < build->least_roughness)) {
+	if ((b->eta == 1 && !b->is_dispersive) || (!r->roughness.varies && b->min_alpha < build->min_roughness)) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
-		bsdf_make_smooth(b, &bsdf_ops_dielectric);
+		bsdf_make_specular(b, &bsdf_ops_dielectric);
 	}
 	return 0;
 }

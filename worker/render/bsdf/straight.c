@@ -13,11 +13,11 @@
 
 struct filter {
 	struct texture transmittance;
-	double share; /* share of light that passes, a factor of the texture */
+	double transmitted_share; /* share of light that passes, a factor of the texture */
 };
 
 /* Returns false if 1 / |wo.z| is not finite. */
-static bool straight_direction(vec3 wo, vec3 *wi)
+static bool pass_straight(vec3 wo, vec3 *wi)
 {
 	*wi = vec3_neg(wo);
 	return fabs(wo.z) >= DBL_MIN;
@@ -27,10 +27,10 @@ static spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_poin
 				    double *chance)
 {
 	const struct filter *f = b->data;
-	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
-		return spectrum_of(0);
+	if (!(mode & BSDF_TRANSMIT) || !pass_straight(wo, wi))
+		return spectrum_constant(0);
 	*chance = 1;
-	return spectrum_scale(f->share, texture_eval(&f->transmittance, &p->where, p->w));
+	return spectrum_scale(f->transmitted_share, texture_eval(&f->transmittance, &p->texture_point, p->wavelengths));
 }
 
 static bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -40,37 +40,39 @@ static bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
 
-static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
-		  struct error *e)
+static int create_filter(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
+			 struct error *e)
 {
 	struct filter *f = b->data;
-	int code = bsdf_texture(b, &f->transmittance, n, "transmittance", 1, build, e);
+	int code = bsdf_read_texture(b, &f->transmittance, n, "transmittance", 1, build, e);
 	if (code)
 		return code;
-	f->share = share;
+	f->transmitted_share = share;
 	b->modes = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
-	b->only_straight = true;
+	b->transmits_only_straight = true;
 	b->has_delta = true;
-	b->two_sided = true;
-	b->alpha = b->alpha_mean = 0;
-	b->black = texture_max(&f->transmittance) == 0;
+	b->is_two_sided = true;
+	b->min_alpha = b->mean_alpha = 0;
+	b->is_black = texture_max(&f->transmittance) == 0;
 	return 0;
 }
 
-static int half_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int create_half_filter(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			      struct error *e)
 {
-	return create(b, n, build, 0.5, e);
+	return create_filter(b, n, build, 0.5, e);
 }
 
-static int whole_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int create_full_filter(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			      struct error *e)
 {
-	return create(b, n, build, 1, e);
+	return create_filter(b, n, build, 1, e);
 }
 
 static int null_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	b->passes = true;
-	return create(b, n, build, 1, e);
+	b->is_see_through = true;
+	return create_filter(b, n, build, 1, e);
 }
 
 #define STRAIGHT_OPS(NAME, CREATE, PARAMETERS)                                 \
@@ -78,17 +80,17 @@ static int null_create(struct bsdf *b, const struct scene_node *n, const struct 
 		.decl = {PLUGIN_BSDF, #NAME, PARAMETERS, 0, PARAM_UNDERSTOOD}, \
 		.data_size = sizeof(struct filter),                            \
 		.create = CREATE,                                              \
-		.eval = bsdf_no_eval,                                          \
-		.pdf_solid = bsdf_no_pdf,                                      \
+		.eval = bsdf_eval_zero,                                        \
+		.pdf_solid = bsdf_pdf_zero,                                    \
 		.eval_delta = straight_eval_delta,                             \
 		.sample = straight_sample,                                     \
 	}
 STRAIGHT_OPS(null, null_create, NULL);
-STRAIGHT_OPS(polarizer, half_create,
+STRAIGHT_OPS(polarizer, create_half_filter,
 	     PARAMS({.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		    {.name = "theta", .status = PARAM_IGNORED}, {.name = "polarizing", .status = PARAM_IGNORED}));
-STRAIGHT_OPS(circular, half_create,
+STRAIGHT_OPS(circular, create_half_filter,
 	     PARAMS({.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 		    {.name = "left_handed", .status = PARAM_IGNORED}));
-STRAIGHT_OPS(retarder, whole_create,
+STRAIGHT_OPS(retarder, create_full_filter,
 	     PARAMS({.name = "theta", .status = PARAM_IGNORED}, {.name = "delta", .status = PARAM_IGNORED}));

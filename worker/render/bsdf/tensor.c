@@ -13,54 +13,55 @@
 #include <errno.h>
 #include <string.h>
 
-enum { MAGIC = 12, HEAD = MAGIC + 2 + 4, MAJOR = 1, TYPES = 11 };
+enum { MAGIC_BYTES = 12, HEADER_BYTES = MAGIC_BYTES + 2 + 4, VERSION_MAJOR = 1, TYPE_MAX = 11 };
 
-static unsigned width_of(unsigned type)
+static unsigned number_bytes(unsigned type)
 {
-	static const unsigned char widths[TYPES + 1] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
-	return type <= TYPES ? widths[type] : 0;
+	static const unsigned char widths[TYPE_MAX + 1] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
+	return type <= TYPE_MAX ? widths[type] : 0;
 }
 
 /* Reads the header of an array; at: offset of its type. */
-static int read_array(const unsigned char *file, size_t size, size_t at, unsigned dimensions, struct tensor *out)
+static int read_array_header(const unsigned char *file, size_t size, size_t header, unsigned dimensions,
+			     struct tensor *out)
 {
-	*out = (struct tensor){.type = file[at], .dimensions = dimensions, .count = 1};
-	uint64_t first = get64(file + at + 1);
-	unsigned width = width_of(out->type);
-	if (width == 0 || dimensions > TENSOR_DIMENSIONS_MAX || first > size)
+	*out = (struct tensor){.type = file[header], .dimension_count = dimensions, .count = 1};
+	uint64_t data_offset = get64(file + header + 1);
+	unsigned width = number_bytes(out->type);
+	if (width == 0 || dimensions > TENSOR_DIMENSIONS_MAX || data_offset > size)
 		return -EINVAL;
-	uint64_t room = (size - first) / width;
+	uint64_t capacity = (size - data_offset) / width;
 	for (unsigned i = 0; i < dimensions; i++) {
-		out->shape[i] = get64(file + at + 9 + 8 * (size_t)i);
-		if (out->shape[i] > room)
+		out->shape[i] = get64(file + header + 9 + 8 * (size_t)i);
+		if (out->shape[i] > capacity)
 			return -EINVAL;
-		room = out->shape[i] ? room / out->shape[i] : room;
+		capacity = out->shape[i] ? capacity / out->shape[i] : capacity;
 		out->count *= out->shape[i];
 	}
-	out->bytes = file + first;
+	out->bytes = file + data_offset;
 	return 0;
 }
 
 int tensor_find(const unsigned char *file, size_t size, const char *name, struct tensor *out)
 {
-	if (size < HEAD || memcmp(file, "tensor_file", MAGIC) != 0)
+	if (size < HEADER_BYTES || memcmp(file, "tensor_file", MAGIC_BYTES) != 0)
 		return -EINVAL;
-	if (file[MAGIC] != MAJOR)
+	if (file[MAGIC_BYTES] != VERSION_MAJOR)
 		return -ENOTSUP;
-	size_t at = HEAD, wanted = strlen(name);
-	for (uint32_t left = get32(file + MAGIC + 2); left > 0; left--) {
-		if (size - at < 2)
+	size_t offset = HEADER_BYTES, name_length = strlen(name);
+	for (uint32_t remaining = get32(file + MAGIC_BYTES + 2); remaining > 0; remaining--) {
+		if (size - offset < 2)
 			return -EINVAL;
-		size_t length = get16(file + at), begin = at + 2;
+		size_t length = get16(file + offset), begin = offset + 2;
 		if (size - begin < length + 2 + 1 + 8)
 			return -EINVAL;
-		at = begin + length;
-		unsigned dimensions = get16(file + at);
-		if (size - at - (2 + 1 + 8) < 8 * (size_t)dimensions)
+		offset = begin + length;
+		unsigned dimensions = get16(file + offset);
+		if (size - offset - (2 + 1 + 8) < 8 * (size_t)dimensions)
 			return -EINVAL;
-		if (length == wanted && memcmp(file + begin, name, length) == 0)
-			return read_array(file, size, at + 2, dimensions, out);
-		at += 2 + 1 + 8 + 8 * (size_t)dimensions;
+		if (length == name_length && memcmp(file + begin, name, length) == 0)
+			return read_array_header(file, size, offset + 2, dimensions, out);
+		offset += 2 + 1 + 8 + 8 * (size_t)dimensions;
 	}
 	return -ENOENT;
 }

@@ -11,7 +11,7 @@ enum { TENSOR_DIMENSIONS_MAX = 8 };
 
 struct tensor {
 	unsigned type;
-	unsigned dimensions;
+	unsigned dimension_count;
 	uint64_t shape[TENSOR_DIMENSIONS_MAX]; /* row-major: the last index varies fastest */
 	uint64_t count;			       /* product of the sizes */
 	const unsigned char *bytes;	       /* `count` numbers, all of them within the file */

@@ -21,7 +21,7 @@ struct tensor_input {
 };
 
 /* Sets the error to the sentence "FILE: NAME WHAT". Returns -code. */
-int tensor_fault(const struct tensor_input *in, int code, const char *name, const char *what);
+int tensor_input_error(const struct tensor_input *in, int code, const char *name, const char *what);
 
 /* Finds an array of the given type and number of dimensions, with sides from 1 to 65,536. Returns 0, -EINVAL or
  * -ENOTSUP. */
@@ -37,11 +37,11 @@ bool tensor_is_usable(const struct tensor *t, uint64_t i);
 /* Returns 0 if all numbers of t are usable, otherwise -EINVAL. */
 int tensor_check_finite(const struct tensor_input *in, const struct tensor *t, const char *name);
 /* Converts all numbers to doubles in *out, or sets it to NULL and returns -EINVAL or -ENOMEM. */
-int tensor_numbers(const struct tensor_input *in, const struct tensor *t, const char *name, double **out);
+int tensor_read_numbers(const struct tensor_input *in, const struct tensor *t, const char *name, double **out);
 /* Reads strictly ascending numbers from an array of one dimension, or of two if the first size is 1. Returns 0,
  * -EINVAL, -ENOTSUP or -ENOMEM. */
-int tensor_axis(const struct tensor_input *in, const char *name, enum tensor_type type, unsigned dimensions,
-		uint32_t *count, const double **at);
+int tensor_read_axis(const struct tensor_input *in, const char *name, enum tensor_type type, unsigned dimensions,
+		     uint32_t *count, const double **at);
 
 /* Computes the weight of each wavelength in R, G and B under D65, for spectra that are linear between the wavelengths
  * and constant beyond. -ENOMEM. */

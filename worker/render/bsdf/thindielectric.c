@@ -17,31 +17,32 @@ struct thin {
 };
 
 /* Returns 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision if it is small. */
-static struct fresnel fresnel_of_sheet(const struct thin *t, vec3 wo)
+static struct fresnel sheet_fresnel(const struct thin *t, vec3 wo)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), t->eta);
-	double both = 1 / (1 + f.reflected);
-	return (struct fresnel){2 * f.reflected * both, f.transmitted * both, 0};
+	double both = 1 / (1 + f.reflectance);
+	return (struct fresnel){2 * f.reflectance * both, f.transmittance * both, 0};
 }
 
 static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				double *chance)
 {
 	const struct thin *t = b->data;
-	struct fresnel f = fresnel_of_sheet(t, wo);
+	struct fresnel f = sheet_fresnel(t, wo);
 	bool reflect = mode & BSDF_REFLECT;
-	double share = reflect ? f.reflected : f.transmitted;
+	double share = reflect ? f.reflectance : f.transmittance;
 	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
 	*chance = fresnel_chance(&f, reflect);
-	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, &p->where, p->w));
+	return spectrum_scale(
+		share, texture_eval(reflect ? &t->reflectance : &t->transmittance, &p->texture_point, p->wavelengths));
 }
 
 static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
-	struct fresnel f = fresnel_of_sheet(b->data, wo);
+	struct fresnel f = sheet_fresnel(b->data, wo);
 	bool reflect = u[2] < fresnel_chance(&f, true);
 	return bsdf_sample_delta(b, p, wo, reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
@@ -54,18 +55,18 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!code)
 		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
 	if (!code)
-		code = bsdf_texture(b, &t->reflectance, n, "specular_reflectance", 1, build, e);
+		code = bsdf_read_texture(b, &t->reflectance, n, "specular_reflectance", 1, build, e);
 	if (!code)
-		code = bsdf_texture(b, &t->transmittance, n, "specular_transmittance", 1, build, e);
+		code = bsdf_read_texture(b, &t->transmittance, n, "specular_transmittance", 1, build, e);
 	if (code)
 		return code;
 	t->eta = inside / outside;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
-	b->only_straight = true;
+	b->transmits_only_straight = true;
 	b->has_delta = true;
-	b->two_sided = true;
-	b->alpha = b->alpha_mean = 0;
-	b->black = texture_max(&t->reflectance) == 0 && texture_max(&t->transmittance) == 0;
+	b->is_two_sided = true;
+	b->min_alpha = b->mean_alpha = 0;
+	b->is_black = texture_max(&t->reflectance) == 0 && texture_max(&t->transmittance) == 0;
 	return 0;
 }
 
@@ -76,8 +77,8 @@ const struct bsdf_ops bsdf_ops_thindielectric = {
 		       MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct thin),
 	.create = thin_create,
-	.eval = bsdf_no_eval,
-	.pdf_solid = bsdf_no_pdf,
+	.eval = bsdf_eval_zero,
+	.pdf_solid = bsdf_pdf_zero,
 	.eval_delta = thin_eval_delta,
 	.sample = thin_sample,
 };

@@ -18,19 +18,19 @@ static vec3 mirror(vec3 v)
 /* Returns a shading frame in coordinates mirrored at the surface. */
 static struct frame mirrored_frame(const void *front, const struct relief *r)
 {
-	const struct relief_place *place = front;
-	struct frame f = place->frame(place->point, r);
+	const struct relief_frames *relief_frames = front;
+	struct frame f = relief_frames->get_frame(relief_frames->context, r);
 	return (struct frame){mirror(f.s), mirror(f.t), vec3_neg(mirror(f.n))};
 }
 
 /* Returns the point for the BSDF of the back, which sees everything mirrored: p itself, or q if frames have to be
  * mirrored; q must outlive the result. */
-static const struct bsdf_point *from_back(const struct bsdf *b, const struct bsdf_point *p, struct bsdf_point *q)
+static const struct bsdf_point *back_point(const struct bsdf *b, const struct bsdf_point *p, struct bsdf_point *q)
 {
-	if (!b->uses_place || !p->place.frame)
+	if (!b->uses_relief_frames || !p->relief_frames.get_frame)
 		return p;
 	*q = *p;
-	q->place = (struct relief_place){&p->place, mirrored_frame};
+	q->relief_frames = (struct relief_frames){&p->relief_frames, mirrored_frame};
 	return q;
 }
 
@@ -40,7 +40,7 @@ static spectrum twosided_eval(const struct bsdf *b, const struct bsdf_point *p, 
 	if (wo.z > 0)
 		return t->side[0].ops->eval(&t->side[0], p, wo, wi);
 	struct bsdf_point q;
-	return t->side[1].ops->eval(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
+	return t->side[1].ops->eval(&t->side[1], back_point(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -49,7 +49,7 @@ static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	if (wo.z > 0)
 		return t->side[0].ops->pdf_solid(&t->side[0], p, wo, wi);
 	struct bsdf_point q;
-	return t->side[1].ops->pdf_solid(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
+	return t->side[1].ops->pdf_solid(&t->side[1], back_point(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -58,7 +58,7 @@ static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_po
 	if (wo.z > 0)
 		return bsdf_eval_halfvec(&t->side[0], p, wo, wi);
 	struct bsdf_point q;
-	return bsdf_eval_halfvec(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
+	return bsdf_eval_halfvec(&t->side[1], back_point(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
@@ -68,7 +68,7 @@ static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_poin
 	if (wo.z > 0)
 		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, chance);
 	struct bsdf_point q;
-	spectrum weight = bsdf_eval_delta(&t->side[1], from_back(b, p, &q), mirror(wo), mode, wi, chance);
+	spectrum weight = bsdf_eval_delta(&t->side[1], back_point(b, p, &q), mirror(wo), mode, wi, chance);
 	if (!spectrum_is_zero(weight))
 		*wi = mirror(*wi);
 	return weight;
@@ -81,7 +81,7 @@ static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	if (wo.z > 0)
 		return t->side[0].ops->sample(&t->side[0], p, wo, u, out);
 	struct bsdf_point q;
-	if (!t->side[1].ops->sample(&t->side[1], from_back(b, p, &q), mirror(wo), u, out))
+	if (!t->side[1].ops->sample(&t->side[1], back_point(b, p, &q), mirror(wo), u, out))
 		return false;
 	out->wi = mirror(out->wi);
 	return true;
@@ -89,7 +89,7 @@ static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 
 int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct error *e)
 {
-	if (build->black_backs || b->two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
+	if (build->has_black_backs || b->is_two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
 		return 0;
 	struct twosided *t = arena_alloc(build->arena, 1, sizeof *t);
 	if (!t)
@@ -97,7 +97,7 @@ int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct erro
 	t->side[0] = t->side[1] = *b;
 	b->data = t;
 	b->ops = &bsdf_ops_twosided;
-	b->two_sided = b->mirrored = true;
+	b->is_two_sided = b->has_mirrored_back = true;
 	return 0;
 }
 
@@ -120,27 +120,27 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 			return node_error(inner, e, EINVAL,
 					  "\"%s\" transmits light; twosided only accepts opaque BSDFs", inner->type);
 	}
-	int tilts = bsdf_share_relief(b, t->side, 2, n, build, e);
-	if (tilts)
-		return tilts;
-	b->two_sided = true;
-	b->black = t->side[0].black && t->side[1].black;
-	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY,
-			t->side[1].has_smooth ? t->side[1].alpha : INFINITY);
+	int rc = bsdf_share_relief(b, t->side, 2, n, build, e);
+	if (rc)
+		return rc;
+	b->is_two_sided = true;
+	b->is_black = t->side[0].is_black && t->side[1].is_black;
+	b->min_alpha = fmin(t->side[0].has_smooth ? t->side[0].min_alpha : INFINITY,
+			    t->side[1].has_smooth ? t->side[1].min_alpha : INFINITY);
 	for (int i = 0; i < 2; i++) {
 		b->modes |= t->side[i].modes;
 		b->has_smooth |= t->side[i].has_smooth;
 		b->has_delta |= t->side[i].has_delta;
-		b->textured |= t->side[i].textured;
+		b->is_textured |= t->side[i].is_textured;
 		b->uses_tangents |= t->side[i].uses_tangents;
-		b->directed |= t->side[i].directed;
-		bsdf_add_shape(b, t->side[i].shape);
+		b->is_nonreciprocal |= t->side[i].is_nonreciprocal;
+		bsdf_add_color_kind(b, t->side[i].color_kind);
 	}
 	if (!b->has_smooth)
-		b->alpha = 0;
+		b->min_alpha = 0;
 	/* The side from which light arrives is not known: both sides count the same. */
 	int smooth = t->side[0].has_smooth + t->side[1].has_smooth;
-	b->alpha_mean = smooth ? (t->side[0].alpha_mean + t->side[1].alpha_mean) / smooth : 0;
+	b->mean_alpha = smooth ? (t->side[0].mean_alpha + t->side[1].mean_alpha) / smooth : 0;
 	return 0;
 }
 

@@ -34,20 +34,20 @@ struct ward_half {
 	double d;      /* p22 / cos_h^4 */
 };
 
-static bool half_of(const struct microfacet *m, vec3 wo, vec3 wi, struct ward_half *f)
+static bool find_half_vector(const struct microfacet *m, vec3 wo, vec3 wi, struct ward_half *f)
 {
 	double length;
-	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(wo, 1, wi, &f->h, &length))
+	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half_vector(wo, 1, wi, &f->h, &length))
 		return false;
 	f->cosine = fmin(0.5 * length, 1);
 	f->d = microfacet_d(m, f->h);
 	return f->d > 0 && f->cosine > 0;
 }
 
-static double lobe_of(const struct ward *w, const struct microfacet *m, vec3 wo, vec3 wi)
+static double eval_lobe(const struct ward *w, const struct microfacet *m, vec3 wo, vec3 wi)
 {
 	struct ward_half f;
-	if (!half_of(m, wo, wi, &f))
+	if (!find_half_vector(m, wo, wi, &f))
 		return 0;
 	double x, z2 = f.h.z * f.h.z;
 	if (w->form == WARD_BALANCED)
@@ -63,11 +63,12 @@ static spectrum ward_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 {
 	const struct ward *w = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	struct microfacet m = rough_map_at(&w->roughness, p);
-	spectrum d = texture_eval(&w->diffuse, &p->where, p->w), s = texture_eval(&w->specular, &p->where, p->w);
-	return spectrum_scale(w->scale,
-			      spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe_of(w, &m, wo, wi), s)));
+	spectrum d = texture_eval(&w->diffuse, &p->texture_point, p->wavelengths),
+		 s = texture_eval(&w->specular, &p->texture_point, p->wavelengths);
+	return spectrum_scale(
+		w->scale, spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(eval_lobe(w, &m, wo, wi), s)));
 }
 
 /* Returns the density of wi (solid angle): half vectors are sampled by their slopes, with density D cos_h, and wi has
@@ -79,7 +80,7 @@ static double ward_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	struct ward_half f;
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
-	double x = half_of(&m, wo, wi, &f) ? 0.25 * f.d * f.h.z / f.cosine : 0;
+	double x = find_half_vector(&m, wo, wi, &f) ? 0.25 * f.d * f.h.z / f.cosine : 0;
 	return w->specular_chance * (isfinite(x) ? x : 0) + (1 - w->specular_chance) * wi.z / WARP_PI;
 }
 
@@ -101,7 +102,7 @@ static bool ward_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
-static enum ward_form form_of(const char *name)
+static enum ward_form parse_form(const char *name)
 {
 	return strcmp(name, "ward") == 0 ? WARD_1992 : strcmp(name, "ward-duer") == 0 ? WARD_DUER : WARD_BALANCED;
 }
@@ -109,23 +110,23 @@ static enum ward_form form_of(const char *name)
 static int ward_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct ward *w = b->data;
-	int code = bsdf_texture(b, &w->diffuse, n, "diffuse_reflectance", 0.5, build, e);
+	int code = bsdf_read_texture(b, &w->diffuse, n, "diffuse_reflectance", 0.5, build, e);
 	if (!code)
-		code = bsdf_texture(b, &w->specular, n, "specular_reflectance", 0.2, build, e);
+		code = bsdf_read_texture(b, &w->specular, n, "specular_reflectance", 0.2, build, e);
 	if (!code)
 		code = rough_map_read(&w->roughness, b, n, build, e);
 	if (code)
 		return code;
 	double d = texture_max(&w->diffuse), s = texture_max(&w->specular);
-	w->form = form_of(node_string(n, "variant", "balanced"));
+	w->form = parse_form(node_string(n, "variant", "balanced"));
 	w->scale = d + s > 1 ? 0.99 / (d + s) : 1;
 	w->specular_chance = d + s > 0 ? s / (d + s) : 0;
-	b->black = d + s == 0;
+	b->is_black = d + s == 0;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha_mean = w->specular_chance * b->alpha_mean + (1 - w->specular_chance);
+	b->mean_alpha = w->specular_chance * b->mean_alpha + (1 - w->specular_chance);
 	if (s == 0)
-		b->alpha = INFINITY;
+		b->min_alpha = INFINITY;
 	return bsdf_check_energy(n, d + s, e);
 }
 

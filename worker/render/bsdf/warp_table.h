@@ -6,7 +6,7 @@
  * conditional one. Both are inverted exactly (Dupuy and Jakob 2018, An Adaptive Parameterization for Efficient Material
  * Acquisition and Rendering, section 4).
  *
- * Immutable after warp_table_make; any thread; nothing else allocates.
+ * Immutable after warp_table_init; any thread; nothing else allocates.
  */
 #ifndef WORKER_RENDER_BSDF_WARP_TABLE_H
 #define WORKER_RENDER_BSDF_WARP_TABLE_H
@@ -19,7 +19,7 @@
  * parameter has the number i * count[1] + j. */
 struct warp_axes {
 	uint32_t count[2];
-	const double *at[2];
+	const double *value[2];
 };
 
 /* The slices to be mixed for given parameters, and the weight of each. */
@@ -32,14 +32,14 @@ struct warp_mix warp_mix_at(const struct warp_axes *axes, const double parameter
 
 struct warp_table {
 	uint32_t width, height;
-	const double *value;	  /* by slice and row; each slice has an integral of 1 */
-	const double *below_node; /* for each node, the integral along its row from x = 0 to the node */
-	const double *below_row;  /* for each row, the integral over all x and over y from 0 to the row */
+	const double *value;	    /* by slice and row; each slice has an integral of 1 */
+	const double *row_cdf;	    /* for each node, the integral along its row from x = 0 to the node */
+	const double *marginal_cdf; /* for each row, the integral over all x and over y from 0 to the row */
 };
 
 /* Makes t from `slices` tables of height x width values, at least 2 x 2, which become part of t. Values must be in [0,
  * 2^500], and not all 0 in any slice, otherwise -EINVAL; -ENOMEM. */
-int warp_table_make(struct warp_table *t, uint32_t slices, uint32_t width, uint32_t height, double *value,
+int warp_table_init(struct warp_table *t, uint32_t slices, uint32_t width, uint32_t height, double *value,
 		    struct arena *arena);
 
 /* Maps u in [0, 1]^2 to the point `where`; returns the density there. */
@@ -51,7 +51,7 @@ double warp_table_density(const struct warp_table *t, const struct warp_mix *mix
 /* The cell of a grid of `nodes` nodes that x in [0, 1] lies in, and the position within it, from 0 to 1. */
 struct warp_cell {
 	uint32_t i;
-	double part;
+	double fraction;
 };
 static inline struct warp_cell warp_cell_at(uint32_t nodes, double x)
 {

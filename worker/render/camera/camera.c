@@ -28,15 +28,15 @@ static void step_back(struct camera *c, double half_width)
 	c->position = vec3_madd(c->position, -distance, c->axes.n);
 	c->near_clip += distance;
 	c->far_clip += distance;
-	c->scale = 0.5 * c->width * distance / half_width;
-	if (c->aperture > 0 && c->focus > 0) {
-		c->aperture *= (distance + c->focus) / c->focus;
-		c->focus += distance;
+	c->pixels_per_slope = 0.5 * c->width * distance / half_width;
+	if (c->aperture_radius > 0 && c->focus_distance > 0) {
+		c->aperture_radius *= (distance + c->focus_distance) / c->focus_distance;
+		c->focus_distance += distance;
 	}
 }
 
 /* The axes are used as they are: a transform that mirrors gives a mirrored image, as in Mitsuba. */
-static struct frame axes_of(const mat4 *m)
+static struct frame axes_from_transform(const mat4 *m)
 {
 	return (struct frame){vec3_neg(vec3_normalize(mat4_vector(m, (vec3){1, 0, 0}))),
 			      vec3_neg(vec3_normalize(mat4_vector(m, (vec3){0, 1, 0}))),
@@ -54,26 +54,26 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	double volume = fabs(vec3_dot(left, vec3_cross(up, forward)));
 	if (!(volume > 0) || !isfinite(volume))
 		return error_set(e, EINVAL, "the sensor's to_world transform is singular");
-	c->axes = axes_of(&s->to_world);
+	c->axes = axes_from_transform(&s->to_world);
 	c->position = vec3_scale(world_scale, vec3_sub(mat4_point(&s->to_world, (vec3){0, 0, 0}), world_center));
 	c->width = s->width;
 	c->height = s->height;
 	c->center_x = s->width * (0.5 - s->principal_x);
 	c->center_y = s->height * (0.5 - s->principal_y);
-	c->projection = camera_projection_of(s->projection);
-	c->scale = s->half_width > 0 || s->projection == PROJECTION_SPHERE ? 0 : pixels_per_slope(s);
+	c->projection = camera_projection_find(s->projection);
+	c->pixels_per_slope = s->half_width > 0 || s->projection == PROJECTION_SPHERE ? 0 : pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;
-	c->aperture = s->aperture_radius * world_scale;
-	c->focus = s->focus_distance * world_scale;
-	c->lens = c->aperture > 0;
+	c->aperture_radius = s->aperture_radius * world_scale;
+	c->focus_distance = s->focus_distance * world_scale;
+	c->has_lens = c->aperture_radius > 0;
 	if (s->half_width > 0)
 		step_back(c, s->half_width * world_scale);
-	double away = vec3_length(c->position) + c->aperture;
-	if (!(away <= PARAM_REACH_MAX))
-		return error_set(e, ERANGE, "the camera is %g scene radii away from the scene, more than %g", away,
-				 PARAM_REACH_MAX);
-	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
+	double distance = vec3_length(c->position) + c->aperture_radius;
+	if (!(distance <= PARAM_DISTANCE_MAX))
+		return error_set(e, ERANGE, "the camera is %g scene radii away from the scene, more than %g", distance,
+				 PARAM_DISTANCE_MAX);
+	if (!(c->aperture_radius >= 0) || (c->aperture_radius > 0 && !(c->focus_distance > 0)))
 		return error_set(e, EINVAL, "an aperture of radius %g cannot be focused at a distance of %g",
 				 s->aperture_radius, s->focus_distance);
 	return c->projection && c->projection->init ? c->projection->init(c, s, e) : 0;
@@ -81,10 +81,10 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 
 void camera_move(const struct camera *c, double time, struct camera *out)
 {
-	mat4 now = motion_at(c->moves, time);
+	mat4 to_world = motion_transform_at(c->motion, time);
 	*out = *c;
-	out->axes = axes_of(&now);
-	out->position = mat4_point(&now, (vec3){0, 0, 0});
+	out->axes = axes_from_transform(&to_world);
+	out->position = mat4_point(&to_world, (vec3){0, 0, 0});
 }
 
 bool camera_has_aperture(const struct camera *c)
@@ -93,17 +93,17 @@ bool camera_has_aperture(const struct camera *c)
 	(void)c;
 	return false;
 #else
-	return c->lens;
+	return c->has_lens;
 #endif
 }
 
 void camera_force_aperture(struct camera *c, bool on)
 {
-	c->lens = on;
+	c->has_lens = on;
 	if (!on)
-		c->aperture = 0;
-	else if (!(c->focus > 0))
-		c->focus = 1; /* any value will do: every point is at the centre */
+		c->aperture_radius = 0;
+	else if (!(c->focus_distance > 0))
+		c->focus_distance = 1; /* any value will do: every point is at the centre */
 }
 
 /* Maps the unit square to the unit disk: concentric squares become circles, and ratios of areas are preserved. */
@@ -119,8 +119,8 @@ static void disk_from_square(const double u[2], double *x, double *y)
 static void square_from_disk(double x, double y, double u[2])
 {
 	bool wide = fabs(x) > fabs(y);
-	double r = copysign(hypot(x, y), wide ? x : y), turn = wide ? atan(y / x) : y == 0 ? 0 : atan(x / y);
-	double other = r * (4 / M_PI) * turn;
+	double r = copysign(hypot(x, y), wide ? x : y), angle = wide ? atan(y / x) : y == 0 ? 0 : atan(x / y);
+	double other = r * (4 / M_PI) * angle;
 	double a[2] = {wide ? r : other, wide ? other : r};
 	for (int i = 0; i < 2; i++)
 		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);
@@ -134,26 +134,26 @@ static void aperture_offset(const struct camera *c, vec3 x_k, double *x, double 
 	*y = vec3_dot(c->axes.t, offset);
 }
 
-vec3 camera_point(const struct camera *c, const double u[2])
+vec3 camera_sample_point(const struct camera *c, const double u[2])
 {
 	double x, y;
 	if (!camera_has_aperture(c))
 		return c->position;
 	disk_from_square(u, &x, &y);
-	return vec3_madd(vec3_madd(c->position, c->aperture * x, c->axes.s), c->aperture * y, c->axes.t);
+	return vec3_madd(vec3_madd(c->position, c->aperture_radius * x, c->axes.s), c->aperture_radius * y, c->axes.t);
 }
 
 void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
 {
 	double x, y;
 	u[0] = u[1] = 0.5;
-	if (!(c->aperture > 0))
+	if (!(c->aperture_radius > 0))
 		return;
 	aperture_offset(c, p, &x, &y);
-	square_from_disk(x / c->aperture, y / c->aperture, u);
+	square_from_disk(x / c->aperture_radius, y / c->aperture_radius, u);
 }
 
-bool camera_has(const struct camera *c, double film_x, double film_y)
+bool camera_film_point_is_valid(const struct camera *c, double film_x, double film_y)
 {
 	vec3 unused;
 	return !c->projection || c->projection->direction(c, film_x, film_y, &unused);
@@ -166,12 +166,12 @@ vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double fi
 		c->projection->direction(c, film_x, film_y, &l);
 		return vec3_normalize(frame_to_world(&c->axes, l));
 	}
-	l = (vec3){(film_x - c->center_x) / c->scale, (film_y - c->center_y) / c->scale, 1};
+	l = (vec3){(film_x - c->center_x) / c->pixels_per_slope, (film_y - c->center_y) / c->pixels_per_slope, 1};
 	if (camera_has_aperture(c)) {
 		double x, y;
 		aperture_offset(c, x_k, &x, &y);
-		l.x -= x / c->focus;
-		l.y -= y / c->focus;
+		l.x -= x / c->focus_distance;
+		l.y -= y / c->focus_distance;
 	}
 	return vec3_normalize(frame_to_world(&c->axes, l));
 }
@@ -179,7 +179,7 @@ vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double fi
 bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y)
 {
 	vec3 l = frame_to_local(&c->axes, d);
-	if (c->projection && c->projection->all_around)
+	if (c->projection && c->projection->sees_all_directions)
 		return c->projection->project(c, l, film_x, film_y);
 	double depth = l.z * distance;
 	if (!(l.z > 0) || depth < c->near_clip || depth > c->far_clip)
@@ -190,11 +190,11 @@ bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, d
 	if (camera_has_aperture(c)) {
 		double x, y;
 		aperture_offset(c, x_k, &x, &y);
-		slope_x += x / c->focus;
-		slope_y += y / c->focus;
+		slope_x += x / c->focus_distance;
+		slope_y += y / c->focus_distance;
 	}
-	*film_x = c->center_x + c->scale * slope_x;
-	*film_y = c->center_y + c->scale * slope_y;
+	*film_x = c->center_x + c->pixels_per_slope * slope_x;
+	*film_y = c->center_y + c->pixels_per_slope * slope_y;
 	return isfinite(*film_x) && isfinite(*film_y);
 }
 
@@ -203,19 +203,19 @@ double camera_jac_film_from_solid(const struct camera *c, vec3 d)
 	if (c->projection)
 		return c->projection->jac_film_from_solid(c, frame_to_local(&c->axes, d));
 	double cosine = vec3_dot(c->axes.n, d);
-	return c->scale * c->scale / (cosine * cosine * cosine);
+	return c->pixels_per_slope * c->pixels_per_slope / (cosine * cosine * cosine);
 }
 
-bool camera_looks(const struct camera *c, vec3 d)
+bool camera_sees_direction(const struct camera *c, vec3 d)
 {
-	return (c->projection && c->projection->all_around) || vec3_dot(c->axes.n, d) > 0;
+	return (c->projection && c->projection->sees_all_directions) || vec3_dot(c->axes.n, d) > 0;
 }
 
-void camera_pixel(const struct camera *c, vec3 d, double distance, vec3 axis[2], double length[2])
+void camera_pixel_footprint(const struct camera *c, vec3 d, double distance, vec3 axis[2], double length[2])
 {
-	if (c->projection && c->projection->pixel) {
+	if (c->projection && c->projection->pixel_footprint) {
 		vec3 tangent[2];
-		c->projection->pixel(c, frame_to_local(&c->axes, d), tangent, length);
+		c->projection->pixel_footprint(c, frame_to_local(&c->axes, d), tangent, length);
 		for (int i = 0; i < 2; i++) {
 			axis[i] = frame_to_world(&c->axes, tangent[i]);
 			length[i] *= distance;
@@ -224,12 +224,12 @@ void camera_pixel(const struct camera *c, vec3 d, double distance, vec3 axis[2],
 	}
 	axis[0] = c->axes.s;
 	axis[1] = c->axes.t;
-	length[0] = length[1] = distance * vec3_dot(c->axes.n, d) / c->scale;
+	length[0] = length[1] = distance * vec3_dot(c->axes.n, d) / c->pixels_per_slope;
 }
 
-void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max)
+void camera_clip_range(const struct camera *c, vec3 d, double *t_min, double *t_max)
 {
-	if (c->projection && c->projection->all_around) {
+	if (c->projection && c->projection->sees_all_directions) {
 		*t_min = 0;
 		*t_max = INFINITY;
 		return;

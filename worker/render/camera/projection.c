@@ -9,7 +9,7 @@
 PROJECTIONS(X)
 #undef X
 
-const struct camera_projection *camera_projection_of(enum scene_projection p)
+const struct camera_projection *camera_projection_find(enum scene_projection p)
 {
 	static const struct camera_projection *const table[] = {
 #define X(kind, name) [PROJECTION_##kind] = &camera_projection_##name,

@@ -11,7 +11,7 @@
 struct camera;
 
 struct camera_projection {
-	bool all_around; /* the camera sees all directions, and has no clipping planes */
+	bool sees_all_directions; /* the camera sees all directions, and has no clipping planes */
 	/* Reads parameters into c. Returns 0, or -EINVAL with a sentence. NULL: no parameters. */
 	int (*init)(struct camera *c, const struct scene_settings *s, struct error *e);
 	/* Computes the direction that a film point sees, not normalised. Returns false if it sees none. */
@@ -22,10 +22,10 @@ struct camera_projection {
 	double (*jac_film_from_solid)(const struct camera *c, vec3 l);
 	/* Computes the unit tangents along which l moves with film_x and film_y, and the rates per pixel. NULL: as on a
 	 * plane. */
-	void (*pixel)(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2]);
+	void (*pixel_footprint)(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2]);
 };
 
 /* Returns NULL for the projection onto a plane. */
-const struct camera_projection *camera_projection_of(enum scene_projection p);
+const struct camera_projection *camera_projection_find(enum scene_projection p);
 
 #endif

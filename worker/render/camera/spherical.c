@@ -22,10 +22,10 @@ static bool direction(const struct camera *c, double film_x, double film_y, vec3
 
 static bool project(const struct camera *c, vec3 l, double *film_x, double *film_y)
 {
-	double sine = hypot(l.x, l.z), turn = atan2(-l.x, -l.z) / (2 * M_PI);
+	double sine = hypot(l.x, l.z), longitude = atan2(-l.x, -l.z) / (2 * M_PI);
 	if (!(sine > 0))
 		return false;
-	double x = (turn < 0 ? turn + 1 : turn) * c->width, y = atan2(sine, -l.y) / M_PI * c->height;
+	double x = (longitude < 0 ? longitude + 1 : longitude) * c->width, y = atan2(sine, -l.y) / M_PI * c->height;
 	*film_x = x;
 	*film_y = y;
 	return x < c->width && y > 0 && y < c->height;
@@ -36,7 +36,7 @@ static double jac_film_from_solid(const struct camera *c, vec3 l)
 	return c->width * c->height / (2 * M_PI * M_PI * hypot(l.x, l.z));
 }
 
-static void pixel(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2])
+static void pixel_footprint(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2])
 {
 	double sine = hypot(l.x, l.z);
 	tangent[0] = (vec3){l.z / sine, 0, -l.x / sine};
@@ -46,9 +46,9 @@ static void pixel(const struct camera *c, vec3 l, vec3 tangent[2], double rate[2
 }
 
 const struct camera_projection camera_projection_spherical = {
-	.all_around = true,
+	.sees_all_directions = true,
 	.direction = direction,
 	.project = project,
 	.jac_film_from_solid = jac_film_from_solid,
-	.pixel = pixel,
+	.pixel_footprint = pixel_footprint,
 };

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-void chain_count(struct chain *c, bool accepted)
+void chain_count_decision(struct chain *c, bool accepted)
 {
 	uint64_t *counters = c->context->counters;
 	if (accepted) {
@@ -19,23 +19,23 @@ void chain_count(struct chain *c, bool accepted)
 		counters[COUNT_LONGEST_STUCK] = c->rejected_run;
 }
 
-void chain_put_head(const struct chain *c, uint8_t *bytes)
+void chain_write_header(const struct chain *c, uint8_t *bytes)
 {
 	put64(bytes, c->id);
 	put64(bytes + 8, c->step);
 	put64(bytes + 16, c->rejected_run);
 }
 
-bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size)
+bool chain_read_header(struct chain *c, const uint8_t *bytes, size_t size)
 {
-	if (size < CHAIN_STATE_HEAD || get64(bytes) != c->id || get64(bytes + 8) != c->step ||
+	if (size < CHAIN_STATE_HEADER_BYTES || get64(bytes) != c->id || get64(bytes + 8) != c->step ||
 	    get64(bytes + 16) > c->step)
 		return false;
 	c->rejected_run = get64(bytes + 16);
 	return true;
 }
 
-int chain_give(const uint8_t *bytes, size_t size, struct chain_state *out)
+int chain_state_copy_bytes(const uint8_t *bytes, size_t size, struct chain_state *out)
 {
 	out->size = (uint32_t)size;
 	out->bytes = mem_alloc(size, 1);

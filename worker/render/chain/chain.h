@@ -13,7 +13,7 @@
 
 /* Sums of f / T over independent proposals. */
 struct chain_sums {
-	double sum, square;
+	double sum, square_sum;
 };
 
 /* The part common to all kinds; each kind's struct begins with it. */
@@ -23,7 +23,7 @@ struct chain {
 	struct film_sums *film;
 	/* The plan's mixture; "" if the kind has no strategies. */
 	const char *mixture;
-	uint64_t (*strategy)[STRATEGY_COUNTERS]; /* the batch's counters */
+	uint64_t (*strategy_counters)[STRATEGY_COUNTERS]; /* the batch's counters */
 	uint64_t seed, id;
 	uint64_t step;	       /* number of the last mutation; 0: none yet */
 	uint64_t rejected_run; /* rejections since the last acceptance */
@@ -47,13 +47,14 @@ struct chain_ops {
 };
 
 /* Updates the counters and the run of rejections after a decision. */
-void chain_count(struct chain *c, bool accepted);
+void chain_count_decision(struct chain *c, bool accepted);
 
 /* The head of a state's bytes, in little endian: id, step, run of rejections. */
-enum { CHAIN_STATE_HEAD = 24 };
-void chain_put_head(const struct chain *c, uint8_t *bytes);
-bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size); /* false: belongs to another chain or step */
+enum { CHAIN_STATE_HEADER_BYTES = 24 };
+void chain_write_header(const struct chain *c, uint8_t *bytes);
+bool chain_read_header(struct chain *c, const uint8_t *bytes,
+		       size_t size); /* false: belongs to another chain or step */
 /* Copies bytes into newly allocated memory that belongs to the batch. Returns -ENOMEM if out of memory. */
-int chain_give(const uint8_t *bytes, size_t size, struct chain_state *out);
+int chain_state_copy_bytes(const uint8_t *bytes, size_t size, struct chain_state *out);
 
 #endif

@@ -7,14 +7,14 @@
 
 /* Converts a path to bytes (little endian) and back. The result is the same path bit by bit, except for points that
  * were drawn on an emitter or the aperture. PATH_BYTES_MAX bytes always suffice. */
-enum { PATH_BYTES_MAX = 32 + 40 * FULL_PATH_MAX_VERTICES };
-/* Writes a path and returns the number of bytes. They are read back into `again` as a check; returns 0 if that failed,
+enum { PATH_BYTES_MAX = 32 + 40 * FULL_PATH_VERTICES_MAX };
+/* Writes a path and returns the number of bytes. They are read back into `reread` as a check; returns 0 if that failed,
  * and then they must not be used. */
-size_t path_write(struct path_context *c, const struct full_path *x, struct full_path *again, uint8_t *bytes);
+size_t path_write(struct path_context *c, const struct full_path *x, struct full_path *reread, uint8_t *bytes);
 /* Reads untrusted bytes and computes log f of their path, ignoring the value that they state. Returns false if they are
  * not a path of this world. */
-bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x,
-		       double *contribution);
+bool path_read_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x,
+			    double *contribution);
 /* Reads untrusted bytes. Returns false if they are not a path of this world that path_write wrote. */
 bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x);
 

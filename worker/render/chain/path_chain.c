@@ -14,7 +14,7 @@
 #include "worker/render/chain/chain.h"
 
 #include "worker/render/chain/path_bytes.h"
-#include "worker/render/chain/path_place.h"
+#include "worker/render/chain/path_state.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
 #include "worker/render/path/integrator.h"
@@ -25,26 +25,26 @@ struct path_chain {
 	struct chain base;
 	struct mixture mixture;
 	struct mutation_ctx mutation;
-	struct path_place place[2];
+	struct path_state states[2];
 	/* The proposal's path equals the current one between steps. */
-	struct path_place *current, *proposal;
+	struct path_state *current, *proposal;
 	/* The path with which the epoch began, as bytes. */
-	size_t began_size;
-	uint8_t began[PATH_BYTES_MAX];
+	size_t epoch_start_size;
+	uint8_t epoch_start[PATH_BYTES_MAX];
 };
 
-static struct path_chain *path_of(struct chain *c)
+static struct path_chain *path_chain_of(struct chain *c)
 {
 	return (struct path_chain *)(void *)c;
 }
 
-static void set_up(struct path_chain *c)
+static void init_chain(struct path_chain *c)
 {
 	struct error ignored;
 	/* The plan was checked when the lease arrived. */
 	mixture_parse(c->base.mixture, &c->mixture, &ignored);
-	c->current = &c->place[0];
-	c->proposal = &c->place[1];
+	c->current = &c->states[0];
+	c->proposal = &c->states[1];
 	c->current->weight = c->proposal->weight = 0;
 	c->mutation.path = c->base.context;
 	c->mutation.seed = c->base.seed;
@@ -53,74 +53,75 @@ static void set_up(struct path_chain *c)
 }
 
 /* Begins an epoch with the current path, and keeps its bytes for save(). */
-static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
+static void begin_epoch(struct path_chain *c, const uint8_t *bytes, size_t size)
 {
-	memcpy(c->began, bytes, size);
-	c->began_size = size;
-	path_place_copy(&c->proposal->path, &c->current->path);
+	memcpy(c->epoch_start, bytes, size);
+	c->epoch_start_size = size;
+	path_state_copy(&c->proposal->path, &c->current->path);
 }
 
 static bool start(struct chain *base, uint64_t bootstrap_index)
 {
 	static const struct full_path black = {0};
-	struct path_chain *c = path_of(base);
+	struct path_chain *c = path_chain_of(base);
 	uint8_t bytes[PATH_BYTES_MAX];
-	set_up(c);
+	init_chain(c);
 	c->current->path.edges = 0;
 	bool ok = bootstrap_index == UINT64_MAX ||
-		  path_start(base->context, base->seed, bootstrap_index, &c->current->path);
+		  path_choose_seed(base->context, base->seed, bootstrap_index, &c->current->path);
 	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes);
 	if (size == 0)
 		size = path_write(base->context, &black, &c->proposal->path, bytes);
-	begin(c, bytes, size);
+	begin_epoch(c, bytes, size);
 	return ok;
 }
 
 static bool resume(struct chain *base, const struct chain_state *state)
 {
-	struct path_chain *c = path_of(base);
-	set_up(c);
-	if (!chain_get_head(base, state->bytes, state->size))
+	struct path_chain *c = path_chain_of(base);
+	init_chain(c);
+	if (!chain_read_header(base, state->bytes, state->size))
 		return false;
-	const uint8_t *bytes = state->bytes + CHAIN_STATE_HEAD;
-	size_t size = state->size - CHAIN_STATE_HEAD;
+	const uint8_t *bytes = state->bytes + CHAIN_STATE_HEADER_BYTES;
+	size_t size = state->size - CHAIN_STATE_HEADER_BYTES;
 	if (!path_read(base->context, bytes, size, &c->current->path))
 		return false;
-	begin(c, bytes, size);
+	begin_epoch(c, bytes, size);
 	return true;
 }
 
 static int save(struct chain *base, struct chain_state *out)
 {
-	struct path_chain *c = path_of(base);
-	uint8_t bytes[CHAIN_STATE_HEAD + PATH_BYTES_MAX];
+	struct path_chain *c = path_chain_of(base);
+	uint8_t bytes[CHAIN_STATE_HEADER_BYTES + PATH_BYTES_MAX];
 	_Static_assert(sizeof bytes <= CHAIN_STATE_MAX, "a coordinator would refuse it");
-	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEAD);
+	size_t size =
+		path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEADER_BYTES);
 	if (size == 0) {
 		base->context->counters[COUNT_STATES_LOST]++;
-		size = c->began_size;
-		memcpy(bytes + CHAIN_STATE_HEAD, c->began, size);
+		size = c->epoch_start_size;
+		memcpy(bytes + CHAIN_STATE_HEADER_BYTES, c->epoch_start, size);
 	}
-	path_place_copy(&c->proposal->path, &c->current->path);
-	chain_put_head(base, bytes);
-	return chain_give(bytes, CHAIN_STATE_HEAD + size, out);
+	path_state_copy(&c->proposal->path, &c->current->path);
+	chain_write_header(base, bytes);
+	return chain_state_copy_bytes(bytes, CHAIN_STATE_HEADER_BYTES + size, out);
 }
 
-static void splat(struct path_chain *c, struct path_place *at)
+static void splat_state(struct path_chain *c, struct path_state *state)
 {
-	if (at->weight == 0)
+	if (state->weight == 0)
 		return;
-	struct splat s = {.x = at->path.film[0], .y = at->path.film[1]};
-	full_path_colour(c->base.context, &at->path, s.xyz);
-	film_sums_splat(c->base.film, &s, at->weight);
-	chain_moments_state(&c->base.film->moments, &s, 1, 1, at->weight);
-	chain_moments_class(&c->base.film->moments, path_class_whole(&at->path), at->weight);
-	at->weight = 0;
+	struct splat s = {.x = state->path.film[0], .y = state->path.film[1]};
+	full_path_colour(c->base.context, &state->path, s.xyz);
+	film_sums_splat(c->base.film, &s, state->weight);
+	chain_moments_add_state(&c->base.film->moments, &s, 1, 1, state->weight);
+	chain_moments_add_class(&c->base.film->moments, full_path_class(&state->path), state->weight);
+	state->weight = 0;
 }
 
 static void flush(struct chain *base)
 {
-	splat(path_of(base), path_of(base)->current);
+	splat_state(path_chain_of(base), path_chain_of(base)->current);
 }
 
 /* Returns the acceptance probability; 0 if there is no valid proposal, the reason for which is counted. */
@@ -129,62 +130,62 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path *x = &c->current->path, *y = &c->proposal->path;
-	enum proposal_end end = entry->ops->propose(entry->ops, m, &entry->how, x, y, move);
-	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
-	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))
-		end = PROPOSAL_DARK;
-	if (end) {
-		m->count[proposal_counter(end)]++;
+	enum proposal_result result = entry->ops->propose(entry->ops, m, &entry->forced, x, y, move);
+	double to_y = result ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
+	if (!result && !(to_y > -INFINITY && path_state_weight_is_valid(m->path, to_y, entry->ops->independent)))
+		result = PROPOSAL_DARK;
+	if (result) {
+		m->counters[proposal_counter(result)]++;
 		return 0;
 	}
 	if (entry->ops->independent) {
 		double f_over_p = exp(to_y);
 		sums->sum += f_over_p;
-		sums->square += f_over_p * f_over_p;
+		sums->square_sum += f_over_p * f_over_p;
 	}
 	if (x->edges == 0)
 		return 1;
 	double to_x = entry->ops->log_weight(m, x, move, Y_TO_X);
-	return path_place_is_sound(m->path, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
+	return path_state_weight_is_valid(m->path, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
 }
 
 static void step(struct chain *base, struct chain_sums *sums)
 {
-	struct path_chain *c = path_of(base);
+	struct path_chain *c = path_chain_of(base);
 	struct mutation_ctx *m = &c->mutation;
 	uint64_t *counters = base->context->counters;
 	double r[4];
 	m->step = ++base->step;
 	mutation_random(m, BLOCK_STRATEGY, r);
 	bool black = c->current->path.edges == 0;
-	unsigned chosen = black ? c->mixture.independent : mixture_choose(&c->mixture, r[0]);
-	const struct mixture_entry *entry = &c->mixture.entry[chosen];
-	m->count = base->strategy[chosen];
-	m->count[STRATEGY_PROPOSED]++;
+	unsigned strategy = black ? c->mixture.independent_index : mixture_choose(&c->mixture, r[0]);
+	const struct mixture_entry *entry = &c->mixture.entries[strategy];
+	m->counters = base->strategy_counters[strategy];
+	m->counters[STRATEGY_PROPOSED]++;
 	counters[COUNT_SAMPLES]++;
 	counters[COUNT_INDEPENDENT] += entry->ops->independent;
 	struct move move = {0};
-	uint64_t before = batch_rays(counters);
-	double a = propose(c, entry, &move, sums);
-	m->count[STRATEGY_RAYS] += batch_rays(counters) - before;
-	bool accepted = r[1] < a;
-	chain_count(base, accepted);
+	uint64_t rays_before = batch_ray_count(counters);
+	double acceptance = propose(c, entry, &move, sums);
+	m->counters[STRATEGY_RAYS] += batch_ray_count(counters) - rays_before;
+	bool accepted = r[1] < acceptance;
+	chain_count_decision(base, accepted);
 	if (!black)
-		c->current->weight += 1 - a;
-	c->proposal->weight = a;
+		c->current->weight += 1 - acceptance;
+	c->proposal->weight = acceptance;
 	if (accepted) {
-		m->count[STRATEGY_ACCEPTED]++;
-		splat(c, c->current);
-		struct path_place *swap = c->current;
+		m->counters[STRATEGY_ACCEPTED]++;
+		splat_state(c, c->current);
+		struct path_state *swap = c->current;
 		c->current = c->proposal;
 		c->proposal = swap;
 	} else {
-		splat(c, c->proposal);
+		splat_state(c, c->proposal);
 	}
-	path_place_follow(&c->proposal->path, &c->current->path, &move, entry->ops->independent);
+	path_state_sync_proposal(&c->proposal->path, &c->current->path, &move, entry->ops->independent);
 }
 
-static const struct chain_ops chain_path = {
+static const struct chain_ops chain_ops_path = {
 	.size = sizeof(struct path_chain),
 	.start = start,
 	.resume = resume,
@@ -194,8 +195,8 @@ static const struct chain_ops chain_path = {
 };
 
 const struct integrator integrator_hslt = {
-	.face = {"hslt", PLAN_CHAINS, FULL_PATH_MAX_EDGES, .has_mutations = true, .to_emitters = true},
+	.properties = {"hslt", PLAN_CHAINS, FULL_PATH_EDGES_MAX, .has_mutations = true, .ends_on_emitters = true},
 	.stream = RNG_BOOTSTRAP,
-	.evaluate = path_bootstrap,
-	.chain = &chain_path,
+	.evaluate = path_evaluate_bootstrap,
+	.chain = &chain_ops_path,
 };

@@ -9,9 +9,9 @@
 #include <assert.h>
 
 /* The fraction of independent proposals. */
-#define LARGE_STEP 0.3
+#define LARGE_STEP_PROBABILITY 0.3
 
-struct pss_place {
+struct pss_state {
 	struct pss_point point;
 	struct path_sample sample;
 	double weight; /* accumulated but not yet splatted */
@@ -19,38 +19,38 @@ struct pss_place {
 
 struct pss_chain {
 	struct chain base;
-	struct pss_place place[2];
-	struct pss_place *current, *proposal;
+	struct pss_state states[2];
+	struct pss_state *current, *proposal;
 };
 
-static struct pss_chain *pss_of(struct chain *c)
+static struct pss_chain *pss_chain_of(struct chain *c)
 {
 	return (struct pss_chain *)(void *)c;
 }
 
-static void evaluate(struct pss_chain *c, struct pss_sampler *s, struct pss_place *at)
+static void evaluate(struct pss_chain *c, struct pss_sampler *s, struct pss_state *state)
 {
-	c->base.integrator->evaluate(c->base.context, &s->base, &at->sample);
-	at->weight = 0;
+	c->base.integrator->evaluate(c->base.context, &s->base, &state->sample);
+	state->weight = 0;
 }
 
-static void set_places(struct pss_chain *c)
+static void set_states(struct pss_chain *c)
 {
-	c->current = &c->place[0];
-	c->proposal = &c->place[1];
+	c->current = &c->states[0];
+	c->proposal = &c->states[1];
 }
 
-static void set_black(struct pss_place *at)
+static void set_black(struct pss_state *state)
 {
-	at->sample.count = 0;
-	at->sample.classes = 0;
-	at->sample.intensity = at->weight = 0;
+	state->sample.splat_count = 0;
+	state->sample.class_mask = 0;
+	state->sample.intensity = state->weight = 0;
 }
 
 static bool start(struct chain *base, uint64_t bootstrap_index)
 {
-	struct pss_chain *c = pss_of(base);
-	set_places(c);
+	struct pss_chain *c = pss_chain_of(base);
+	set_states(c);
 	struct pss_sampler s;
 	pss_sampler_init(&s, &c->current->point, NULL, base->seed, RNG_BOOTSTRAP, bootstrap_index, 0);
 	if (bootstrap_index == UINT64_MAX) {
@@ -73,28 +73,30 @@ static void reevaluate(struct pss_chain *c)
 
 static int save(struct chain *base, struct chain_state *out)
 {
-	const struct pss_chain *c = pss_of(base);
-	uint8_t bytes[CHAIN_STATE_HEAD + 8 + sizeof c->current->point.u];
+	const struct pss_chain *c = pss_chain_of(base);
+	uint8_t bytes[CHAIN_STATE_HEADER_BYTES + 8 + sizeof c->current->point.u];
 	_Static_assert(sizeof bytes <= CHAIN_STATE_MAX, "a coordinator would refuse it");
-	chain_put_head(base, bytes);
-	size_t n = pss_write(&c->current->point, bytes + CHAIN_STATE_HEAD, sizeof bytes - CHAIN_STATE_HEAD);
+	chain_write_header(base, bytes);
+	size_t n = pss_write(&c->current->point, bytes + CHAIN_STATE_HEADER_BYTES,
+			     sizeof bytes - CHAIN_STATE_HEADER_BYTES);
 	assert(n > 0);
-	return chain_give(bytes, CHAIN_STATE_HEAD + n, out);
+	return chain_state_copy_bytes(bytes, CHAIN_STATE_HEADER_BYTES + n, out);
 }
 
 static bool resume(struct chain *base, const struct chain_state *state)
 {
-	struct pss_chain *c = pss_of(base);
-	set_places(c);
-	if (!chain_get_head(base, state->bytes, state->size))
+	struct pss_chain *c = pss_chain_of(base);
+	set_states(c);
+	if (!chain_read_header(base, state->bytes, state->size))
 		return false;
-	unsigned flags =
-		fptrap_leave(); /* the bytes are not trusted: a signalling NaN is refused and is not a fault of ours */
-	size_t n = pss_read(&c->current->point, state->bytes + CHAIN_STATE_HEAD, state->size - CHAIN_STATE_HEAD);
-	fptrap_return(flags);
-	if (n == 0 || n != state->size - CHAIN_STATE_HEAD)
+	unsigned flags = fptrap_enter_library(); /* the bytes are not trusted: a signalling NaN is refused and is not a
+						    fault of ours */
+	size_t n = pss_read(&c->current->point, state->bytes + CHAIN_STATE_HEADER_BYTES,
+			    state->size - CHAIN_STATE_HEADER_BYTES);
+	fptrap_leave_library(flags);
+	if (n == 0 || n != state->size - CHAIN_STATE_HEADER_BYTES)
 		return false;
-	if (c->current->point.used[SIDE_CAMERA] == 0) {
+	if (c->current->point.block_count[SIDE_CAMERA] == 0) {
 		set_black(c->current);
 		return true;
 	}
@@ -102,69 +104,72 @@ static bool resume(struct chain *base, const struct chain_state *state)
 	return c->current->sample.intensity > 0;
 }
 
-static void splat(struct pss_chain *c, struct pss_place *at)
+static void splat_state(struct pss_chain *c, struct pss_state *state)
 {
-	if (at->weight == 0)
+	if (state->weight == 0)
 		return;
 	/* Splats are divided by the intensity, not multiplied by its reciprocal, which is infinite
 	 * for a denormal intensity. */
-	double intensity = at->sample.intensity;
-	for (uint32_t i = 0; i < at->sample.count; i++) {
-		struct splat s = at->sample.splats[i];
+	double intensity = state->sample.intensity;
+	for (uint32_t i = 0; i < state->sample.splat_count; i++) {
+		struct splat s = state->sample.splats[i];
 		for (int k = 0; k < 3; k++)
 			s.xyz[k] /= intensity;
-		film_sums_splat(c->base.film, &s, at->weight);
+		film_sums_splat(c->base.film, &s, state->weight);
 	}
 	struct chain_moments *m = &c->base.film->moments;
-	chain_moments_state(m, at->sample.splats, at->sample.count, intensity, at->weight);
-	for (uint32_t rest = at->sample.classes; rest; rest &= rest - 1) {
-		unsigned k = (unsigned)__builtin_ctz(rest);
-		chain_moments_class(m, k, at->sample.of_class[k] / intensity * at->weight);
+	chain_moments_add_state(m, state->sample.splats, state->sample.splat_count, intensity, state->weight);
+	for (uint32_t remaining = state->sample.class_mask; remaining; remaining &= remaining - 1) {
+		unsigned k = (unsigned)__builtin_ctz(remaining);
+		chain_moments_add_class(m, k, state->sample.class_intensity[k] / intensity * state->weight);
 	}
-	at->weight = 0;
+	state->weight = 0;
 }
 
 static void flush(struct chain *base)
 {
-	splat(pss_of(base), pss_of(base)->current);
+	splat_state(pss_chain_of(base), pss_chain_of(base)->current);
 }
 
 static void step(struct chain *base, struct chain_sums *sums)
 {
-	struct pss_chain *c = pss_of(base);
+	struct pss_chain *c = pss_chain_of(base);
 	uint64_t *counters = base->context->counters;
-	double choice[SAMPLER_BLOCK], here = c->current->sample.intensity;
+	double choice[SAMPLER_BLOCK_SIZE], current_intensity = c->current->sample.intensity;
 	base->step++;
-	pss_choices(base->seed, base->id, base->step, choice);
-	bool large = !(here > 0) || choice[PSS_CHOOSE_LARGE] < LARGE_STEP;
+	pss_draw_choices(base->seed, base->id, base->step, choice);
+	bool large = !(current_intensity > 0) || choice[PSS_CHOOSE_LARGE] < LARGE_STEP_PROBABILITY;
 	struct pss_sampler s;
 	pss_sampler_init(&s, &c->proposal->point, large ? NULL : &c->current->point, base->seed, RNG_CHAIN, base->id,
 			 base->step);
 	evaluate(c, &s, c->proposal);
-	double there = c->proposal->sample.intensity;
+	double proposal_intensity = c->proposal->sample.intensity;
 	counters[COUNT_SAMPLES]++;
 	if (large) {
 		counters[COUNT_INDEPENDENT]++;
-		sums->sum += there;
-		sums->square += there * there;
+		sums->sum += proposal_intensity;
+		sums->square_sum += proposal_intensity * proposal_intensity;
 	}
-	double a = there > 0 ? (there < here ? there / here : 1) : 0;
-	if (here > 0)
-		c->current->weight += 1 - a;
-	c->proposal->weight = a;
-	bool accepted = choice[PSS_ACCEPT] < a;
-	chain_count(base, accepted);
+	double acceptance =
+		proposal_intensity > 0
+			? (proposal_intensity < current_intensity ? proposal_intensity / current_intensity : 1)
+			: 0;
+	if (current_intensity > 0)
+		c->current->weight += 1 - acceptance;
+	c->proposal->weight = acceptance;
+	bool accepted = choice[PSS_ACCEPT] < acceptance;
+	chain_count_decision(base, accepted);
 	if (!accepted) {
-		splat(c, c->proposal);
+		splat_state(c, c->proposal);
 		return;
 	}
-	splat(c, c->current);
-	struct pss_place *swap = c->current;
+	splat_state(c, c->current);
+	struct pss_state *swap = c->current;
 	c->current = c->proposal;
 	c->proposal = swap;
 }
 
-static const struct chain_ops chain_pss = {
+static const struct chain_ops chain_ops_pss = {
 	.size = sizeof(struct pss_chain),
 	.start = start,
 	.resume = resume,
@@ -174,8 +179,8 @@ static const struct chain_ops chain_pss = {
 };
 
 const struct integrator integrator_pssmlt = {
-	.face = {.name = "pssmlt", .kind = PLAN_CHAINS, .max_depth = PSS_MAX_EDGES},
+	.properties = {.name = "pssmlt", .kind = PLAN_CHAINS, .max_depth = PSS_EDGES_MAX},
 	.stream = RNG_BOOTSTRAP,
-	.evaluate = path_trace_both_ways,
-	.chain = &chain_pss,
+	.evaluate = path_trace_bidirectional,
+	.chain = &chain_ops_pss,
 };

@@ -14,7 +14,7 @@
 
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
-#include "worker/render/chain/path_place.h"
+#include "worker/render/chain/path_state.h"
 #include "worker/render/math/logsum.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
@@ -22,12 +22,13 @@
 #include "worker/render/world/build.h"
 
 /* Relative MSE times CPU time for other values: tests/bench/choices.md, "Energy redistribution". */
-const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 256};
+const struct redistribution_rule redistribution_default_rule = {
+	.threshold = 4, .mutations_per_unit = 2, .chain_length = 256};
 
-struct spread_place {
-	struct path_place place;
-	double scale; /* w */
-	double share; /* 1 - a; 0: the film gets everything */
+struct spread_state {
+	struct path_state state;
+	double scale;		/* w */
+	double spread_fraction; /* 1 - a; 0: the film gets everything */
 };
 
 struct redistribution {
@@ -36,17 +37,17 @@ struct redistribution {
 	struct path_context context; /* context of the chains */
 	uint32_t light_every;	     /* light_every of the samples */
 	const struct brightness *map;
-	struct splat_target *to;
+	struct splat_target *target;
 	struct mixture mixture; /* local strategies only */
 	struct mutation_ctx mutation;
-	uint64_t unread[STRATEGY_COUNTERS];
+	uint64_t unused_counters[STRATEGY_COUNTERS];
 	uint64_t pixel, sample;
-	double taken, *classes;
-	struct spread_place start, places[2];
+	double spread_intensity, *class_intensity;
+	struct spread_state start, states[2];
 };
 
 /* Whether some inner vertex is not specular. */
-static bool is_scattered(const struct full_path *x)
+static bool has_nonspecular_vertex(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
 		if (!x->v[j].delta)
@@ -55,165 +56,165 @@ static bool is_scattered(const struct full_path *x)
 }
 
 /* Computes w and the share 1 - a of this path's contribution that is spread. */
-static void compute_weight(struct redistribution *r, struct spread_place *at)
+static void compute_weight(struct redistribution *r, struct spread_state *state)
 {
-	double log_pdf[FULL_PATH_MAX_VERTICES];
-	struct full_path *x = &at->place.path;
-	at->scale = brightness_scale(r->map, x->film[0], x->film[1]);
-	at->share = 0;
-	if (!is_scattered(x))
+	double log_pdf[FULL_PATH_VERTICES_MAX];
+	struct full_path *x = &state->state.path;
+	state->scale = brightness_scale(r->map, x->film[0], x->film[1]);
+	state->spread_fraction = 0;
+	if (!has_nonspecular_vertex(x))
 		return;
-	full_path_log_techniques(&r->context, x, log_pdf);
+	full_path_log_technique_pdfs(&r->context, x, log_pdf);
 	for (unsigned j = 2; j <= x->edges && r->light_every > 1; j++)
 		log_pdf[j] -= log(r->light_every);
-	double u = at->scale * exp(full_path_log_f(&r->context, x) - log_sum_exp(log_pdf, x->edges + 1));
+	double u = state->scale * exp(full_path_log_f(&r->context, x) - log_sum_exp(log_pdf, x->edges + 1));
 	if (isgreater(u, r->rule.threshold))
-		at->share = 1 - r->rule.threshold / u;
+		state->spread_fraction = 1 - r->rule.threshold / u;
 }
 
-static void splat(struct redistribution *r, struct spread_place *at, double unit)
+static void splat_state(struct redistribution *r, struct spread_state *state, double unit)
 {
-	if (at->place.weight == 0)
+	if (state->state.weight == 0)
 		return;
-	struct splat s = {.x = at->place.path.film[0], .y = at->place.path.film[1]};
-	full_path_colour(&r->context, &at->place.path, s.xyz);
-	r->to->splat(r->to, &s, at->place.weight * unit / at->scale);
-	at->place.weight = 0;
+	struct splat s = {.x = state->state.path.film[0], .y = state->state.path.film[1]};
+	full_path_colour(&r->context, &state->state.path, s.xyz);
+	r->target->add_splat(r->target, &s, state->state.weight * unit / state->scale);
+	state->state.weight = 0;
 }
 
 /* Returns the acceptance probability. */
 static double propose(struct redistribution *r, const struct mixture_entry *entry, struct move *move,
-		      struct spread_place *x, struct spread_place *y)
+		      struct spread_state *x, struct spread_state *y)
 {
 	struct mutation_ctx *m = &r->mutation;
-	if (entry->ops->propose(entry->ops, m, &entry->how, &x->place.path, &y->place.path, move))
+	if (entry->ops->propose(entry->ops, m, &entry->forced, &x->state.path, &y->state.path, move))
 		return 0;
-	double to_y = entry->ops->log_weight(m, &y->place.path, move, X_TO_Y);
-	if (!(to_y > -INFINITY && path_place_is_sound(m->path, to_y, false)))
+	double to_y = entry->ops->log_weight(m, &y->state.path, move, X_TO_Y);
+	if (!(to_y > -INFINITY && path_state_weight_is_valid(m->path, to_y, false)))
 		return 0;
 	compute_weight(r, y);
-	if (!(y->share > 0))
+	if (!(y->spread_fraction > 0))
 		return 0;
-	double to_x = entry->ops->log_weight(m, &x->place.path, move, Y_TO_X);
-	if (!path_place_is_sound(m->path, to_x, false))
+	double to_x = entry->ops->log_weight(m, &x->state.path, move, Y_TO_X);
+	if (!path_state_weight_is_valid(m->path, to_x, false))
 		return 0;
-	return exp(fmin(to_y - to_x + log(y->scale * y->share / (x->scale * x->share)), 0));
+	return exp(fmin(to_y - to_x + log(y->scale * y->spread_fraction / (x->scale * x->spread_fraction)), 0));
 }
 
-/* Runs one chain from the path `from`; each mutation splats `unit` times the brightness of its place. */
-static void run_chain(struct redistribution *r, const struct spread_place *from, double unit)
+/* Runs one chain from the path `start`; each mutation splats `unit` times the brightness of its place. */
+static void run_chain(struct redistribution *r, const struct spread_state *start, double unit)
 {
-	struct spread_place *x = &r->places[0], *y = &r->places[1];
+	struct spread_state *x = &r->states[0], *y = &r->states[1];
 	struct mutation_ctx *m = &r->mutation;
-	path_place_copy(&x->place.path, &from->place.path);
-	path_place_copy(&y->place.path, &from->place.path);
-	x->scale = from->scale;
-	x->share = from->share;
-	x->place.weight = y->place.weight = 0;
+	path_state_copy(&x->state.path, &start->state.path);
+	path_state_copy(&y->state.path, &start->state.path);
+	x->scale = start->scale;
+	x->spread_fraction = start->spread_fraction;
+	x->state.weight = y->state.weight = 0;
 	liveness_tick();
-	for (uint32_t i = 0; i < r->rule.length; i++) {
+	for (uint32_t i = 0; i < r->rule.chain_length; i++) {
 		double u[4];
 		struct move move = {0};
 		m->step = i;
 		mutation_random(m, BLOCK_STRATEGY, u);
-		double a = propose(r, &r->mixture.entry[mixture_choose(&r->mixture, u[0])], &move, x, y);
-		x->place.weight += 1 - a;
-		y->place.weight = a;
-		if (u[1] < a) {
-			struct spread_place *swap = x;
-			splat(r, x, unit);
+		double acceptance = propose(r, &r->mixture.entries[mixture_choose(&r->mixture, u[0])], &move, x, y);
+		x->state.weight += 1 - acceptance;
+		y->state.weight = acceptance;
+		if (u[1] < acceptance) {
+			struct spread_state *swap = x;
+			splat_state(r, x, unit);
 			x = y;
 			y = swap;
 		} else {
-			splat(r, y, unit);
+			splat_state(r, y, unit);
 		}
-		path_place_follow(&y->place.path, &x->place.path, &move, false);
+		path_state_sync_proposal(&y->state.path, &x->state.path, &move, false);
 	}
-	splat(r, x, unit);
+	splat_state(r, x, unit);
 }
 
 /* Returns the number of chains for `units` times the energy that one chain carries, and sets the factor *each on their
  * energy. For less than one unit: one chain with that probability, otherwise none. */
-static unsigned chains_for(double units, double u, double *each)
+static unsigned choose_chain_count(double units, double u, double *energy_factor)
 {
 	if (units < 1) {
-		*each = 1;
+		*energy_factor = 1;
 		return u < units;
 	}
-	double n = fmin(floor(units), REDISTRIBUTION_CHAINS);
-	*each = units / n;
+	double n = fmin(floor(units), REDISTRIBUTION_CHAINS_MAX);
+	*energy_factor = units / n;
 	return (unsigned)n;
 }
 
-static spectrum keep(struct path_split *split, struct path_context *c, unsigned s, unsigned t, const double film[2],
-		     spectrum l)
+static spectrum spread_contribution(struct path_split *split, struct path_context *c, unsigned s, unsigned t,
+				    const double film[2], spectrum l)
 {
 	struct redistribution *r = (struct redistribution *)(void *)split;
-	struct spread_place *x = &r->start;
+	struct spread_state *x = &r->start;
 	double intensity = path_intensity(c, l), relative = intensity * brightness_scale(r->map, film[0], film[1]);
 	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
-	    !full_path_from_subpaths(c, s, c->passed_count, s + t - 1 + c->passed_count, &x->place.path))
+	    !full_path_from_subpaths(c, s, c->passed_count, s + t - 1 + c->passed_count, &x->state.path))
 		return l;
 	compute_weight(r, x);
-	if (!(x->share > 0))
+	if (!(x->spread_fraction > 0))
 		return l;
-	const double share = x->share, carries = r->rule.length / r->rule.mutations;
-	double u[4], each;
+	const double fraction = x->spread_fraction, chain_energy = r->rule.chain_length / r->rule.mutations_per_unit;
+	double u[4], energy_factor;
 	uint64_t id[4];
-	const uint64_t technique = s * (PATH_MAX_EDGES + 2) + t;
+	const uint64_t technique = s * (PATH_EDGES_MAX + 2) + t;
 	rng_uniform4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2, u);
-	unsigned n = chains_for(share * relative / carries, u[0], &each);
-	r->taken += share * intensity;
-	r->classes[path_class_whole(&x->place.path)] += share * intensity;
+	unsigned n = choose_chain_count(fraction * relative / chain_energy, u[0], &energy_factor);
+	r->spread_intensity += fraction * intensity;
+	r->class_intensity[full_path_class(&x->state.path)] += fraction * intensity;
 	c->counters[COUNT_SPREAD]++;
-	c->counters[COUNT_SPREAD_MUTATIONS] += (uint64_t)n * r->rule.length;
+	c->counters[COUNT_SPREAD_MUTATIONS] += (uint64_t)n * r->rule.chain_length;
 	rng_bits4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2 + 1, id);
-	const uint64_t rays = batch_rays(c->counters);
+	const uint64_t rays_before = batch_ray_count(c->counters);
 	for (unsigned k = 0; k < n; k++) {
 		r->mutation.chain = id[0] + k;
-		run_chain(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
+		run_chain(r, x, energy_factor / r->rule.mutations_per_unit / (c->window.width * c->window.height));
 	}
-	c->counters[COUNT_SPREAD_RAYS] += batch_rays(c->counters) - rays;
-	return spectrum_scale(1 - share, l);
+	c->counters[COUNT_SPREAD_RAYS] += batch_ray_count(c->counters) - rays_before;
+	return spectrum_scale(1 - fraction, l);
 }
 
 /* Removes independent strategies: they ignore the current path, so they would not keep the energy near it. */
-static void leave_out_independent(struct mixture *m)
+static void remove_independent(struct mixture *m)
 {
 	unsigned n = 0;
-	m->total = 0;
+	m->total_weight = 0;
 	for (unsigned i = 0; i < m->count; i++) {
-		if (m->entry[i].ops->independent)
+		if (m->entries[i].ops->independent)
 			continue;
-		m->total += m->entry[i].weight;
-		m->entry[n++] = m->entry[i];
+		m->total_weight += m->entries[i].weight;
+		m->entries[n++] = m->entries[i];
 	}
 	m->count = n;
 }
 
 int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
 		       const struct path_context *c, const struct brightness *map, uint64_t seed,
-		       struct splat_target *to, double classes[PATH_CLASSES], struct error *e)
+		       struct splat_target *target, double classes[PATH_CLASSES], struct error *e)
 {
 	struct render_summary summary;
 	struct redistribution *r = *out = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for chains");
-	r->split.keep = keep;
+	r->split.film_part = spread_contribution;
 	r->rule = *rule;
 	r->context = *c;
-	r->context.roulette = 0;
+	r->context.max_survival = 0;
 	r->context.light_every = 0;
 	r->light_every = c->light_every;
 	r->map = map;
-	r->to = to;
-	r->classes = classes;
+	r->target = target;
+	r->class_intensity = classes;
 	world_summary(c->w, &summary);
-	mixture_default(&summary, &r->mixture);
-	leave_out_independent(&r->mixture);
+	mixture_init_default(&summary, &r->mixture);
+	remove_independent(&r->mixture);
 	r->mutation.path = &r->context;
 	r->mutation.seed = seed;
-	r->mutation.count = r->unread;
+	r->mutation.counters = r->unused_counters;
 	r->mutation.limits = walk_limits_of(&c->w->accuracy);
 	return 0;
 }
@@ -227,11 +228,11 @@ struct path_split *redistribution_begin(struct redistribution *r, uint64_t pixel
 {
 	r->pixel = pixel;
 	r->sample = sample;
-	r->taken = 0;
+	r->spread_intensity = 0;
 	return &r->split;
 }
 
-double redistribution_taken(const struct redistribution *r)
+double redistribution_spread_intensity(const struct redistribution *r)
 {
-	return r->taken;
+	return r->spread_intensity;
 }

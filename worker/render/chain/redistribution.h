@@ -17,10 +17,10 @@
  * All chains have the same length of L mutations: if those that begin at bright paths were longer, light would flow
  * away from there and not come back. Energy is measured relative to the brightness of the place. If the rest of a
  * contribution is less than L / M, one chain that carries L / M starts with the probability rest / (L / M), otherwise
- * none. Else the rest is divided equally among as many chains as it has units of L / M, up to REDISTRIBUTION_CHAINS. So
- * a splat is 1 / M times as bright as its place, or brighter for the very brightest contributions. No chain runs where
- * no sample is too bright. Emitters in view, and those seen only by exactly specular surfaces, are not spread, because
- * all samples of such a place are alike.
+ * none. Else the rest is divided equally among as many chains as it has units of L / M, up to
+ * REDISTRIBUTION_CHAINS_MAX. So a splat is 1 / M times as bright as its place, or brighter for the very brightest
+ * contributions. No chain runs where no sample is too bright. Emitters in view, and those seen only by exactly specular
+ * surfaces, are not spread, because all samples of such a place are alike.
  *
  * One thread. Memory: some 400 kB; nothing allocates after redistribution_new.
  */
@@ -32,20 +32,20 @@
 struct redistribution;
 
 struct redistribution_rule {
-	double threshold; /* T */
-	double mutations; /* M: mutations for each unit of relative brightness */
-	uint32_t length;  /* L */
+	double threshold;	   /* T */
+	double mutations_per_unit; /* M: mutations for each unit of relative brightness */
+	uint32_t chain_length;	   /* L */
 };
 /* The rule that renders use; tests spread more. */
-extern const struct redistribution_rule redistribution_usual;
+extern const struct redistribution_rule redistribution_default_rule;
 
-enum { REDISTRIBUTION_CHAINS = 64 }; /* most chains for one contribution */
+enum { REDISTRIBUTION_CHAINS_MAX = 64 }; /* most chains for one contribution */
 
-/* c: the context of the samples, from which world, window, depths, light_every and counters are taken. to: where the
- * chains splat. classes: gets the sums of the energy that is spread, I by path class. Returns -ENOMEM if out of
+/* c: the context of the samples, from which world, window, depths, light_every and counters are taken. target: where
+ * the chains splat. classes: gets the sums of the energy that is spread, I by path class. Returns -ENOMEM if out of
  * memory. */
 int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
-		       const struct brightness *map, uint64_t seed, struct splat_target *to,
+		       const struct brightness *map, uint64_t seed, struct splat_target *target,
 		       double classes[PATH_CLASSES], struct error *e);
 void redistribution_free(struct redistribution *r);
 
@@ -53,6 +53,6 @@ void redistribution_free(struct redistribution *r);
  * sample among all samples of the plan: the random numbers of its chains follow from them. */
 struct path_split *redistribution_begin(struct redistribution *r, uint64_t pixel, uint64_t sample);
 /* Returns I of the part of the sample that the film did not get directly. */
-double redistribution_taken(const struct redistribution *r);
+double redistribution_spread_intensity(const struct redistribution *r);
 
 #endif

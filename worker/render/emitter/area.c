@@ -13,7 +13,7 @@
 
 struct area_light {
 	struct surface_light light; /* first: surface_light.h */
-	double back;		    /* probability that a sub-path leaves against the normal; 0: one-sided */
+	double back_chance;	    /* probability that a sub-path leaves against the normal; 0: one-sided */
 };
 
 /* Returns whether the surface encloses a body: the normals of its triangles, weighted by area, then add up to 0. */
@@ -33,10 +33,10 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	int rc = surface_light_create(em, n, build, e);
 	if (rc)
 		return rc;
-	bool both = node_bool(n, "two_sided", node_bool(n, "twosided", false));
+	bool is_two_sided = node_bool(n, "two_sided", node_bool(n, "twosided", false));
 	/* The scene's radius is 1; a sphere of half that radius has an area of pi. */
-	l->back = !both ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
-	em->power = l->light.area * M_PI * em->brightest * (both ? 2 : 1);
+	l->back_chance = !is_two_sided ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
+	em->power = l->light.area * M_PI * em->brightness_bound * (is_two_sided ? 2 : 1);
 	return 0;
 }
 
@@ -44,9 +44,9 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 {
 	const struct area_light *l = em->data;
 	double cosine = vec3_dot(x->n, w);
-	if (!(cosine > 0 || (l->back > 0 && cosine < 0)))
-		return spectrum_of(0);
-	return texture_eval(&l->light.radiance, &x->where, wl);
+	if (!(cosine > 0 || (l->back_chance > 0 && cosine < 0)))
+		return spectrum_constant(0);
+	return texture_eval(&l->light.radiance, &x->texture_point, wl);
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -54,8 +54,9 @@ static bool sample_direction(const struct emitter *em, const struct emitter_poin
 {
 	const struct area_light *l = em->data;
 	struct frame f = frame_around(x->n);
-	bool behind = u[0] < l->back;
-	double share = behind ? l->back : 1 - l->back, rest = behind ? u[0] / share : (u[0] - l->back) / share;
+	bool behind = u[0] < l->back_chance;
+	double share = behind ? l->back_chance : 1 - l->back_chance,
+	       rest = behind ? u[0] / share : (u[0] - l->back_chance) / share;
 	double r = sqrt(rest), phi = 2 * M_PI * u[1], z = sqrt(1 - rest);
 	*w = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), behind ? -z : z});
 	*pdf = share * z / M_PI;
@@ -66,18 +67,18 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 {
 	const struct area_light *l = em->data;
 	double cosine = vec3_dot(x->n, w);
-	return (cosine > 0 ? (1 - l->back) * cosine : -l->back * cosine) / M_PI;
+	return (cosine > 0 ? (1 - l->back_chance) * cosine : -l->back_chance * cosine) / M_PI;
 }
 
 /* Computes the cone that the sphere subtends at ref: its axis, the distance of the centre, and the squared sine of its
  * half angle. Returns false if the light is not a sphere that emits outwards, or ref is inside it. */
-static bool sphere_cone(const struct surface_light *l, vec3 ref, vec3 *axis, double *distance, double *sin2)
+static bool find_sphere_cone(const struct surface_light *l, vec3 ref, vec3 *axis, double *distance, double *sin2)
 {
-	vec3 to = vec3_sub(l->surface.center, ref);
-	double d = vec3_length(to), r = l->surface.radius;
+	vec3 to_center = vec3_sub(l->surface.center, ref);
+	double d = vec3_length(to_center), r = l->surface.radius;
 	if (!l->surface.is_sphere || l->surface.normal_sign < 0 || !(d > r * (1 + 0x1p-40)))
 		return false;
-	*axis = vec3_scale(1 / d, to);
+	*axis = vec3_scale(1 / d, to_center);
 	*distance = d;
 	*sin2 = (r / d) * (r / d);
 	return true;
@@ -103,7 +104,7 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	const struct surface_light *l = em->data;
 	vec3 axis;
 	double distance, sin2;
-	if (!sphere_cone(l, ref, &axis, &distance, &sin2))
+	if (!find_sphere_cone(l, ref, &axis, &distance, &sin2))
 		return surface_light_sample_point(em, u, x, pdf);
 	/* q = 1 - cos(theta), with theta the angle of the direction to the axis; t: distance of the nearer
 	 * intersection. */
@@ -113,10 +114,11 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	struct frame f = frame_around(axis);
 	vec3 w = frame_to_world(&f, (vec3){s * cos(phi), s * sin(phi), c});
 	vec3 p = vec3_madd(ref, t, w);
-	x->infinite = false;
-	vec3 out = vec3_sub(p, l->surface.center);
+	x->is_infinite = false;
+	vec3 from_center = vec3_sub(p, l->surface.center);
 	/* A sphere so distant that it rounds to a point: use the point nearest to ref. */
-	surface_light_on_sphere(l, vec3_length(out) > 0 ? vec3_normalize(out) : vec3_neg(axis), x);
+	surface_light_set_sphere_point(l, vec3_length(from_center) > 0 ? vec3_normalize(from_center) : vec3_neg(axis),
+				       x);
 	*pdf = sphere_pdf_area(ref, sin2, x);
 	return *pdf > 0;
 }
@@ -126,7 +128,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 	const struct surface_light *l = em->data;
 	vec3 axis;
 	double distance, sin2;
-	if (!sphere_cone(l, ref, &axis, &distance, &sin2))
+	if (!find_sphere_cone(l, ref, &axis, &distance, &sin2))
 		return surface_light_pdf_point(em, x);
 	return sphere_pdf_area(ref, sin2, x);
 }
@@ -144,5 +146,5 @@ const struct emitter_ops emitter_ops_area = {
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,
 	.pdf_toward = pdf_toward,
-	.place = surface_light_place,
+	.set_transform = surface_light_set_transform,
 };

@@ -10,7 +10,7 @@
 #include "worker/render/emitter/delta.h"
 
 /* Tolerance for the direction between two vertices that have been offset or rounded. */
-static const double same_direction = 1e-7;
+static const double direction_tolerance = 1e-7;
 
 struct beam {
 	struct delta_light light;
@@ -20,14 +20,15 @@ struct beam {
 static bool is_along(const struct emitter *em, vec3 w)
 {
 	const struct beam *b = em->data;
-	return vec3_length(vec3_sub(w, b->axis)) <= same_direction;
+	return vec3_length(vec3_sub(w, b->axis)) <= direction_tolerance;
 }
 
 static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
 {
 	(void)x;
 	const struct beam *b = em->data;
-	return is_along(em, w) ? spectrum_scale(b->light.factor, color_eval(&b->light.color, wl)) : spectrum_of(0);
+	return is_along(em, w) ? spectrum_scale(b->light.factor, color_eval(&b->light.color, wl))
+			       : spectrum_constant(0);
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -65,28 +66,28 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	b->axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	if (!vec3_is_finite(b->axis))
 		return node_error(n, e, EINVAL, "to_world gives the beam no direction");
-	b->light.x.p = delta_origin(&to_world, build);
-	int code = delta_create(em, n, "power", build->scale * build->scale, build, e);
+	b->light.point.p = delta_origin(&to_world, build);
+	int code = delta_create(em, n, "power", build->world_scale * build->world_scale, build, e);
 	if (code)
 		return code;
-	em->beam = true;
+	em->is_beam = true;
 	em->power = delta_strength(&b->light);
 	/* All of the light may come from one point, seen by one pixel: allow for pixels of a millionth of a
 	 * steradian. */
-	em->brightest *= 0x1p20;
+	em->brightness_bound *= 0x1p20;
 	return 0;
 }
 
-static void place(struct emitter *em, const mat4 *to_world)
+static void set_transform(struct emitter *em, const mat4 *to_world)
 {
 	struct beam *b = em->data;
-	b->light.x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	b->light.point.p = mat4_point(to_world, (vec3){0, 0, 0});
 	b->axis = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
 }
 
 const struct emitter_ops emitter_ops_collimated = {
 	.decl = PLUGIN(EMITTER, "collimated", {.name = "power", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "to_world", .types = VALUE_TRANSFORM_OR_ANIMATION},
 		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct beam),
 	.create = create,
@@ -96,5 +97,5 @@ const struct emitter_ops emitter_ops_collimated = {
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,
 	.pdf_toward = pdf_toward,
-	.place = place,
+	.set_transform = set_transform,
 };

@@ -3,7 +3,7 @@
 #include "worker/render/emitter/emitter.h"
 #include "worker/render/emitter/uniform.h"
 
-#define UNIFORM (1 / (4 * M_PI))
+#define UNIFORM_PDF (1 / (4 * M_PI))
 
 static spectrum constant_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w,
 				  const struct wavelengths *wl)
@@ -16,36 +16,36 @@ static bool constant_sample_point(const struct emitter *em, const double u[2], s
 				  double *pdf_point)
 {
 	(void)em;
-	*x = (struct emitter_point){.p = vec3_normalize(direction_of_square(u)), .infinite = true};
-	*pdf_point = UNIFORM;
+	*x = (struct emitter_point){.p = vec3_normalize(sphere_from_square(u)), .is_infinite = true};
+	*pdf_point = UNIFORM_PDF;
 	return true;
 }
 
 static double constant_pdf_point(const struct emitter *em, const struct emitter_point *x)
 {
 	(void)em, (void)x;
-	return UNIFORM;
+	return UNIFORM_PDF;
 }
 
 static void constant_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
 {
 	(void)em;
-	square_of_direction(x->p, u);
+	square_from_sphere(x->p, u);
 }
 
 static int constant_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 			   struct error *e)
 {
 	struct texture radiance;
-	int code = emitter_texture(&radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
+	int code = emitter_read_texture(&radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (code)
 		return code;
 	struct color *c = em->data;
 	*c = radiance.color;
-	em->infinite = true;
-	em->shape = c->shape;
+	em->is_infinite = true;
+	em->color_kind = c->kind;
 	em->power = 4 * M_PI * color_mean(c);
-	em->brightest = color_max(c);
+	em->brightness_bound = color_max(c);
 	return 0;
 }
 

@@ -6,33 +6,33 @@ int delta_create(struct emitter *em, const struct scene_node *n, const char *nam
 {
 	struct delta_light *l = em->data;
 	struct texture t;
-	int code = emitter_texture(&t, n, name, COLOR_ILLUMINANT, build, e);
+	int code = emitter_read_texture(&t, n, name, COLOR_ILLUMINANT, build, e);
 	if (!code)
-		code = delta_place(em, n, factor, e);
+		code = delta_init(em, n, factor, e);
 	if (code)
 		return code;
 	l->color = t.color;
-	em->shape = l->color.shape;
-	em->brightest = DELTA_HEADROOM * factor * color_max(&l->color);
+	em->color_kind = l->color.kind;
+	em->brightness_bound = DELTA_HEADROOM * factor * color_max(&l->color);
 	return 0;
 }
 
-int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e)
+int delta_init(struct emitter *em, const struct scene_node *n, double factor, struct error *e)
 {
 	struct delta_light *l = em->data;
-	double away = vec3_length(l->x.p);
-	if (!(away <= PARAM_REACH_MAX))
-		return node_error(n, e, ERANGE, "is %g scene radii away from the scene, more than %g", away,
-				  PARAM_REACH_MAX);
+	double distance = vec3_length(l->point.p);
+	if (!(distance <= PARAM_DISTANCE_MAX))
+		return node_error(n, e, ERANGE, "is %g scene radii away from the scene, more than %g", distance,
+				  PARAM_DISTANCE_MAX);
 	if (!(factor > 0) || !isfinite(factor))
 		return node_error(n, e, EINVAL, "this light's strength is out of range at the scene's size");
 	l->factor = factor;
-	em->delta = true;
-	em->infinite = l->x.infinite;
+	em->is_delta = true;
+	em->is_infinite = l->point.is_infinite;
 	return 0;
 }
 
-bool delta_axes_of(const mat4 *to_world, vec3 axes[3])
+bool delta_axes_from_transform(const mat4 *to_world, vec3 axes[3])
 {
 	vec3 x = mat4_vector(to_world, (vec3){1, 0, 0}), y = mat4_vector(to_world, (vec3){0, 1, 0});
 	vec3 z = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
@@ -45,9 +45,11 @@ bool delta_axes_of(const mat4 *to_world, vec3 axes[3])
 	return vec3_is_finite(z) && vec3_is_finite(axes[1]) && fabs(side) > 0;
 }
 
-int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e)
+int delta_read_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e)
 {
-	return delta_axes_of(to_world, axes) ? 0 : node_error(n, e, EINVAL, "the to_world transform is singular");
+	return delta_axes_from_transform(to_world, axes)
+		       ? 0
+		       : node_error(n, e, EINVAL, "the to_world transform is singular");
 }
 
 double delta_strength(const struct delta_light *l)
@@ -55,22 +57,22 @@ double delta_strength(const struct delta_light *l)
 	return l->factor * color_mean(&l->color);
 }
 
-int delta_either(const struct scene_node *n, const char *name, struct error *e)
+int delta_check_exclusive(const struct scene_node *n, const char *name, struct error *e)
 {
-	if (node_find(n, name) && node_find(n, "to_world"))
+	if (node_find_property(n, name) && node_find_property(n, "to_world"))
 		return node_error(n, e, EINVAL, "%s and to_world are both given: only one is allowed", name);
 	return 0;
 }
 
 vec3 delta_origin(const mat4 *to_world, const struct emitter_build *build)
 {
-	return vec3_scale(build->scale, vec3_sub(mat4_point(to_world, (vec3){0, 0, 0}), build->center));
+	return vec3_scale(build->world_scale, vec3_sub(mat4_point(to_world, (vec3){0, 0, 0}), build->world_center));
 }
 
 bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
 {
 	(void)u;
-	*x = ((const struct delta_light *)em->data)->x;
+	*x = ((const struct delta_light *)em->data)->point;
 	*pdf_point = 1;
 	return true;
 }

@@ -17,26 +17,27 @@
 #define DELTA_HEADROOM 1024.0
 
 struct delta_light {
-	struct color color;	/* intensity or irradiance, in the scene's units */
-	double factor;		/* factor that converts `color` to the units of the rescaled world */
-	struct emitter_point x; /* the point, or the direction at infinity */
+	struct color color;	    /* intensity or irradiance, in the scene's units */
+	double factor;		    /* factor that converts `color` to the units of the rescaled world */
+	struct emitter_point point; /* the point, or the direction at infinity */
 };
 
 /* Reads the colour `name` of the node (1 by default) and sets all members of `em` except its power, which is the power
- * for intensity 1 times delta_strength(). The caller has set `x` of em->data. Returns 0 or a negative error code. */
+ * for intensity 1 times delta_strength(). The caller has set `point` of em->data. Returns 0 or a negative error code.
+ */
 int delta_create(struct emitter *em, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e);
 /* Like delta_create(), but without the colour: the caller sets shape, brightest and power. */
-int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
+int delta_init(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
 /* Computes unit axes of to_world: +z is kept, +y is made perpendicular to it, and a mirrored transform stays mirrored.
  * Returns false if to_world is singular. */
-bool delta_axes_of(const mat4 *to_world, vec3 axes[3]);
-/* Like delta_axes_of(), but returns 0, or -EINVAL with a sentence that names the node. */
-int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
+bool delta_axes_from_transform(const mat4 *to_world, vec3 axes[3]);
+/* Like delta_axes_from_transform(), but returns 0, or -EINVAL with a sentence that names the node. */
+int delta_read_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
 /* Returns the factor times the mean of the colour over wavelengths. */
 double delta_strength(const struct delta_light *l);
 /* Returns -EINVAL with a sentence if the node has both `name` and to_world, otherwise 0. */
-int delta_either(const struct scene_node *n, const char *name, struct error *e);
+int delta_check_exclusive(const struct scene_node *n, const char *name, struct error *e);
 /* Returns the origin of to_world in the rescaled world. */
 vec3 delta_origin(const mat4 *to_world, const struct emitter_build *build);
 

@@ -28,10 +28,10 @@ bool emitter_needs_surface(const struct scene_node *n)
 	return ops && ops->needs_surface;
 }
 
-bool emitter_is_in_medium(const struct scene_node *n)
+bool emitter_is_volumetric(const struct scene_node *n)
 {
 	const struct emitter_ops *ops = find_ops(n);
-	return ops && ops->in_medium;
+	return ops && ops->is_volumetric;
 }
 
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
@@ -52,25 +52,25 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 	return ops->create(em, n, build, e);
 }
 
-void emitter_move(const struct emitter *em, double time, struct emitter_room *room)
+void emitter_move(const struct emitter *em, double time, struct emitter_storage *storage)
 {
-	mat4 now = motion_at(em->moves, time);
-	assert(em->ops->data_size <= sizeof room->data);
-	memcpy(room->data, em->data, em->ops->data_size);
-	room->em = *em;
-	room->em.data = room->data;
-	room->em.moves = NULL;
-	em->ops->place(&room->em, &now);
+	mat4 to_world = motion_transform_at(em->motion, time);
+	assert(em->ops->data_size <= sizeof storage->data);
+	memcpy(storage->data, em->data, em->ops->data_size);
+	storage->em = *em;
+	storage->em.data = storage->data;
+	storage->em.motion = NULL;
+	em->ops->set_transform(&storage->em, &to_world);
 }
 
-int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
-		    const struct emitter_build *build, struct error *e)
+int emitter_read_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
+			 const struct emitter_build *build, struct error *e)
 {
-	const struct texture_build inner = {build->assets,
-					    build->arena,
-					    build->dialect_3,
-					    build->attributes,
-					    build->surface ? build->volumes : NULL,
-					    false};
-	return texture_from_node(t, n, name, 1, role, &inner, e);
+	const struct texture_build texture_build = {build->assets,
+						    build->arena,
+						    build->dialect_3,
+						    build->attributes,
+						    build->surface ? build->volumes : NULL,
+						    false};
+	return texture_from_node(t, n, name, 1, role, &texture_build, e);
 }

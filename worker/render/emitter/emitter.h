@@ -17,10 +17,10 @@
 #include "worker/render/texture/texture.h"
 
 struct emitter_point {
-	vec3 p;			    /* position, or direction towards the emitter when infinite */
-	vec3 n;			    /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
-	struct texture_point where; /* on the surface; unused when infinite */
-	bool infinite;
+	vec3 p; /* position, or direction towards the emitter when infinite */
+	vec3 n; /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
+	struct texture_point texture_point; /* on the surface; unused when infinite */
+	bool is_infinite;
 };
 
 /* The surface of an area emitter in the rescaled world. Its triangles are those that rays hit. */
@@ -33,8 +33,8 @@ struct emitter_surface {
 	const float (*position)[3];
 	const double (*unrounded)[3]; /* replaces `position` unless NULL; see worker/render/geom/primitive.h */
 	const uint32_t (*index)[3];
-	const float (*uv)[2];	    /* NULL: none */
-	const struct motion *moves; /* to the rescaled world, of a sphere from `center`; NULL: no motion */
+	const float (*uv)[2];	     /* NULL: none */
+	const struct motion *motion; /* to the rescaled world, of a sphere from `world_center`; NULL: no motion */
 };
 
 struct emitter_build {
@@ -43,8 +43,8 @@ struct emitter_build {
 	bool dialect_3;
 	const struct emitter_surface *surface; /* NULL: the emitter has no shape */
 	struct attribute_table *attributes;    /* of the mesh; NULL: none */
-	vec3 center;			       /* a scene point p is at scale (p - center) in the rescaled world */
-	double scale;
+	vec3 world_center;		       /* a scene point p is at scale (p - center) in the rescaled world */
+	double world_scale;
 	const struct volume_build *volumes; /* NULL: none */
 	double shutter_open, shutter_close; /* of the camera */
 };
@@ -55,7 +55,7 @@ struct emitter_ops {
 	struct plugin_decl decl;
 	size_t data_size;   /* bytes of em->data, which is zeroed before `create` is called; 0: none */
 	bool needs_surface; /* belongs to a shape */
-	bool in_medium;	    /* the medium inside its shape emits: no struct emitter is created for it */
+	bool is_volumetric; /* the medium inside its shape emits: no struct emitter is created for it */
 	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e);
 	/* Returns the radiance that leaves x in direction w (unit, away from the emitter, into the scene). */
@@ -76,41 +76,44 @@ struct emitter_ops {
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
 	/* Moves the emitter to its position at one time. to_world: transform to the rescaled world, from the motion of
-	 * the surface or from the emitter's own to_world, a VALUE_PLACE. NULL: the emitter cannot move. */
-	void (*place)(struct emitter *em, const mat4 *to_world);
+	 * the surface or from the emitter's own to_world, a VALUE_TRANSFORM_OR_ANIMATION. NULL: the emitter cannot
+	 * move. */
+	void (*set_transform)(struct emitter *em, const mat4 *to_world);
 };
 
 struct emitter {
 	const struct emitter_ops *ops;
-	bool infinite, textured, delta;
-	bool beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin alike
-		    */
-	uint64_t negative;	/* number of pixels of its image with a negative value, which counts as 0 */
-	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
+	bool is_infinite, is_textured, is_delta;
+	bool is_beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin
+		       * alike
+		       */
+	uint64_t negative_pixel_count; /* number of pixels of its image with a negative value, which counts as 0 */
+	enum color_kind color_kind;    /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
-	double brightest; /* upper bound of the radiance over positions, directions and wavelengths; for delta emitters,
-			     a bound below which pixels are expected to stay (delta.h) */
-	const struct motion *moves; /* motion to the rescaled world; NULL: none. With one, `data` describes the emitter
+	double brightness_bound; /* upper bound of the radiance over positions, directions and wavelengths; for delta
+			     emitters, a bound below which pixels are expected to stay (delta.h) */
+	const struct motion *motion; /* motion to the rescaled world; NULL: none. With one, `data` describes the emitter
 				       when the shutter opens */
 	void *data;
 };
 
-/* Storage for a moving emitter at one time. EMITTER_ROOM: the largest data_size. */
-enum { EMITTER_ROOM = 1024 };
-struct emitter_room {
+/* Storage for a moving emitter at one time. EMITTER_DATA_MAX: the largest data_size. */
+enum { EMITTER_DATA_MAX = 1024 };
+struct emitter_storage {
 	struct emitter em;
-	_Alignas(16) unsigned char data[EMITTER_ROOM];
+	_Alignas(16) unsigned char data[EMITTER_DATA_MAX];
 };
 
-/* Sets room->em to the moving emitter em at the given time. emitter_at returns it, or em itself if em does not move. */
-void emitter_move(const struct emitter *em, double time, struct emitter_room *room) __attribute__((cold));
-static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_room *room)
+/* Sets storage->em to the moving emitter em at the given time. emitter_at returns it, or em itself if em does not move.
+ */
+void emitter_move(const struct emitter *em, double time, struct emitter_storage *room) __attribute__((cold));
+static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_storage *storage)
 {
-	if (!em->moves)
+	if (!em->motion)
 		return em;
-	emitter_move(em, time, room);
-	return &room->em;
+	emitter_move(em, time, storage);
+	return &storage->em;
 }
 
 static inline bool emitter_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
@@ -128,7 +131,7 @@ static inline double emitter_pdf_toward(const struct emitter *em, vec3 ref, cons
 /* Returns whether emitters of this type belong to a shape. */
 bool emitter_needs_surface(const struct scene_node *n);
 /* Returns whether emitters of this type make the medium inside a shape emit. */
-bool emitter_is_in_medium(const struct scene_node *n);
+bool emitter_is_volumetric(const struct scene_node *n);
 
 /* Creates em from n, with em->data in build->arena. Returns 0 or a negative error code: -ENOTSUP if the type is not
  * known, -EINVAL if it has to be inside a shape and is not, or the other way round, -ENOMEM, or the code of the
@@ -136,8 +139,8 @@ bool emitter_is_in_medium(const struct scene_node *n);
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
 
 /* Reads the property `name` of an emitter, a colour or a texture; 1 if absent. Returns 0 or a negative error code. */
-int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
-		    const struct emitter_build *build, struct error *e);
+int emitter_read_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
+			 const struct emitter_build *build, struct error *e);
 
 extern const struct emitter_ops *const emitter_registry[]; /* ends with NULL */
 

@@ -14,7 +14,7 @@ static bool sample_direction(const struct emitter *em, const struct emitter_poin
 			     double *pdf_solid)
 {
 	(void)em, (void)x;
-	*w = vec3_normalize(direction_of_square(u));
+	*w = vec3_normalize(sphere_from_square(u));
 	*pdf_solid = 1 / (4 * M_PI);
 	return true;
 }
@@ -28,29 +28,29 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct delta_light *l = em->data;
-	int code = delta_either(n, "position", e);
+	int code = delta_check_exclusive(n, "position", e);
 	if (code)
 		return code;
 	mat4 to_world = node_transform(n, "to_world");
-	const struct property *position = node_find(n, "position");
+	const struct property *position = node_find_property(n, "position");
 	vec3 p = position ? position->value.as.point : mat4_point(&to_world, (vec3){0, 0, 0});
-	l->x.p = vec3_scale(build->scale, vec3_sub(p, build->center));
-	code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
+	l->point.p = vec3_scale(build->world_scale, vec3_sub(p, build->world_center));
+	code = delta_create(em, n, "intensity", build->world_scale * build->world_scale, build, e);
 	if (!code)
 		em->power = 4 * M_PI * delta_strength(l);
 	return code;
 }
 
-static void place(struct emitter *em, const mat4 *to_world)
+static void set_transform(struct emitter *em, const mat4 *to_world)
 {
 	struct delta_light *l = em->data;
-	l->x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	l->point.p = mat4_point(to_world, (vec3){0, 0, 0});
 }
 
 const struct emitter_ops emitter_ops_point = {
 	.decl = PLUGIN(EMITTER, "point", {.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 		       {.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "to_world", .types = VALUE_TRANSFORM_OR_ANIMATION},
 		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct delta_light),
 	.create = create,
@@ -58,5 +58,5 @@ const struct emitter_ops emitter_ops_point = {
 	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
-	.place = place,
+	.set_transform = set_transform,
 };

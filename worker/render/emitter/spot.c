@@ -11,12 +11,12 @@
 struct spot {
 	struct delta_light light;
 	struct frame axes;
-	double cutoff, beam; /* radians */
-	double height;	     /* height of the cone's spherical cap: 1 - cos(cutoff) */
-	bool textured;
+	double cutoff, beam_width; /* radians */
+	double cap_height;	   /* height of the cone's spherical cap: 1 - cos(cutoff) */
+	bool has_texture;
 	struct texture texture;
-	vec3 local[3]; /* unit axes of the texture */
-	double reach;  /* tan(cutoff) */
+	vec3 texture_axes[3]; /* unit axes of the texture */
+	double cutoff_slope;  /* tan(cutoff) */
 };
 
 static double falloff(const struct spot *s, vec3 w)
@@ -24,7 +24,7 @@ static double falloff(const struct spot *s, vec3 w)
 	double angle = atan2(vec3_length(vec3_cross(s->axes.n, w)), vec3_dot(s->axes.n, w));
 	if (angle >= s->cutoff)
 		return 0;
-	return angle <= s->beam ? 1 : (s->cutoff - angle) / (s->cutoff - s->beam);
+	return angle <= s->beam_width ? 1 : (s->cutoff - angle) / (s->cutoff - s->beam_width);
 }
 
 static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
@@ -33,12 +33,12 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 	const struct spot *s = em->data;
 	double part = falloff(s, w);
 	spectrum intensity = spectrum_scale(s->light.factor * part, color_eval(&s->light.color, wl));
-	if (!s->textured || !(part > 0))
+	if (!s->has_texture || !(part > 0))
 		return intensity;
-	double z = 2 * s->reach * vec3_dot(s->local[2], w);
-	const struct texture_point at = {.u = 0.5 + vec3_dot(s->local[0], w) / z,
-					 .v = 0.5 + vec3_dot(s->local[1], w) / z};
-	return spectrum_mul(intensity, texture_eval(&s->texture, &at, wl));
+	double z = 2 * s->cutoff_slope * vec3_dot(s->texture_axes[2], w);
+	const struct texture_point point = {.u = 0.5 + vec3_dot(s->texture_axes[0], w) / z,
+					    .v = 0.5 + vec3_dot(s->texture_axes[1], w) / z};
+	return spectrum_mul(intensity, texture_eval(&s->texture, &point, wl));
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -46,9 +46,9 @@ static bool sample_direction(const struct emitter *em, const struct emitter_poin
 {
 	(void)x;
 	const struct spot *s = em->data;
-	double down = u[0] * s->height, r = sqrt(down * (2 - down)), phi = 2 * M_PI * u[1];
+	double down = u[0] * s->cap_height, r = sqrt(down * (2 - down)), phi = 2 * M_PI * u[1];
 	*w = vec3_normalize(frame_to_world(&s->axes, (vec3){r * cos(phi), r * sin(phi), 1 - down}));
-	*pdf_solid = 1 / (2 * M_PI * s->height);
+	*pdf_solid = 1 / (2 * M_PI * s->cap_height);
 	return true;
 }
 
@@ -56,29 +56,29 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 {
 	(void)x;
 	const struct spot *s = em->data;
-	return falloff(s, w) > 0 ? 1 / (2 * M_PI * s->height) : 0;
+	return falloff(s, w) > 0 ? 1 / (2 * M_PI * s->cap_height) : 0;
 }
 
 static int read_texture(struct emitter *em, struct spot *s, const struct scene_node *n, const mat4 *to_world,
 			const struct emitter_build *build, struct error *e)
 {
-	const struct property *given = node_find(n, "texture");
-	s->textured =
-		given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores a colour or a number */
-	if (!s->textured)
+	const struct property *property = node_find_property(n, "texture");
+	s->has_texture = property && (build->dialect_3 ||
+				      property->value.type == VALUE_NODE); /* 0.6 ignores a colour or a number */
+	if (!s->has_texture)
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))
 		return node_error(n, e, EINVAL, "a texture needs a cutoff_angle of at most 89 degrees");
-	int code = emitter_texture(&s->texture, n, "texture", COLOR_REFLECTANCE, build, e);
+	int code = emitter_read_texture(&s->texture, n, "texture", COLOR_REFLECTANCE, build, e);
 	if (!code)
-		code = delta_axes(n, to_world, s->local, e);
+		code = delta_read_axes(n, to_world, s->texture_axes, e);
 	if (code)
 		return code;
-	s->reach = tan(s->cutoff);
-	em->textured = !texture_is_constant(&s->texture);
-	if (texture_shape(&s->texture) != COLOR_SHAPE_CONSTANT)
-		em->shape = COLOR_SHAPE_OTHER;
-	em->brightest *= texture_max(&s->texture);
+	s->cutoff_slope = tan(s->cutoff);
+	em->is_textured = !texture_is_constant(&s->texture);
+	if (texture_color_kind(&s->texture) != COLOR_KIND_CONSTANT)
+		em->color_kind = COLOR_KIND_OTHER;
+	em->brightness_bound *= texture_max(&s->texture);
 	em->power *= texture_max(&s->texture);
 	return 0;
 }
@@ -90,37 +90,38 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	vec3 axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	if (!vec3_is_finite(axis))
 		return node_error(n, e, EINVAL, "to_world gives the spot no direction");
-	double cutoff = node_float(n, "cutoff_angle", 20), beam = node_float(n, "beam_width", 0.75 * cutoff);
-	if (beam > cutoff)
-		return node_error(n, e, EINVAL, "beam_width=%g exceeds cutoff_angle=%g", beam, cutoff);
+	double cutoff = node_float(n, "cutoff_angle", 20), beam_width = node_float(n, "beam_width", 0.75 * cutoff);
+	if (beam_width > cutoff)
+		return node_error(n, e, EINVAL, "beam_width=%g exceeds cutoff_angle=%g", beam_width, cutoff);
 	s->axes = frame_around(axis);
 	s->cutoff = cutoff * (M_PI / 180);
-	s->beam = beam * (M_PI / 180);
-	s->height = 2 * pow(sin(0.5 * s->cutoff), 2);
-	s->light.x.p = delta_origin(&to_world, build);
-	int code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
+	s->beam_width = beam_width * (M_PI / 180);
+	s->cap_height = 2 * pow(sin(0.5 * s->cutoff), 2);
+	s->light.point.p = delta_origin(&to_world, build);
+	int code = delta_create(em, n, "intensity", build->world_scale * build->world_scale, build, e);
 	if (code)
 		return code;
 	/* The integral of the fall-off over the cone is 2 pi (1 - slope). */
-	double slope = s->cutoff > s->beam ? (sin(s->cutoff) - sin(s->beam)) / (s->cutoff - s->beam) : cos(s->cutoff);
+	double slope = s->cutoff > s->beam_width ? (sin(s->cutoff) - sin(s->beam_width)) / (s->cutoff - s->beam_width)
+						 : cos(s->cutoff);
 	em->power = 2 * M_PI * (1 - slope) * delta_strength(&s->light);
 	return read_texture(em, s, n, &to_world, build, e);
 }
 
-/* delta_axes_of cannot fail: a moving transform has an inverse and its determinant keeps its sign, so it has axes at
- * every time if `create` accepted it. */
-static void place(struct emitter *em, const mat4 *to_world)
+/* delta_axes_from_transform cannot fail: a moving transform has an inverse and its determinant keeps its sign, so it
+ * has axes at every time if `create` accepted it. */
+static void set_transform(struct emitter *em, const mat4 *to_world)
 {
 	struct spot *s = em->data;
-	s->light.x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	s->light.point.p = mat4_point(to_world, (vec3){0, 0, 0});
 	s->axes = frame_around(vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1})));
-	if (s->textured)
-		delta_axes_of(to_world, s->local);
+	if (s->has_texture)
+		delta_axes_from_transform(to_world, s->texture_axes);
 }
 
 const struct emitter_ops emitter_ops_spot = {
 	.decl = PLUGIN(EMITTER, "spot", {.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "to_world", .types = VALUE_TRANSFORM_OR_ANIMATION},
 		       {.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
 		       {.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
 		       {.name = "texture", .types = VALUE_TEXTURE, .max = 1},
@@ -131,5 +132,5 @@ const struct emitter_ops emitter_ops_spot = {
 	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
-	.place = place,
+	.set_transform = set_transform,
 };

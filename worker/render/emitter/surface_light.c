@@ -11,7 +11,7 @@
 #include "worker/render/math/search.h"
 #include "worker/render/math/sphere.h"
 
-static vec3 vertex_of(const struct surface_light *l, uint32_t i)
+static vec3 vertex_position(const struct surface_light *l, uint32_t i)
 {
 	const float *p = l->surface.position[i];
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
@@ -23,45 +23,45 @@ vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int 
 	const double(*u)[3] = l->surface.unrounded;
 	if (u)
 		return (vec3){u[i][0], u[i][1], u[i][2]};
-	return l->placed ? mat4_point(&l->to_world, vertex_of(l, i)) : vertex_of(l, i);
+	return l->is_moving_mesh ? mat4_point(&l->to_world, vertex_position(l, i)) : vertex_position(l, i);
 }
 
 /* A triangle's first corner, and its edges from there. */
-struct wedge {
+struct triangle_edges {
 	vec3 v0, e1, e2;
 };
 
 /* Not inlined: most lights do not move, and are neither very large nor very small. */
-__attribute__((noinline)) static void other_wedge(const struct surface_light *l, uint32_t i, struct wedge *t)
+__attribute__((noinline)) static void compute_edges(const struct surface_light *l, uint32_t i, struct triangle_edges *t)
 {
 	t->v0 = surface_light_corner(l, i, 0);
 	t->e1 = vec3_sub(surface_light_corner(l, i, 1), t->v0);
 	t->e2 = vec3_sub(surface_light_corner(l, i, 2), t->v0);
 }
 
-static inline struct wedge wedge_of(const struct surface_light *l, uint32_t i)
+static inline struct triangle_edges triangle_edges_of(const struct surface_light *l, uint32_t i)
 {
-	struct wedge t;
-	if (l->other) {
-		other_wedge(l, i, &t);
+	struct triangle_edges t;
+	if (l->has_computed_corners) {
+		compute_edges(l, i, &t);
 		return t;
 	}
 	const uint32_t *k = l->surface.index[i];
-	t.v0 = vertex_of(l, k[0]);
-	t.e1 = vec3_sub(vertex_of(l, k[1]), t.v0);
-	t.e2 = vec3_sub(vertex_of(l, k[2]), t.v0);
+	t.v0 = vertex_position(l, k[0]);
+	t.e1 = vec3_sub(vertex_position(l, k[1]), t.v0);
+	t.e2 = vec3_sub(vertex_position(l, k[2]), t.v0);
 	return t;
 }
 
 vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle)
 {
-	const struct wedge t = wedge_of(l, triangle);
+	const struct triangle_edges t = triangle_edges_of(l, triangle);
 	return vec3_cross(t.e1, t.e2);
 }
 
-void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2])
+void surface_light_barycentrics(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2])
 {
-	const struct wedge t = wedge_of(l, triangle);
+	const struct triangle_edges t = triangle_edges_of(l, triangle);
 	vec3 r = vec3_sub(p, t.v0), n = vec3_cross(t.e1, t.e2);
 	double n2 = vec3_dot(n, n);
 	b[0] = vec3_dot(vec3_cross(r, t.e2), n) / n2;
@@ -92,7 +92,7 @@ static int build_cdf(struct surface_light *l, struct arena *arena)
 	return 0;
 }
 
-static void move(struct surface_light *l, const mat4 *to_world)
+static void transform_surface(struct surface_light *l, const mat4 *to_world)
 {
 	struct emitter_surface *s = &l->surface;
 	if (!s->is_sphere) {
@@ -107,9 +107,9 @@ static void move(struct surface_light *l, const mat4 *to_world)
 	l->area = sphere_area(l);
 }
 
-void surface_light_place(struct emitter *em, const mat4 *to_world)
+void surface_light_set_transform(struct emitter *em, const mat4 *to_world)
 {
-	move(em->data, to_world);
+	transform_surface(em->data, to_world);
 }
 
 /* Returns the mean area of a moving surface over time, which is used to choose among emitters. */
@@ -118,12 +118,12 @@ static double mean_area(const struct surface_light *l)
 	enum { TIMES = 8 };
 	double sum = 0;
 	for (int k = 0; k < TIMES; k++) {
-		struct surface_light at = *l;
-		mat4 now = motion_at(l->surface.moves, (k + 0.5) / TIMES);
-		move(&at, &now);
-		sum += l->surface.is_sphere ? at.area : 0;
+		struct surface_light moved = *l;
+		mat4 to_world = motion_transform_at(l->surface.motion, (k + 0.5) / TIMES);
+		transform_surface(&moved, &to_world);
+		sum += l->surface.is_sphere ? moved.area : 0;
 		for (uint32_t i = 0; i < l->surface.triangle_count; i++)
-			sum += triangle_area(&at, i);
+			sum += triangle_area(&moved, i);
 	}
 	return sum / TIMES;
 }
@@ -133,48 +133,49 @@ int surface_light_create(struct emitter *em, const struct scene_node *n, const s
 {
 	struct surface_light *l = em->data;
 	l->surface = *build->surface;
-	int rc = emitter_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
+	int rc = emitter_read_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (rc)
 		return rc;
-	em->moves = l->surface.moves;
-	l->placed = em->moves && !l->surface.is_sphere;
-	l->other = l->placed || l->surface.unrounded;
-	if (l->placed)
-		l->to_world = motion_at(em->moves, 0);
+	em->motion = l->surface.motion;
+	l->is_moving_mesh = em->motion && !l->surface.is_sphere;
+	l->has_computed_corners = l->is_moving_mesh || l->surface.unrounded;
+	if (l->is_moving_mesh)
+		l->to_world = motion_transform_at(em->motion, 0);
 	if (l->surface.is_sphere)
 		l->area = sphere_area(l);
 	else if (build_cdf(l, build->arena))
 		return error_set(e, ENOMEM, "out of memory");
-	if (em->moves)
+	if (em->motion)
 		l->area = mean_area(l);
 	if (!(l->area > 0))
 		return node_error(n, e, EINVAL, "an area emitter needs a shape whose area is above 0");
-	em->textured = !texture_is_constant(&l->radiance);
-	em->shape = texture_shape(&l->radiance);
-	em->brightest = texture_max(&l->radiance);
+	em->is_textured = !texture_is_constant(&l->radiance);
+	em->color_kind = texture_color_kind(&l->radiance);
+	em->brightness_bound = texture_max(&l->radiance);
 	return 0;
 }
 
-void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitter_point *x)
+void surface_light_set_sphere_point(const struct surface_light *l, vec3 w, struct emitter_point *x)
 {
 	x->p = vec3_madd(l->surface.center, l->surface.radius, w);
 	x->n = vec3_scale(l->surface.normal_sign, w);
-	x->where = (struct texture_point){.p = x->p};
-	sphere_uv(&l->surface.sphere_axes, w, &x->where.u, &x->where.v);
+	x->texture_point = (struct texture_point){.p = x->p};
+	sphere_uv(&l->surface.sphere_axes, w, &x->texture_point.u, &x->texture_point.v);
 }
 
-void surface_light_on_triangle(const struct surface_light *l, uint32_t i, double b1, double b2, struct emitter_point *x)
+void surface_light_set_triangle_point(const struct surface_light *l, uint32_t i, double b1, double b2,
+				      struct emitter_point *x)
 {
 	const struct emitter_surface *s = &l->surface;
-	const struct wedge t = wedge_of(l, i);
+	const struct triangle_edges t = triangle_edges_of(l, i);
 	x->p = vec3_madd(vec3_madd(t.v0, b1, t.e1), b2, t.e2);
 	x->n = vec3_normalize(vec3_cross(t.e1, t.e2));
-	x->where = (struct texture_point){b1, b2, b1, b2, i, .p = x->p};
+	x->texture_point = (struct texture_point){b1, b2, b1, b2, i, .p = x->p};
 	if (s->uv) {
 		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
 		double b0 = 1 - b1 - b2;
-		x->where.u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
-		x->where.v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
+		x->texture_point.u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
+		x->texture_point.v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
 	}
 }
 
@@ -186,39 +187,39 @@ static uint32_t find_triangle(const struct surface_light *l, double u, double *r
 	return i;
 }
 
-__attribute__((noinline)) static double placed_density(const struct surface_light *l, uint32_t i)
+__attribute__((noinline)) static double moving_mesh_pdf(const struct surface_light *l, uint32_t i)
 {
 	return (l->cdf[i + 1] - l->cdf[i]) / triangle_area(l, i);
 }
 
-static inline double density(const struct surface_light *l, uint32_t i)
+static inline double triangle_pdf(const struct surface_light *l, uint32_t i)
 {
-	return l->placed ? placed_density(l, i) : 1 / l->area;
+	return l->is_moving_mesh ? moving_mesh_pdf(l, i) : 1 / l->area;
 }
 
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf)
 {
 	const struct surface_light *l = em->data;
-	x->infinite = false;
+	x->is_infinite = false;
 	if (l->surface.is_sphere) {
 		*pdf = 1 / l->area;
-		surface_light_on_sphere(l, direction_of_square(u), x);
+		surface_light_set_sphere_point(l, sphere_from_square(u), x);
 		return true;
 	}
 	double v;
 	uint32_t i = find_triangle(l, u[0], &v);
 	double root = sqrt(v);
-	*pdf = density(l, i);
-	surface_light_on_triangle(l, i, 1 - root, root * u[1], x);
+	*pdf = triangle_pdf(l, i);
+	surface_light_set_triangle_point(l, i, 1 - root, root * u[1], x);
 	return true;
 }
 
 double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x)
 {
-	return density(em->data, x->where.prim);
+	return triangle_pdf(em->data, x->texture_point.prim);
 }
 
-static double below_1(double x)
+static double clamp_below_1(double x)
 {
 	return fmin(fmax(x, 0), 1 - 0x1p-53);
 }
@@ -226,18 +227,19 @@ static double below_1(double x)
 static void triangle_inverse(const struct surface_light *l, const struct emitter_point *x, double u[2])
 {
 	double b[2];
-	surface_light_weights(l, x->where.prim, x->p, b);
-	double root = fmin(fmax(1 - b[0], 0), 1), low = l->cdf[x->where.prim], high = l->cdf[x->where.prim + 1];
+	surface_light_barycentrics(l, x->texture_point.prim, x->p, b);
+	double root = fmin(fmax(1 - b[0], 0), 1), low = l->cdf[x->texture_point.prim],
+	       high = l->cdf[x->texture_point.prim + 1];
 	/* Rounding must not select another triangle. */
 	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
-	u[1] = root > 0 ? below_1(b[1] / root) : 0;
+	u[1] = root > 0 ? clamp_below_1(b[1] / root) : 0;
 }
 
 void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
 {
 	const struct surface_light *l = em->data;
 	if (l->surface.is_sphere)
-		square_of_direction(vec3_scale(1 / l->surface.radius, vec3_sub(x->p, l->surface.center)), u);
+		square_from_sphere(vec3_scale(1 / l->surface.radius, vec3_sub(x->p, l->surface.center)), u);
 	else
 		triangle_inverse(l, x, u);
 }

@@ -17,10 +17,10 @@ struct surface_light {
 	double area; /* in the rescaled world; of a moving surface the mean over time, of a sphere that has been placed
 			its area then */
 	double *cdf; /* cumulative areas of triangles; cdf[triangle_count] = 1; NULL: a sphere */
-	bool placed; /* a mesh that moves: positions are in its own frame, which to_world transforms to the rescaled
-			world */
+	bool is_moving_mesh; /* a mesh that moves: positions are in its own frame, which to_world transforms to the
+			rescaled world */
 	mat4 to_world;
-	bool other; /* corners are not simply surface.position: `placed`, or surface.unrounded */
+	bool has_computed_corners; /* corners are not simply surface.position: `is_moving_mesh`, or surface.unrounded */
 };
 
 /* Reads `radiance` and sets all members of `em` except its power; brightest becomes the largest radiance.
@@ -30,7 +30,7 @@ int surface_light_create(struct emitter *em, const struct scene_node *n, const s
 			 struct error *e);
 
 /* Operations of struct emitter_ops. A plug-in with further data that depends on the position has its own `place`. */
-void surface_light_place(struct emitter *em, const mat4 *to_world);
+void surface_light_set_transform(struct emitter *em, const mat4 *to_world);
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf);
 double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x);
 void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2]);
@@ -39,12 +39,12 @@ void surface_light_point_inverse(const struct emitter *em, const struct emitter_
 	.point_inverse = surface_light_point_inverse
 
 /* Sets x to the point of a sphere in the unit direction w from its centre. */
-void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitter_point *x);
+void surface_light_set_sphere_point(const struct surface_light *l, vec3 w, struct emitter_point *x);
 /* Sets x to the point of a triangle with the barycentric weights b1 of its second corner and b2 of its third. */
-void surface_light_on_triangle(const struct surface_light *l, uint32_t triangle, double b1, double b2,
-			       struct emitter_point *x);
+void surface_light_set_triangle_point(const struct surface_light *l, uint32_t triangle, double b1, double b2,
+				      struct emitter_point *x);
 /* Computes the barycentric weights of the triangle's second and third corner at a point p in its plane. */
-void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2]);
+void surface_light_barycentrics(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2]);
 /* Returns the normal of a triangle, with twice its area as length. */
 vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle);
 /* Returns corner k, from 0 to 2, of a triangle. */

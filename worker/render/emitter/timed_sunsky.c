@@ -2,9 +2,9 @@
 /*
  * Daylight over a period, `timed_sunsky` of Mitsuba 3.7. The emitter's time from shutter_open to shutter_close covers a
  * window of hours on each day from the first to the one before the last; the camera's shutter is open for a part of
- * that time. The emitter is an environment map of the mean light in that part: the sky at SKIES times, and the sun at
- * SUNS times, each with one point of its disk. If the camera's shutter closes at the time it opens, the map consists of
- * one sky and DISK points of the sun. There is no light while the sun is below the horizon.
+ * that time. The emitter is an environment map of the mean light in that part: the sky at SKY_SAMPLES times, and the
+ * sun at SUN_SAMPLES times, each with one point of its disk. If the camera's shutter closes at the time it opens, the
+ * map consists of one sky and DISK_SAMPLES points of the sun. There is no light while the sun is below the horizon.
  *
  * Creation fails as described in sunsky.c, if times are not in order, if the camera's shutter is open outside the
  * emitter's time, and in a scene of 0.6.
@@ -16,117 +16,122 @@
 #include <string.h>
 
 enum {
-	SKIES = 256,
-	SUNS = 1 << 20,
-	DISK = 1 << 12,
+	SKY_SAMPLES = 256,
+	SUN_SAMPLES = 1 << 20,
+	DISK_SAMPLES = 1 << 12,
 	SKY_WIDTH = 256,
 	SKY_HEIGHT = 128,
-	HEIGHTS = 256,
-	SCALE = 8,
+	SUN_ANGLES = 256,
+	SKY_SCALE = 8,
 	DAYS_MAX = 366 * 200
 };
 
 /* Irrational steps whose multiples, modulo 1, fill an interval or a square evenly (Roberts 2018). */
-#define STEP 0.6180339887498949
-#define STEP_X 0.7548776662466927
-#define STEP_Y 0.5698402909980532
+#define SKY_STEP 0.6180339887498949
+#define DISK_STEP_X 0.7548776662466927
+#define DISK_STEP_Y 0.5698402909980532
 
 static double fraction(double x)
 {
 	return x - floor(x);
 }
 
-struct timed {
-	struct daylight_time first; /* hour: beginning of the window */
-	double hours;		    /* length of the window */
-	int days;
-	double from, to; /* the part of the emitter's time, from 0 to 1, during which the camera's shutter is open */
-	int skies, suns; /* numbers of samples */
-	double turbidity, albedo[3], radius, sky_scale, sun_scale;
+struct sun_period {
+	struct daylight_time start; /* hour: beginning of the window */
+	double window_hours;	    /* length of the window */
+	int day_count;
+	double shutter_begin, shutter_end; /* the part of the emitter's time, from 0 to 1, during which the camera's
+					      shutter is open */
+	int sky_samples, sun_samples;	   /* numbers of samples */
+	double turbidity, albedo[3], sun_radius, sky_scale, sun_scale;
 	struct envmap_axes axes;
 	struct image image;
 };
 
 /* Computes the direction of the sun and its angle from the zenith at a share of the camera's shutter time. Returns
  * false if the sun is below the horizon. */
-static bool sun_at(const struct timed *t, double share, vec3 *towards, double *angle)
+static bool sun_direction_at(const struct sun_period *t, double share, vec3 *sun_direction, double *angle)
 {
-	struct daylight_time now = t->first;
-	double day = fmin((t->from + share * (t->to - t->from)) * t->days, t->days * (1 - 0x1p-52)), whole = floor(day);
-	now.day += (int)whole;
-	now.hour += (day - whole) * t->hours;
-	*towards = sunsky_compass(daylight_position(&now), true);
-	*angle = atan2(hypot(towards->x, towards->z), towards->y);
+	struct daylight_time moment = t->start;
+	double day = fmin((t->shutter_begin + share * (t->shutter_end - t->shutter_begin)) * t->day_count,
+			  t->day_count * (1 - 0x1p-52)),
+	       whole_days = floor(day);
+	moment.day += (int)whole_days;
+	moment.hour += (day - whole_days) * t->window_hours;
+	*sun_direction = sunsky_map_direction(daylight_sun_direction(&moment), true);
+	*angle = atan2(hypot(sun_direction->x, sun_direction->z), sun_direction->y);
 	return *angle <= 0.5 * M_PI;
 }
 
-/* ---- the map: rows from up (+y) down, columns from -z on over +x ---- */
+/* ---- the map: rows from up (+y) down, columns shutter_begin -z on over +x ---- */
 
-static vec3 direction(double column, double row)
+static vec3 map_direction(double column, double row)
 {
 	double phi = 2 * M_PI * column, theta = M_PI * row;
 	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
 }
 
-static void add_sky(const struct timed *t, vec3 towards, double angle, double *mean)
+static void accumulate_sky(const struct sun_period *t, vec3 sun_direction, double angle, double *mean)
 {
-	struct daylight sky = daylight_of(t->turbidity, t->albedo, angle);
+	struct daylight sky = daylight_make(t->turbidity, t->albedo, angle);
 	for (int y = 0; y < SKY_HEIGHT / 2; y++)
 		for (int x = 0; x < SKY_WIDTH; x++) {
 			double row = (y + 0.5) / SKY_HEIGHT, rgb[3];
-			vec3 d = direction((x + 0.5) / SKY_WIDTH, row);
-			double gamma = atan2(vec3_length(vec3_cross(d, towards)), vec3_dot(d, towards));
-			daylight_sky(&sky, M_PI * row, gamma, rgb);
+			vec3 d = map_direction((x + 0.5) / SKY_WIDTH, row);
+			double gamma = atan2(vec3_length(vec3_cross(d, sun_direction)), vec3_dot(d, sun_direction));
+			daylight_sky_radiance(&sky, M_PI * row, gamma, rgb);
 			for (int k = 0; k < 3; k++)
-				mean[3 * (y * SKY_WIDTH + x) + k] += t->sky_scale * rgb[k] / t->skies;
+				mean[3 * (y * SKY_WIDTH + x) + k] += t->sky_scale * rgb[k] / t->sky_samples;
 		}
 	liveness_tick();
 }
 
 /* Interpolates the coarse sky bilinearly; its outer rows continue to the pole and to the horizon. */
-static void put_sky(const struct timed *t, const double *mean)
+static void upsample_sky(const struct sun_period *t, const double *mean)
 {
 	for (uint32_t y = 0; y < t->image.height / 2; y++)
 		for (uint32_t x = 0; x < t->image.width; x++) {
-			double row = (y + 0.5) / SCALE - 0.5, column = (x + 0.5) / SCALE - 0.5;
+			double row = (y + 0.5) / SKY_SCALE - 0.5, column = (x + 0.5) / SKY_SCALE - 0.5;
 			int r = (int)floor(row), c = (int)floor(column), up = r < 0 ? 0 : r,
 			    down = r + 1 < SKY_HEIGHT / 2 ? r + 1 : SKY_HEIGHT / 2 - 1;
 			double v = row - r, u = column - c;
 			for (int k = 0; k < 3; k++) {
-				const double *at = mean + k;
+				const double *channel = mean + k;
 				int left = (c + SKY_WIDTH) % SKY_WIDTH, right = (c + 1) % SKY_WIDTH;
-				double a = at[3 * (up * SKY_WIDTH + left)], b = at[3 * (up * SKY_WIDTH + right)],
-				       d = at[3 * (down * SKY_WIDTH + left)], f = at[3 * (down * SKY_WIDTH + right)];
+				double a = channel[3 * (up * SKY_WIDTH + left)],
+				       b = channel[3 * (up * SKY_WIDTH + right)],
+				       d = channel[3 * (down * SKY_WIDTH + left)],
+				       f = channel[3 * (down * SKY_WIDTH + right)];
 				t->image.pixels[3 * ((size_t)y * t->image.width + x) + (size_t)k] =
 					(float)((1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * f));
 			}
 		}
 }
 
-static int bake_sky(const struct timed *t, struct arena *room)
+static int bake_sky(const struct sun_period *t, struct arena *scratch)
 {
-	double *mean = arena_alloc(room, (size_t)SKY_WIDTH * SKY_HEIGHT / 2, 3 * sizeof *mean);
+	double *mean = arena_alloc(scratch, (size_t)SKY_WIDTH * SKY_HEIGHT / 2, 3 * sizeof *mean);
 	if (!mean)
 		return -ENOMEM;
-	for (int i = 0; i < t->skies && t->sky_scale > 0; i++) {
-		vec3 towards;
+	for (int i = 0; i < t->sky_samples && t->sky_scale > 0; i++) {
+		vec3 sun_direction;
 		double angle;
-		if (sun_at(t, (i + fraction(i * STEP)) / t->skies, &towards, &angle))
-			add_sky(t, towards, angle, mean);
+		if (sun_direction_at(t, (i + fraction(i * SKY_STEP)) / t->sky_samples, &sun_direction, &angle))
+			accumulate_sky(t, sun_direction, angle, mean);
 	}
-	put_sky(t, mean);
+	upsample_sky(t, mean);
 	return 0;
 }
 
-/* Computes the radiance of the disk at its true size, for HEIGHTS angles from the zenith. */
-static void sun_colors(const struct timed *t, double rgb[HEIGHTS][3])
+/* Computes the radiance of the disk at its true size, for SUN_ANGLES angles from the zenith. */
+static void tabulate_sun(const struct sun_period *t, double rgb[SUN_ANGLES][3])
 {
-	for (int i = 0; i < HEIGHTS; i++)
-		daylight_sun(t->turbidity, 0.5 * M_PI * i / (HEIGHTS - 1), rgb[i]);
+	for (int i = 0; i < SUN_ANGLES; i++)
+		daylight_sun_radiance(t->turbidity, 0.5 * M_PI * i / (SUN_ANGLES - 1), rgb[i]);
 }
 
 /* Adds light from a direction to four pixels, with bilinear weights. l: radiance times solid angle. */
-static void splat(const struct timed *t, vec3 d, const double l[3])
+static void splat_light(const struct sun_period *t, vec3 d, const double l[3])
 {
 	const struct image *m = &t->image;
 	double column = (atan2(d.x, -d.z) / (2 * M_PI) + 1) * m->width - 0.5,
@@ -143,106 +148,108 @@ static void splat(const struct timed *t, vec3 d, const double l[3])
 	}
 }
 
-static void bake_sun(const struct timed *t)
+static void bake_sun(const struct sun_period *t)
 {
 	static const vec3 up = {0, 1, 0};
-	double colors[HEIGHTS][3], whole = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2);
-	sun_colors(t, colors);
-	for (int i = 0; i < t->suns; i++) {
-		vec3 towards;
+	double colors[SUN_ANGLES][3], solid_angle = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2);
+	tabulate_sun(t, colors);
+	for (int i = 0; i < t->sun_samples; i++) {
+		vec3 sun_direction;
 		double angle, l[3];
 		if (i % 4096 == 0)
 			liveness_tick();
-		if (!sun_at(t, (i + 0.5) / t->suns, &towards, &angle))
+		if (!sun_direction_at(t, (i + 0.5) / t->sun_samples, &sun_direction, &angle))
 			continue;
-		double place = angle / (0.5 * M_PI) * (HEIGHTS - 1), r = t->radius * sqrt(fraction(i * STEP_X)),
-		       phi = 2 * M_PI * fraction(i * STEP_Y);
-		int low = (int)fmin(place, HEIGHTS - 2);
+		double position = angle / (0.5 * M_PI) * (SUN_ANGLES - 1),
+		       r = t->sun_radius * sqrt(fraction(i * DISK_STEP_X)), phi = 2 * M_PI * fraction(i * DISK_STEP_Y);
+		int low = (int)fmin(position, SUN_ANGLES - 2);
 		for (int k = 0; k < 3; k++)
-			l[k] = t->sun_scale * whole / t->suns *
-			       (colors[low][k] + (place - low) * (colors[low + 1][k] - colors[low][k]));
-		struct frame f = frame_along(towards, up);
-		splat(t, frame_to_world(&f, (vec3){sin(r) * cos(phi), sin(r) * sin(phi), cos(r)}), l);
+			l[k] = t->sun_scale * solid_angle / t->sun_samples *
+			       (colors[low][k] + (position - low) * (colors[low + 1][k] - colors[low][k]));
+		struct frame f = frame_along(sun_direction, up);
+		splat_light(t, frame_to_world(&f, (vec3){sin(r) * cos(phi), sin(r) * sin(phi), cos(r)}), l);
 	}
 }
 
 /* ---- reading ---- */
 
 /* Reads the part of the emitter's time in which the camera's shutter is open. */
-static int read_shutter(struct timed *t, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+static int read_shutter(struct sun_period *t, const struct scene_node *n, const struct emitter_build *build,
+			struct error *e)
 {
 	double open = node_float(n, "shutter_open", 0), length = node_float(n, "shutter_close", 1) - open;
 	if (!(length > 0))
 		return node_error(n, e, EINVAL, "its shutter_close must be after its shutter_open");
-	t->from = (build->shutter_open - open) / length;
-	t->to = (build->shutter_close - open) / length;
-	if (!(t->from >= 0 && t->to <= 1))
+	t->shutter_begin = (build->shutter_open - open) / length;
+	t->shutter_end = (build->shutter_close - open) / length;
+	if (!(t->shutter_begin >= 0 && t->shutter_end <= 1))
 		return node_error(n, e, EINVAL,
 				  "the sensor's shutter is open from %g to %g, which is not within %g to %g",
 				  build->shutter_open, build->shutter_close, open, open + length);
 	return 0;
 }
 
-static int read_time(struct timed *t, const struct scene_node *n, struct error *e)
+static int read_time(struct sun_period *t, const struct scene_node *n, struct error *e)
 {
 	double begin = node_float(n, "window_start_time", 7), end = node_float(n, "window_end_time", 19);
-	t->first = (struct daylight_time){.latitude = node_float(n, "latitude", 35.689),
+	t->start = (struct daylight_time){.latitude = node_float(n, "latitude", 35.689),
 					  .longitude = node_float(n, "longitude", 139.6917),
-					  .zone = node_float(n, "timezone", 9),
+					  .utc_offset = node_float(n, "timezone", 9),
 					  .hour = begin,
 					  .year = (int)node_float(n, "start_year", 2025),
 					  .month = (int)node_float(n, "start_month", 1),
 					  .day = (int)node_float(n, "start_day", 1)};
-	struct daylight_time last = t->first;
-	last.year = (int)node_float(n, "end_year", t->first.year + 1);
-	last.month = (int)node_float(n, "end_month", t->first.month);
-	last.day = (int)node_float(n, "end_day", t->first.day);
-	int code = sunsky_check_day(n, t->first.year, t->first.month, t->first.day, e);
+	struct daylight_time last = t->start;
+	last.year = (int)node_float(n, "end_year", t->start.year + 1);
+	last.month = (int)node_float(n, "end_month", t->start.month);
+	last.day = (int)node_float(n, "end_day", t->start.day);
+	int code = sunsky_check_day(n, t->start.year, t->start.month, t->start.day, e);
 	if (!code)
 		code = sunsky_check_day(n, last.year, last.month, last.day, e);
 	if (code)
 		return code;
-	t->hours = end - begin;
-	t->days = daylight_days_between(&t->first, &last);
-	if (t->hours < 0 || t->days < 0 || t->days > DAYS_MAX)
+	t->window_hours = end - begin;
+	t->day_count = daylight_days_between(&t->start, &last);
+	if (t->window_hours < 0 || t->day_count < 0 || t->day_count > DAYS_MAX)
 		return node_error(n, e, EINVAL, "its %s",
-				  t->hours < 0	? "window_end_time is before window_start_time"
-				  : t->days < 0 ? "last day is before its first"
-						: "days are more than 200 years");
-	t->days += t->days == 0;
-	bool once = t->from == t->to || (t->hours == 0 && t->days == 1);
-	t->skies = once ? 1 : SKIES;
-	t->suns = once ? DISK : SUNS;
+				  t->window_hours < 0 ? "window_end_time is before window_start_time"
+				  : t->day_count < 0  ? "last day is before its first"
+						      : "days are more than 200 years");
+	t->day_count += t->day_count == 0;
+	bool is_instant = t->shutter_begin == t->shutter_end || (t->window_hours == 0 && t->day_count == 1);
+	t->sky_samples = is_instant ? 1 : SKY_SAMPLES;
+	t->sun_samples = is_instant ? DISK_SAMPLES : SUN_SAMPLES;
 	return 0;
 }
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct timed t = {.turbidity = node_float(n, "turbidity", 3),
-			  .sky_scale = node_float(n, "sky_scale", 1),
-			  .sun_scale = node_float(n, "sun_scale", 1),
-			  .image = {.width = SKY_WIDTH * SCALE, .height = SKY_HEIGHT * SCALE, .channels = 3}};
-	t.radius = node_float(n, "sun_aperture", 2 * DAYLIGHT_SUN_RADIUS * 180 / M_PI) * M_PI / 360;
+	struct sun_period t = {
+		.turbidity = node_float(n, "turbidity", 3),
+		.sky_scale = node_float(n, "sky_scale", 1),
+		.sun_scale = node_float(n, "sun_scale", 1),
+		.image = {.width = SKY_WIDTH * SKY_SCALE, .height = SKY_HEIGHT * SKY_SCALE, .channels = 3}};
+	t.sun_radius = node_float(n, "sun_aperture", 2 * DAYLIGHT_SUN_RADIUS * 180 / M_PI) * M_PI / 360;
 	int code = build->dialect_3 ? 0 : node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"timed_sunsky\"");
 	if (!code)
-		code = sunsky_axes_read(n, build, &t.axes, e);
+		code = sunsky_read_axes(n, build, &t.axes, e);
 	if (!code)
 		code = read_shutter(&t, n, build, e);
 	if (!code)
 		code = read_time(&t, n, e);
 	if (!code)
-		code = sunsky_albedo(n, build, t.albedo, e);
+		code = sunsky_read_albedo(n, build, t.albedo, e);
 	if (code)
 		return code;
-	struct arena room = {.limit = build->arena->limit};
+	struct arena scratch = {.limit = build->arena->limit};
 	t.image.pixels = arena_alloc(build->arena, (size_t)t.image.width * t.image.height, 3 * sizeof *t.image.pixels);
-	code = t.image.pixels ? bake_sky(&t, &room) : -ENOMEM;
-	arena_fini(&room);
+	code = t.image.pixels ? bake_sky(&t, &scratch) : -ENOMEM;
+	arena_fini(&scratch);
 	if (code)
 		return node_error(n, e, ENOMEM, "out of memory");
 	if (t.sun_scale > 0)
 		bake_sun(&t);
-	return envmap_make(em, &(struct raster){.image = indexed_image_of(&t.image)}, false, 1, &t.axes, n, build, e);
+	return envmap_init(em, &(struct raster){.image = indexed_image_wrap(&t.image)}, false, 1, &t.axes, n, build, e);
 }
 
 #define RANGE(name_, types_, min_, max_)                                 \

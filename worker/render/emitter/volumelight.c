@@ -6,5 +6,5 @@ const struct emitter_ops emitter_ops_volumelight = {
 	.decl = PLUGIN(EMITTER, "volumelight", {"radiance", VALUE_VOLUME, PARAM_UNDERSTOOD, 0, PARAM_LIGHT_MAX, NULL},
 		       {"sampling_weight", IGNORED}),
 	.needs_surface = true,
-	.in_medium = true,
+	.is_volumetric = true,
 };

@@ -40,18 +40,18 @@ static double windowed_sinc_integral(double radius)
 	return 2 * sum * radius / (3.0 * STEPS);
 }
 
-static void splat_on_film(struct splat_target *to, const struct splat *s, double weight)
+static void splat_on_film(struct splat_target *target, const struct splat *s, double weight)
 {
-	film_sums_splat((struct film_sums *)(void *)to, s, weight);
+	film_sums_splat((struct film_sums *)(void *)target, s, weight);
 }
 
 /* Checks the window of a panorama. Samples beyond its edge are only taken if they are in the window. */
-static int check_around(const struct plan *p, const struct scene_settings *s, struct error *e)
+static int check_panorama_window(const struct plan *p, const struct scene_settings *s, struct error *e)
 {
 	uint32_t b = s->border;
-	bool inside = p->crop_x >= b && p->crop_y >= b && p->crop_x + p->crop_width + b <= s->width &&
-		      p->crop_y + p->crop_height + b <= s->height;
-	if (s->projection != PROJECTION_SPHERE || inside)
+	bool is_inside = p->crop_x >= b && p->crop_y >= b && p->crop_x + p->crop_width + b <= s->width &&
+			 p->crop_y + p->crop_height + b <= s->height;
+	if (s->projection != PROJECTION_SPHERE || is_inside)
 		return 0;
 	if (p->crop_width < s->width)
 		return error_set(
@@ -73,33 +73,33 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 				.width = p->crop_width,
 				.height = p->crop_height,
 				.filter = s->filter,
-				.radius = s->filter_radius};
-	int rc = check_around(p, s, e);
+				.filter_radius = s->filter_radius};
+	int rc = check_panorama_window(p, s, e);
 	if (rc)
 		return rc;
 	if (s->projection == PROJECTION_SPHERE) {
-		f->around[0] = s->width;
-		f->around[1] = s->height;
+		f->panorama_size[0] = s->width;
+		f->panorama_size[1] = s->height;
 	}
 	f->tiles_x = (f->width + TILE_SIZE - 1) / TILE_SIZE;
 	f->tiles_y = (f->height + TILE_SIZE - 1) / TILE_SIZE;
 	if (s->filter == FILTER_GAUSSIAN) {
 		/* Mitsuba's Gaussian is shifted down so that it ends at zero; the integral is in closed form. */
 		double sd = s->filter_stddev, r = s->filter_radius;
-		f->inverse = 1 / (2 * sd * sd);
-		f->floor = exp(-f->inverse * r * r);
-		f->scale = 1 / (sd * sqrt(2 * M_PI) * erf(r / (sd * M_SQRT2)) - 2 * r * f->floor);
-		if (!(f->scale > 0) || !isfinite(f->scale))
+		f->gaussian_exponent = 1 / (2 * sd * sd);
+		f->gaussian_floor = exp(-f->gaussian_exponent * r * r);
+		f->kernel_scale = 1 / (sd * sqrt(2 * M_PI) * erf(r / (sd * M_SQRT2)) - 2 * r * f->gaussian_floor);
+		if (!(f->kernel_scale > 0) || !isfinite(f->kernel_scale))
 			return error_set(e, EINVAL, "a gaussian filter of deviation %g and radius %g pixels vanishes",
 					 sd, r);
 	}
-	f->b = s->filter_b;
-	f->c = s->filter_c;
+	f->cubic_b = s->filter_b;
+	f->cubic_c = s->filter_c;
 	if (s->filter == FILTER_LANCZOS)
-		f->scale = 1 / windowed_sinc_integral(f->radius);
+		f->kernel_scale = 1 / windowed_sinc_integral(f->filter_radius);
 	f->xyz = mem_alloc((size_t)f->width * f->height * 3, sizeof *f->xyz);
-	f->touched = mem_alloc((size_t)f->tiles_x * f->tiles_y, 1);
-	if (!f->xyz || !f->touched) {
+	f->touched_tiles = mem_alloc((size_t)f->tiles_x * f->tiles_y, 1);
+	if (!f->xyz || !f->touched_tiles) {
 		film_sums_fini(f);
 		return error_set(e, ENOMEM, "out of memory for a film of %u x %u pixels", f->width, f->height);
 	}
@@ -112,26 +112,27 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 void film_sums_fini(struct film_sums *f)
 {
 	mem_free(f->xyz);
-	mem_free(f->touched);
+	mem_free(f->touched_tiles);
 	chain_moments_fini(&f->moments);
 	f->xyz = NULL;
-	f->touched = NULL;
+	f->touched_tiles = NULL;
 }
 
-double film_kernel(const struct film_sums *f, double distance)
+double film_sums_kernel(const struct film_sums *f, double distance)
 {
 	double d = fabs(distance);
 	switch (f->filter) {
 	case FILTER_BOX:
-		return d <= f->radius ? 0.5 / f->radius : 0;
+		return d <= f->filter_radius ? 0.5 / f->filter_radius : 0;
 	case FILTER_TENT:
-		return d < f->radius ? (1 - d / f->radius) / f->radius : 0;
+		return d < f->filter_radius ? (1 - d / f->filter_radius) / f->filter_radius : 0;
 	case FILTER_GAUSSIAN:
-		return d < f->radius ? f->scale * (exp(-f->inverse * d * d) - f->floor) : 0;
+		return d < f->filter_radius ? f->kernel_scale * (exp(-f->gaussian_exponent * d * d) - f->gaussian_floor)
+					    : 0;
 	case FILTER_CUBIC:
-		return cubic(f->b, f->c, d);
+		return cubic(f->cubic_b, f->cubic_c, d);
 	case FILTER_LANCZOS:
-		return f->scale * windowed_sinc(f->radius, d);
+		return f->kernel_scale * windowed_sinc(f->filter_radius, d);
 	}
 	return 0;
 }
@@ -141,7 +142,7 @@ static void add_pixel(struct film_sums *f, uint32_t i, uint32_t j, const double 
 	double *p = f->xyz + ((size_t)j * f->width + i) * 3;
 	for (int k = 0; k < 3; k++)
 		p[k] += weight * xyz[k];
-	f->touched[(size_t)(j / TILE_SIZE) * f->tiles_x + i / TILE_SIZE] = 1;
+	f->touched_tiles[(size_t)(j / TILE_SIZE) * f->tiles_x + i / TILE_SIZE] = 1;
 }
 
 /* Finds the first and last pixel (relative to the crop) whose centre is within the radius. Returns false if there
@@ -156,25 +157,25 @@ static bool pixels_within(double position, double radius, uint32_t size, uint32_
 	return true;
 }
 
-enum { KERNEL_MAX = 130 }; /* most pixels that a kernel spans: settings limit its radius to 64 */
+enum { KERNEL_PIXELS_MAX = 130 }; /* most pixels that a kernel spans: settings limit its radius to 64 */
 
 static void splat_at(struct film_sums *f, double x, double y, const struct splat *s, double weight)
 {
-	if (f->filter == FILTER_BOX && f->radius == 0.5) {
+	if (f->filter == FILTER_BOX && f->filter_radius == 0.5) {
 		/* A point on the border of two pixels belongs to only one. */
 		if (x >= 0 && y >= 0 && x < f->width && y < f->height)
 			add_pixel(f, (uint32_t)x, (uint32_t)y, s->xyz, weight);
 		return;
 	}
 	uint32_t i0, i1, j0, j1;
-	if (!pixels_within(x, f->radius, f->width, &i0, &i1) || !pixels_within(y, f->radius, f->height, &j0, &j1) ||
-	    i1 - i0 >= KERNEL_MAX)
+	if (!pixels_within(x, f->filter_radius, f->width, &i0, &i1) ||
+	    !pixels_within(y, f->filter_radius, f->height, &j0, &j1) || i1 - i0 >= KERNEL_PIXELS_MAX)
 		return;
-	double kx[KERNEL_MAX];
+	double kx[KERNEL_PIXELS_MAX];
 	for (uint32_t i = i0; i <= i1; i++)
-		kx[i - i0] = film_kernel(f, x - (i + 0.5));
+		kx[i - i0] = film_sums_kernel(f, x - (i + 0.5));
 	for (uint32_t j = j0; j <= j1; j++) {
-		double ky = film_kernel(f, y - (j + 0.5)) * weight;
+		double ky = film_sums_kernel(f, y - (j + 0.5)) * weight;
 		for (uint32_t i = i0; i <= i1; i++)
 			if (kx[i - i0] * ky != 0)
 				add_pixel(f, i, j, s->xyz, kx[i - i0] * ky);
@@ -183,24 +184,24 @@ static void splat_at(struct film_sums *f, double x, double y, const struct splat
 
 /* Splats on a panorama: beyond its left edge follows the right one; beyond a pole follows the
  * meridian half a turn away. */
-static void splat_around(struct film_sums *f, const struct splat *s, double weight)
+static void splat_on_panorama(struct film_sums *f, const struct splat *s, double weight)
 {
-	double w = f->around[0], h = f->around[1];
-	const double places[3][2] = {{s->x, s->y}, {s->x + 0.5 * w, -s->y}, {s->x + 0.5 * w, 2 * h - s->y}};
+	double w = f->panorama_size[0], h = f->panorama_size[1];
+	const double copies[3][2] = {{s->x, s->y}, {s->x + 0.5 * w, -s->y}, {s->x + 0.5 * w, 2 * h - s->y}};
 	for (int i = 0; i < 3; i++)
 		for (int turn = -1; turn <= 1; turn++)
-			splat_at(f, places[i][0] + turn * w - f->x, places[i][1] - f->y, s, weight);
+			splat_at(f, copies[i][0] + turn * w - f->x, copies[i][1] - f->y, s, weight);
 }
 
 void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 {
-	if (f->around[0] > 0)
-		splat_around(f, s, weight);
+	if (f->panorama_size[0] > 0)
+		splat_on_panorama(f, s, weight);
 	else
 		splat_at(f, s->x - f->x, s->y - f->y, s, weight);
 }
 
-static int take_tile(const struct film_sums *f, uint32_t tx, uint32_t ty, struct tile *t)
+static int round_tile(const struct film_sums *f, uint32_t tx, uint32_t ty, struct tile *t)
 {
 	uint32_t x0 = tx * TILE_SIZE, y0 = ty * TILE_SIZE;
 	t->x = f->x + x0;
@@ -219,18 +220,18 @@ static int take_tile(const struct film_sums *f, uint32_t tx, uint32_t ty, struct
 	return 0;
 }
 
-int film_sums_take(const struct film_sums *f, struct batch *out, struct error *e)
+int film_sums_add_tiles(const struct film_sums *f, struct batch *out, struct error *e)
 {
 	uint32_t count = 0;
 	for (uint32_t i = 0; i < f->tiles_x * f->tiles_y; i++)
-		count += f->touched[i];
+		count += f->touched_tiles[i];
 	out->tiles = mem_alloc(count, sizeof *out->tiles);
 	if (!out->tiles)
 		return error_set(e, ENOMEM, "out of memory for tiles");
 	for (uint32_t i = 0; i < f->tiles_x * f->tiles_y; i++) {
-		if (!f->touched[i])
+		if (!f->touched_tiles[i])
 			continue;
-		if (take_tile(f, i % f->tiles_x, i / f->tiles_x, &out->tiles[out->tile_count]))
+		if (round_tile(f, i % f->tiles_x, i / f->tiles_x, &out->tiles[out->tile_count]))
 			return error_set(e, ENOMEM, "out of memory for tiles");
 		out->tile_count++;
 	}

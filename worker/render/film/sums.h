@@ -16,13 +16,14 @@ struct film_sums {
 	uint32_t x, y, width, height; /* the crop */
 	uint32_t tiles_x, tiles_y;
 	/* Width and height of a panorama, where kernels reach around the edges; 0 for other films. */
-	double around[2];
+	double panorama_size[2];
 	enum filter_kind filter;
-	double radius;
-	double inverse, floor, scale; /* Gaussian: scale (exp(-inverse d^2) - floor); Lanczos: `scale` alone */
-	double b, c;		      /* of the cubic filters; the others do not use them */
+	double filter_radius;
+	double gaussian_exponent, gaussian_floor,
+		kernel_scale;	 /* Gaussian: scale (exp(-inverse d^2) - floor); Lanczos: `kernel_scale` alone */
+	double cubic_b, cubic_c; /* of the cubic filters; the others do not use them */
 	double *xyz;
-	uint8_t *touched; /* one per tile */
+	uint8_t *touched_tiles; /* one per tile */
 	struct chain_moments moments;
 };
 
@@ -32,9 +33,9 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 void film_sums_fini(struct film_sums *f);
 void film_sums_splat(struct film_sums *f, const struct splat *s, double weight);
 /* Adds the touched tiles to the batch in row-major order, rounded to float. Returns -ENOMEM if out of memory. */
-int film_sums_take(const struct film_sums *f, struct batch *out, struct error *e);
+int film_sums_add_tiles(const struct film_sums *f, struct batch *out, struct error *e);
 
 /* Returns the kernel's value at a distance from the pixel's centre, in one dimension. */
-double film_kernel(const struct film_sums *f, double distance);
+double film_sums_kernel(const struct film_sums *f, double distance);
 
 #endif

@@ -9,8 +9,8 @@
 static int compare_pairs(const void *x, const void *y)
 {
 	const struct coincide_pair *a = x, *b = y;
-	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, (uint32_t)a->rank, a->by.shape, a->by.prim};
-	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, (uint32_t)b->rank, b->by.shape, b->by.prim};
+	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, (uint32_t)a->rank, a->covering.shape, a->covering.prim};
+	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, (uint32_t)b->rank, b->covering.shape, b->covering.prim};
 	for (int i = 0; i < 5; i++)
 		if (u[i] != v[i])
 			return u[i] < v[i] ? -1 : 1;
@@ -19,10 +19,10 @@ static int compare_pairs(const void *x, const void *y)
 
 static int compare_shapes(const void *x, const void *y)
 {
-	const struct coincide_shapes *a = x, *b = y;
+	const struct coincide_shape_pair *a = x, *b = y;
 	if (a->hidden != b->hidden)
 		return a->hidden < b->hidden ? -1 : 1;
-	return a->by < b->by ? -1 : a->by > b->by;
+	return a->covering < b->covering ? -1 : a->covering > b->covering;
 }
 
 /* Sorts the pairs and removes duplicates: pairs across a cut were found more than once. Returns the number left. */
@@ -40,39 +40,41 @@ static size_t unique_pairs(struct coincide_pair *p, size_t n)
 
 static void list_shapes(struct coincidence *c)
 {
-	struct coincide_shapes *s = c->shapes;
+	struct coincide_shape_pair *s = c->shape_pairs;
 	for (size_t i = 0; i < c->pair_count; i++)
-		s[i] = (struct coincide_shapes){c->pairs[i].hidden.shape, c->pairs[i].by.shape, c->pairs[i].same_side};
+		s[i] = (struct coincide_shape_pair){c->pairs[i].hidden.shape, c->pairs[i].covering.shape,
+						    c->pairs[i].same_side};
 	if (c->pair_count > 1)
 		qsort(s, c->pair_count, sizeof *s, compare_shapes);
 	for (size_t i = 0; i < c->pair_count; i++) {
-		if (c->shapes_count == 0 || compare_shapes(&s[c->shapes_count - 1], &s[i]) != 0)
-			s[c->shapes_count++] = s[i];
+		if (c->shape_pair_count == 0 || compare_shapes(&s[c->shape_pair_count - 1], &s[i]) != 0)
+			s[c->shape_pair_count++] = s[i];
 		else
-			s[c->shapes_count - 1].same_side |= s[i].same_side;
+			s[c->shape_pair_count - 1].same_side |= s[i].same_side;
 	}
 }
 
-int coincide_result(struct coincide_pair *pairs, size_t n, bool incomplete, uint32_t count, struct coincidence **out)
+int coincide_make_result(struct coincide_pair *pairs, size_t n, bool is_incomplete, uint32_t count,
+			 struct coincidence **out)
 {
 	struct coincidence *c = mem_alloc(1, sizeof *c);
 	if (!c) {
 		mem_free(pairs);
 		return -ENOMEM;
 	}
-	*c = (struct coincidence){.pairs = pairs, .pair_count = unique_pairs(pairs, n), .incomplete = incomplete};
-	c->shapes = mem_alloc(c->pair_count, sizeof *c->shapes);
-	c->first = mem_alloc((size_t)count + 1, sizeof *c->first);
-	if (!c->shapes || !c->first) {
+	*c = (struct coincidence){.pairs = pairs, .pair_count = unique_pairs(pairs, n), .is_incomplete = is_incomplete};
+	c->shape_pairs = mem_alloc(c->pair_count, sizeof *c->shape_pairs);
+	c->first_pair = mem_alloc((size_t)count + 1, sizeof *c->first_pair);
+	if (!c->shape_pairs || !c->first_pair) {
 		coincide_free(c);
 		return -ENOMEM;
 	}
 	list_shapes(c);
 	for (size_t i = 0; i < c->pair_count; i++)
-		c->first[c->pairs[i].hidden.shape + 1] = i + 1;
+		c->first_pair[c->pairs[i].hidden.shape + 1] = i + 1;
 	for (uint32_t i = 0; i < count; i++)
-		if (c->first[i + 1] < c->first[i])
-			c->first[i + 1] = c->first[i];
+		if (c->first_pair[i + 1] < c->first_pair[i])
+			c->first_pair[i + 1] = c->first_pair[i];
 	*out = c;
 	return 0;
 }

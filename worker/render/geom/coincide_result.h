@@ -7,6 +7,7 @@
 
 /* Takes ownership of the n pairs, which may be in any order and contain duplicates. count: the number of shapes.
  * Returns -ENOMEM if out of memory. */
-int coincide_result(struct coincide_pair *pairs, size_t n, bool incomplete, uint32_t count, struct coincidence **out);
+int coincide_make_result(struct coincide_pair *pairs, size_t n, bool is_incomplete, uint32_t count,
+			 struct coincidence **out);
 
 #endif

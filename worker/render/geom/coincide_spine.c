@@ -31,8 +31,8 @@ static vec3 main_direction(const struct accel_shape *s, vec3 center, vec3 start)
 static void add_to_box(struct spine *s, vec3 v)
 {
 	for (unsigned k = 0; k < 3; k++) {
-		s->low[k] = fmin(s->low[k], vec3_along(v, k));
-		s->high[k] = fmax(s->high[k], vec3_along(v, k));
+		s->low[k] = fmin(s->low[k], vec3_component(v, k));
+		s->high[k] = fmax(s->high[k], vec3_component(v, k));
 	}
 }
 
@@ -42,7 +42,7 @@ static vec3 box_middle(const struct spine *s)
 }
 
 /* Computes the segment along s->direction that covers all vertices, and its radius. */
-static void lay_segment(struct spine *s, const struct accel_shape *mesh, vec3 center)
+static void fit_segment(struct spine *s, const struct accel_shape *mesh, vec3 center)
 {
 	double first = INFINITY, last = -INFINITY;
 	for (uint32_t i = 0; i < mesh->vertex_count; i++) {
@@ -52,45 +52,46 @@ static void lay_segment(struct spine *s, const struct accel_shape *mesh, vec3 ce
 		last = fmax(last, t);
 		s->radius = fmax(s->radius, vec3_length(vec3_sub(v, vec3_scale(t, s->direction))));
 	}
-	s->from = vec3_madd(center, first, s->direction);
-	s->along = vec3_scale(last - first, s->direction);
+	s->start = vec3_madd(center, first, s->direction);
+	s->span = vec3_scale(last - first, s->direction);
 }
 
-static double largest_coordinate(const struct spine *s)
+static double max_coordinate(const struct spine *s)
 {
-	double far = 0;
+	double max = 0;
 	for (int k = 0; k < 3; k++)
-		far = fmax(far, fmax(fabs(s->low[k]), fabs(s->high[k])));
-	return far;
+		max = fmax(max, fmax(fabs(s->low[k]), fabs(s->high[k])));
+	return max;
 }
 
-static void read_triangles(struct spine *s, const struct accel_shape *mesh)
+static void measure_triangles(struct spine *s, const struct accel_shape *mesh)
 {
 	for (uint32_t i = 0; i < mesh->triangle_count; i++) {
 		const struct triangle t = accel_triangle(mesh, i, 0);
 		double n = vec3_length(t.n), height = triangle_altitude(&t);
-		s->height = fmin(s->height, height);
-		s->lean = n > 0 ? fmax(s->lean, fabs(vec3_dot(t.n, s->direction)) / n) : 1;
+		s->min_altitude = fmin(s->min_altitude, height);
+		s->max_lean = n > 0 ? fmax(s->max_lean, fabs(vec3_dot(t.n, s->direction)) / n) : 1;
 	}
 }
 
-struct spine spine_of(const struct accel_shape *mesh)
+struct spine spine_make(const struct accel_shape *mesh)
 {
-	struct spine s = {
-		.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}, .height = INFINITY};
+	struct spine s = {.low = {INFINITY, INFINITY, INFINITY},
+			  .high = {-INFINITY, -INFINITY, -INFINITY},
+			  .min_altitude = INFINITY};
 	for (uint32_t i = 0; i < mesh->vertex_count; i++)
 		add_to_box(&s, triangle_vertex(mesh->position, i));
 	vec3 center = box_middle(&s), start = {s.high[0] - s.low[0], s.high[1] - s.low[1], s.high[2] - s.low[2]};
 	/* The start is not exactly along a diagonal of the box, since that could be perpendicular to
 	 * the direction looked for. */
 	start = vec3_add(start, (vec3){0.37 * start.y, -0.41 * start.z, 0.43 * start.x});
-	double length = vec3_length(start), far = largest_coordinate(&s);
+	double length = vec3_length(start), max = max_coordinate(&s);
 	if (length >= DBL_MIN)
 		s.direction = main_direction(mesh, center, vec3_scale(1 / length, start));
-	lay_segment(&s, mesh, center);
-	read_triangles(&s, mesh);
-	s.rounded = far * 0x1p-23;
-	double margin = far * 0x1p-20;
+	fit_segment(&s, mesh, center);
+	measure_triangles(&s, mesh);
+	s.rounding = max * 0x1p-23;
+	double margin = max * 0x1p-20;
 	s.radius += margin;
 	for (int k = 0; k < 3; k++) {
 		s.low[k] -= margin;
@@ -103,19 +104,19 @@ bool spine_clip(const struct spine *s, const double low[3], const double high[3]
 {
 	*part = (struct spine_part){0, 1};
 	for (unsigned k = 0; k < 3; k++) {
-		double at = vec3_along(s->from, k), d = vec3_along(s->along, k), least = low[k] - s->radius,
-		       most = high[k] + s->radius;
+		double origin = vec3_component(s->start, k), d = vec3_component(s->span, k), min = low[k] - s->radius,
+		       max = high[k] + s->radius;
 		if (s->high[k] < low[k] || s->low[k] > high[k])
 			return false;
 		/* Along this axis the segment does not leave the box, or by no more than the margin in its radius. */
-		if (fmin(at, at + d) >= least && fmax(at, at + d) <= most)
+		if (fmin(origin, origin + d) >= min && fmax(origin, origin + d) <= max)
 			continue;
 		if (!(fabs(d) > 0x1p-24 * s->radius)) {
-			if (at > most + fabs(d) || at < least - fabs(d))
+			if (origin > max + fabs(d) || origin < min - fabs(d))
 				return false;
 			continue;
 		}
-		double t = (least - at) / d, u = (most - at) / d;
+		double t = (min - origin) / d, u = (max - origin) / d;
 		part->first = fmax(part->first, fmin(t, u));
 		part->last = fmin(part->last, fmax(t, u));
 	}
@@ -124,50 +125,51 @@ bool spine_clip(const struct spine *s, const double low[3], const double high[3]
 
 void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, double *low, double *high)
 {
-	double at = vec3_along(s->from, axis), d = vec3_along(s->along, axis), t = at + part.first * d,
-	       u = at + part.last * d;
+	double origin = vec3_component(s->start, axis), d = vec3_component(s->span, axis), t = origin + part.first * d,
+	       u = origin + part.last * d;
 	*low = fmax(fmin(t, u) - s->radius, s->low[axis]);
 	*high = fmin(fmax(t, u) + s->radius, s->high[axis]);
 }
 
-static double clamped(double t)
+static double clamp_unit(double t)
 {
 	return fmin(fmax(t, 0), 1);
 }
 
 /* Returns the least squared distance of two segments. */
-static double least_distance2(vec3 p, vec3 d, vec3 q, vec3 e)
+static double segment_distance2(vec3 p, vec3 d, vec3 q, vec3 e)
 {
 	vec3 r = vec3_sub(p, q);
 	double a = vec3_dot(d, d), b = vec3_dot(d, e), c = vec3_dot(e, e), f = vec3_dot(d, r), g = vec3_dot(e, r),
-	       slope = a * c - b * b, least = INFINITY;
+	       slope = a * c - b * b, min = INFINITY;
 	/* The point where the lines are nearest, then the nearest point to each end. Only the latter count where the
 	 * former lies outside the segments or the lines are parallel. */
 	const double ends[5][2] = {
-		{slope > 0 ? clamped((b * g - c * f) / slope) : 0, NAN}, {0, NAN}, {1, NAN}, {NAN, 0}, {NAN, 1}};
+		{slope > 0 ? clamp_unit((b * g - c * f) / slope) : 0, NAN}, {0, NAN}, {1, NAN}, {NAN, 0}, {NAN, 1}};
 	for (int i = 0; i < 5; i++) {
 		double t = ends[i][0], u = ends[i][1];
 		if (i < 3)
-			u = c > 0 ? clamped((b * t + g) / c) : 0;
+			u = c > 0 ? clamp_unit((b * t + g) / c) : 0;
 		else
-			t = a > 0 ? clamped((b * u - f) / a) : 0;
+			t = a > 0 ? clamp_unit((b * u - f) / a) : 0;
 		vec3 between = vec3_add(r, vec3_sub(vec3_scale(t, d), vec3_scale(u, e)));
-		least = fmin(least, vec3_dot(between, between));
+		min = fmin(min, vec3_dot(between, between));
 	}
-	return least;
+	return min;
 }
 
-bool spines_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other)
+bool spines_may_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other)
 {
-	double reach = a->radius + b->radius;
-	vec3 p = vec3_madd(a->from, part.first, a->along), q = vec3_madd(b->from, other.first, b->along);
-	return least_distance2(p, vec3_scale(part.last - part.first, a->along), q,
-			       vec3_scale(other.last - other.first, b->along)) <= reach * reach;
+	double radius_sum = a->radius + b->radius;
+	vec3 p = vec3_madd(a->start, part.first, a->span), q = vec3_madd(b->start, other.first, b->span);
+	return segment_distance2(p, vec3_scale(part.last - part.first, a->span), q,
+				 vec3_scale(other.last - other.first, b->span)) <= radius_sum * radius_sum;
 }
 
-double spine_lean_at_most(const struct spine *s, const struct spine *from)
+double spine_max_parallel_lean(const struct spine *s, const struct spine *other)
 {
-	double height = fmin(s->height, from->height), off = 1.5 * COINCIDE_TILT * (s->rounded + from->rounded);
+	double min_altitude = fmin(s->min_altitude, other->min_altitude),
+	       shift = 1.5 * COINCIDE_TILT * (s->rounding + other->rounding);
 	/* Unit normals at an angle differ by at most sqrt(2) times its sine, up to the sign. */
-	return off < height ? s->lean + off / height : 2;
+	return shift < min_altitude ? s->max_lean + shift / min_altitude : 2;
 }

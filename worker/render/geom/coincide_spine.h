@@ -13,15 +13,15 @@
 #include "worker/render/geom/triangle.h"
 
 struct spine {
-	vec3 from, along; /* the segment is from + t along, for t in [0,1] */
+	vec3 start, span; /* the segment is from + t along, for t in [0,1] */
 	/* The whole mesh is within this distance of the segment, including a margin for rounded coordinates. */
 	double radius;
 	double low[3], high[3];
-	vec3 direction; /* unit direction of the segment; 0 if the mesh is a single point */
-	double lean;	/* the largest |n.direction| of the triangles' unit normals n */
+	vec3 direction;	 /* unit direction of the segment; 0 if the mesh is a single point */
+	double max_lean; /* the largest |n.direction| of the triangles' unit normals n */
 	/* The distance by which the rounding of vertices can move a triangle. */
-	double rounded;
-	double height; /* smallest altitude of any triangle */
+	double rounding;
+	double min_altitude; /* smallest altitude of any triangle */
 };
 
 /* A part of the segment: t in [first, last]. */
@@ -29,7 +29,7 @@ struct spine_part {
 	double first, last;
 };
 
-struct spine spine_of(const struct accel_shape *mesh);
+struct spine spine_make(const struct accel_shape *mesh);
 
 /* Sets *part to the part of the segment around everything that the mesh has in the box. Returns false if
  * the mesh is not in the box. */
@@ -39,10 +39,10 @@ bool spine_clip(const struct spine *s, const double low[3], const double high[3]
 void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, double *low, double *high);
 
 /* Whether these parts of two meshes may have a point in common. */
-bool spines_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other);
+bool spines_may_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other);
 
 /* For a triangle of `from` with unit normal n: returns the largest |n . s->direction| at which the triangle may be
  * parallel to a triangle of s. If it is larger, coincide_triangles is false for all triangles of s. At most 2. */
-double spine_lean_at_most(const struct spine *s, const struct spine *from);
+double spine_max_parallel_lean(const struct spine *s, const struct spine *other);
 
 #endif

@@ -18,16 +18,16 @@
 
 struct cone cone_between(vec3 p0, double r0, vec3 p1, double r1)
 {
-	vec3 way = vec3_sub(p1, p0);
-	double length = vec3_length(way), lean = r0 - r1;
+	vec3 span = vec3_sub(p1, p0);
+	double length = vec3_length(span), radius_difference = r0 - r1;
 	struct cone c = {.p0 = p0, .axis = {0, 0, 1}, .r0 = r0, .r1 = r1, .length = length};
 	if (length > 0)
-		c.axis = vec3_scale(1 / length, way);
-	if (!(fabs(lean) < length)) {
-		c.sin = lean >= 0 ? 1 : -1;
+		c.axis = vec3_scale(1 / length, span);
+	if (!(fabs(radius_difference) < length)) {
+		c.sin = radius_difference >= 0 ? 1 : -1;
 		return c;
 	}
-	c.sin = lean / length;
+	c.sin = radius_difference / length;
 	c.cos = sqrt((1 - c.sin) * (1 + c.sin));
 	return c;
 }
@@ -39,7 +39,7 @@ struct quadratic {
 };
 
 /* The quadratic of the double cone along a line; q: origin of the line relative to p0. */
-static struct quadratic side_along(const struct cone *c, vec3 q, vec3 d)
+static struct quadratic side_quadratic(const struct cone *c, vec3 q, vec3 d)
 {
 	double y = vec3_dot(q, c->axis), dy = vec3_dot(d, c->axis), cos2 = c->cos * c->cos;
 	vec3 x = vec3_madd(q, -y, c->axis), dx = vec3_madd(d, -dy, c->axis);
@@ -48,7 +48,7 @@ static struct quadratic side_along(const struct cone *c, vec3 q, vec3 d)
 				  cos2 * vec3_dot(x, dx) + c->sin * dy * g, (width - g) * (width + g)};
 }
 
-static bool solve(const struct quadratic *f, double root[2])
+static bool solve_quadratic(const struct quadratic *f, double root[2])
 {
 	double discriminant = f->b * f->b - f->a * f->c;
 	if (!(discriminant > 0))
@@ -64,26 +64,26 @@ static bool side_roots(const struct cone *c, vec3 o, vec3 d, double root[2])
 	vec3 from = vec3_sub(o, c->p0), to_middle = vec3_madd(from, -0.5 * c->length, c->axis);
 	double d2 = vec3_dot(d, d), shift = -vec3_dot(to_middle, d) / d2, size = c->length + c->r0 + c->r1;
 	vec3 q = vec3_madd(from, shift, d);
-	struct quadratic f = side_along(c, q, d);
+	struct quadratic f = side_quadratic(c, q, d);
 	/* Not for a line nearly parallel to the surface: the middle of its two roots may be anywhere. */
 	if (f.a > 0 && fabs(f.b) * sqrt(d2) <= 4 * size * f.a) {
-		double more = -f.b / f.a;
-		shift += more;
-		f = side_along(c, vec3_madd(q, more, d), d);
+		double correction = -f.b / f.a;
+		shift += correction;
+		f = side_quadratic(c, vec3_madd(q, correction, d), d);
 	}
-	if (!(c->cos > 0) || !solve(&f, root))
+	if (!(c->cos > 0) || !solve_quadratic(&f, root))
 		return false;
 	root[0] += shift;
 	root[1] += shift;
 	return true;
 }
 
-static vec3 center_of(const struct cone *c, enum cone_part part)
+static vec3 part_center(const struct cone *c, enum cone_part part)
 {
 	return part == CONE_END ? vec3_madd(c->p0, c->length, c->axis) : c->p0;
 }
 
-static double radius_of(const struct cone *c, enum cone_part part)
+static double part_radius(const struct cone *c, enum cone_part part)
 {
 	return part == CONE_END ? c->r1 : c->r0;
 }
@@ -92,7 +92,8 @@ static bool sphere_roots(vec3 center, double radius, vec3 o, vec3 d, double root
 {
 	vec3 q = vec3_sub(o, center);
 	double d2 = vec3_dot(d, d), middle = -vec3_dot(q, d) / d2;
-	double miss = vec3_length(vec3_madd(q, middle, d)), h2 = (radius - miss) * (radius + miss) / d2;
+	double line_distance = vec3_length(vec3_madd(q, middle, d)),
+	       h2 = (radius - line_distance) * (radius + line_distance) / d2;
 	if (!(h2 > 0))
 		return false;
 	root[0] = middle - sqrt(h2);
@@ -103,14 +104,14 @@ static bool sphere_roots(vec3 center, double radius, vec3 o, vec3 d, double root
 bool cone_roots(const struct cone *c, enum cone_part part, vec3 o, vec3 d, double root[2])
 {
 	return part == CONE_SIDE ? side_roots(c, o, d, root)
-				 : sphere_roots(center_of(c, part), radius_of(c, part), o, d, root);
+				 : sphere_roots(part_center(c, part), part_radius(c, part), o, d, root);
 }
 
 double cone_other_root(const struct cone *c, enum cone_part part, vec3 o, vec3 d)
 {
 	if (part != CONE_SIDE)
-		return -2 * vec3_dot(vec3_sub(o, center_of(c, part)), d) / vec3_dot(d, d);
-	struct quadratic f = side_along(c, vec3_sub(o, c->p0), d);
+		return -2 * vec3_dot(vec3_sub(o, part_center(c, part)), d) / vec3_dot(d, d);
+	struct quadratic f = side_quadratic(c, vec3_sub(o, c->p0), d);
 	return f.a != 0 ? -2 * f.b / f.a : INFINITY;
 }
 
@@ -119,13 +120,13 @@ double cone_other_root(const struct cone *c, enum cone_part part, vec3 o, vec3 d
 double cone_height(const struct cone *c, enum cone_part part, vec3 p)
 {
 	if (part != CONE_SIDE)
-		return vec3_length(vec3_sub(p, center_of(c, part))) - radius_of(c, part);
+		return vec3_length(vec3_sub(p, part_center(c, part))) - part_radius(c, part);
 	vec3 q = vec3_sub(p, c->p0);
 	double y = vec3_dot(q, c->axis);
 	return c->cos * vec3_length(vec3_madd(q, -y, c->axis)) + y * c->sin - c->r0;
 }
 
-bool cone_has(const struct cone *c, enum cone_part part, vec3 p, double slack)
+bool cone_part_contains(const struct cone *c, enum cone_part part, vec3 p, double slack)
 {
 	double y = vec3_dot(vec3_sub(p, c->p0), c->axis), first = c->r0 * c->sin, last = c->length + c->r1 * c->sin;
 	switch (part) {

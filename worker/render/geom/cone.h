@@ -2,7 +2,7 @@
 /*
  * Round cones: the hull of two spheres. Its surface consists of a part of each sphere and, between them, the part of a
  * cone that touches both. Everything is in double. Lines are intersected with the whole sphere or the whole double cone
- * of a part, and cone_has tells whether an intersection lies in the part. Pure; any thread.
+ * of a part, and cone_part_contains tells whether an intersection lies in the part. Pure; any thread.
  */
 #ifndef WORKER_RENDER_GEOM_CONE_H
 #define WORKER_RENDER_GEOM_CONE_H
@@ -33,7 +33,7 @@ double cone_other_root(const struct cone *c, enum cone_part part, vec3 o, vec3 d
 /* Returns the signed distance of p from the part's sphere or cone, positive outside. */
 double cone_height(const struct cone *c, enum cone_part part, vec3 p);
 /* Whether a point p of the part's sphere or cone is in the part, or outside it by at most `slack` along the axis. */
-bool cone_has(const struct cone *c, enum cone_part part, vec3 p, double slack);
+bool cone_part_contains(const struct cone *c, enum cone_part part, vec3 p, double slack);
 
 /* Returns the signed distance of p from the surface of the cone, negative inside. open_start, open_end: the sphere at
  * that end is not part of the surface; then the distance of points beyond that end is INFINITY. */

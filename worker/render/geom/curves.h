@@ -23,36 +23,36 @@ enum { CURVE_BEGINS = 1, CURVE_ENDS = 2, CURVE_SHIFT = 2 };
 
 struct curves {
 	uint32_t count, point_count; /* number of cones; number of points of all chains */
-	float (*point)[4];	     /* centre and radius */
+	float (*points)[4];	     /* centre and radius */
 	/* For each cone: index of its first point << CURVE_SHIFT, with the flags CURVE_BEGINS and CURVE_ENDS. */
 	uint32_t *cone;
 	/* For each cone: where u is 0, in turns from Mitsuba's direction. */
-	float *start;
+	float *u_start;
 	float *v; /* texture coordinate v of each point */
 	/* Unit tangent of each point, for shading normals; NULL: those of the cones are used. */
 	float (*tangent)[3];
-	float thickest; /* largest radius */
-	bool open;	/* chains have no spheres at their ends */
+	float max_radius; /* largest radius */
+	bool is_open;	  /* chains have no spheres at their ends */
 };
 
-/* Sets `start`: at the beginning of a chain u starts at Mitsuba's direction, which is then carried along
+/* Sets `u_start`: at the beginning of a chain u starts at Mitsuba's direction, which is then carried along
  * the chain without twist. */
-void curves_lay(struct curves *c);
+void curves_compute_u_starts(struct curves *c);
 
 vec3 curves_center(const struct curves *c, uint32_t i); /* centre of the i-th point */
 struct cone curves_cone(const struct curves *c, uint32_t prim);
 /* The bounding boxes of a primitive and of all primitives. */
 void curves_box(const struct curves *c, uint32_t prim, vec3 *low, vec3 *high);
-void curves_box_of_all(const struct curves *c, vec3 *low, vec3 *high);
+void curves_bounds(const struct curves *c, vec3 *low, vec3 *high);
 
 /* A ray or segment. */
 struct curve_ray {
 	vec3 o, d, end; /* end is o + d, for segments */
 	/* Whether o, and end, is on a primitive of these curves. */
-	bool starts, ends;
-	uint32_t from, to; /* the primitives on which o and end are */
+	bool starts_on_curve, ends_on_curve;
+	uint32_t start_prim, end_prim; /* the primitives on which o and end are */
 	double t_min, t_max;
-	bool culled; /* the ray does not meet curves from inside */
+	bool culls_backfaces; /* the ray does not meet curves from inside */
 };
 
 /* A crossing of a cone: which part is met, and at which of the two roots. */
@@ -64,33 +64,34 @@ struct curve_crossing {
 
 /* Finds the nearest crossing of a primitive within the ray's range; returns false if there is none. If an end of the
  * ray is on a sphere or cone, of this primitive or of a neighbour, the root at that end is divided out. */
-bool curves_meet(const struct curves *c, uint32_t prim, const struct curve_ray *r, struct curve_crossing *x);
-/* Like curves_meet(), but finds the crossing nearest to t_near. */
-bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,
-		      struct curve_crossing *x);
+bool curves_intersect(const struct curves *c, uint32_t prim, const struct curve_ray *r, struct curve_crossing *x);
+/* Like curves_intersect(), but finds the crossing nearest to t_near. */
+bool curves_intersect_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,
+			   struct curve_crossing *x);
 
-struct curve_site {
+struct curve_coordinates {
 	double along, around;
 };
 
 /* Returns the coordinates of a point on this part or near it. */
-struct curve_site curves_site(const struct cone *c, enum cone_part part, vec3 p);
+struct curve_coordinates curves_coordinates(const struct cone *c, enum cone_part part, vec3 p);
 /* Returns the coordinates of the primitive's point that is nearest to p. */
-struct curve_site curves_nearest(const struct curves *c, uint32_t prim, vec3 p);
+struct curve_coordinates curves_nearest_coordinates(const struct curves *c, uint32_t prim, vec3 p);
 /* Whether the primitive has a point with these coordinates. */
-bool curves_have(const struct curves *c, uint32_t prim, struct curve_site at);
+bool curves_have_point(const struct curves *c, uint32_t prim, struct curve_coordinates coordinates);
 
-struct curve_place {
+struct curve_point {
 	struct cone cone;
 	enum cone_part part;
 	vec3 p, n; /* n: unit normal, outwards */
 	/* Unit vectors: e away from the axis, side around it, up along the surface, perpendicular to n and side. */
-	vec3 e, side, up;
-	double x; /* distance from the axis */
-	double s; /* position along the side, from 0 to 1 */
+	vec3 radial, side, up;
+	double axis_distance; /* distance from the axis */
+	double side_position; /* position along the side, from 0 to 1 */
 	double u, v;
 };
 
-void curves_place(const struct curves *c, uint32_t prim, struct curve_site at, struct curve_place *p);
+void curves_compute_point(const struct curves *c, uint32_t prim, struct curve_coordinates coordinates,
+			  struct curve_point *p);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "common/base/liveness.h"
 
-RTCScene embree_scene(RTCDevice device)
+RTCScene embree_new_scene(RTCDevice device)
 {
 	RTCScene scene = rtcNewScene(device);
 	if (scene) {
@@ -13,7 +13,7 @@ RTCScene embree_scene(RTCDevice device)
 	return scene;
 }
 
-RTCGeometry embree_triangles(RTCDevice device, const struct accel_shape *s)
+RTCGeometry embree_new_triangles(RTCDevice device, const struct accel_shape *s)
 {
 	RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
 	if (!g)

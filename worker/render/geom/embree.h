@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Common names for Embree 3 and 4, and the construction of trees: that of the world (accel.c) and those of meshes
- * (instances.c). Only these two files and solved.c include this header. */
+ * (instances.c). Only these two files and user_geometry.c include this header. */
 #ifndef WORKER_RENDER_GEOM_EMBREE_H
 #define WORKER_RENDER_GEOM_EMBREE_H
 
@@ -21,9 +21,9 @@ typedef struct RTCIntersectContext embree_context;
 #endif
 #pragma GCC diagnostic pop
 
-RTCScene embree_scene(RTCDevice device); /* a new scene in robust mode; NULL if out of memory */
+RTCScene embree_new_scene(RTCDevice device); /* a new scene in robust mode; NULL if out of memory */
 /* Returns a geometry with the triangles of a shape, whose arrays must outlive it. NULL if out of memory. */
-RTCGeometry embree_triangles(RTCDevice device, const struct accel_shape *s);
+RTCGeometry embree_new_triangles(RTCDevice device, const struct accel_shape *s);
 /* Commits a geometry and attaches it to the scene with that ID. */
 void embree_attach(RTCScene scene, RTCGeometry g, uint32_t id);
 /* Builds the tree. Errors are reported through the device. Counts as progress (common/base/liveness.h). */

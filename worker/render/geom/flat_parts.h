@@ -11,7 +11,7 @@
 
 struct flat_parts {
 	uint32_t count;
-	uint32_t *prim; /* in ascending order; freed with mem_free */
+	uint32_t *prims; /* in ascending order; freed with mem_free */
 };
 
 /* Finds the flat parts of the mesh in its own frame. Returns -ENOMEM if out of memory. */

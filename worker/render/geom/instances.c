@@ -13,37 +13,37 @@
 /* ---- building */
 
 /* A query within one instance. */
-struct within {
+struct instance_query {
 	embree_context context;
 	const struct query *q;
 	uint32_t shape;
-	const struct placement *place; /* placement at the query's time */
-	struct placement room;	       /* room for the placement of an instance that moves */
-	vec3 from, d;		       /* start and unit direction of the segment */
+	const struct placement *placement; /* placement at the query's time */
+	struct placement storage;	   /* room for the placement of an instance that moves */
+	vec3 start, d;			   /* start and unit direction of the segment */
 	/* Length of the segment, which is the part of the query from t0 to t1. */
 	double length, t0, t1;
-	double reach;	       /* error bound of Embree's floats */
-	double before, beyond; /* Embree's ray is longer by this at its ends, see query_lowness */
+	double float_error; /* error bound of Embree's floats */
+	double lead, trail; /* Embree's ray is longer by this at its ends, see query_grazing_factor */
 };
 
 /* As in accel.c: whether both ends are so high over the triangle's plane that rounding cannot change their sides. */
-static bool clearly_crosses(const struct within *w, const struct RTCHit *hit, const struct RTCRay *ray)
+static bool clearly_crosses(const struct instance_query *w, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
-	double t = (double)ray->tfar - w->before, nearer = w->q->segment ? fmin(t, w->length - t) : t;
-	return fabs(vec3_dot(n, w->d)) * nearer > 0x1p10 * w->reach * triangle_norm1(n);
+	double t = (double)ray->tfar - w->lead, nearer = w->q->is_segment ? fmin(t, w->length - t) : t;
+	return fabs(vec3_dot(n, w->d)) * nearer > 0x1p10 * w->float_error * triangle_norm1(n);
 }
 
-static void filter(const struct RTCFilterFunctionNArguments *args)
+static void filter_hit(const struct RTCFilterFunctionNArguments *args)
 {
-	const struct within *w = (const struct within *)(const void *)args->context;
+	const struct instance_query *w = (const struct instance_query *)(const void *)args->context;
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
 	const struct query *q = w->q;
-	const struct prim_ref prim = {w->shape, hit->primID, q->from.time};
+	const struct prim_ref prim = {w->shape, hit->primID, q->start_prim.time};
 	if (query_is_end(q, prim))
 		args->valid[0] = 0;
-	else if (query_hides(q, prim.shape)) {
-		if (!query_crosses_there(q, prim))
+	else if (query_may_be_hidden(q, prim.shape)) {
+		if (!query_crosses_present(q, prim))
 			args->valid[0] = 0;
 	} else if (!clearly_crosses(w, hit, (const struct RTCRay *)(const void *)args->ray) &&
 		   !query_crosses(q, &q->shapes[prim.shape], prim.prim))
@@ -52,17 +52,17 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
 
 static int build_tree(struct instance_tree *t, RTCDevice device, const struct accel_shape *s)
 {
-	t->mirrored = s->place->mirrored;
-	t->scene = embree_scene(device);
-	RTCGeometry g = t->scene ? embree_triangles(device, s) : NULL;
+	t->is_mirrored = s->placement->is_mirrored;
+	t->scene = embree_new_scene(device);
+	RTCGeometry g = t->scene ? embree_new_triangles(device, s) : NULL;
 	if (!g)
 		return -ENOMEM;
-	rtcSetGeometryIntersectFilterFunction(g, filter);
-	rtcSetGeometryOccludedFilterFunction(g, filter);
+	rtcSetGeometryIntersectFilterFunction(g, filter_hit);
+	rtcSetGeometryOccludedFilterFunction(g, filter_hit);
 	embree_attach(t->scene, g, 0);
 	embree_build(t->scene);
 	embree_bounds(t->scene, &t->low, &t->high);
-	t->reach = 0x1p-21 * fmax(triangle_norm_max(t->low), triangle_norm_max(t->high));
+	t->float_error = 0x1p-21 * fmax(triangle_norm_max(t->low), triangle_norm_max(t->high));
 	return 0;
 }
 
@@ -72,24 +72,24 @@ int instances_init(struct instances *s, RTCDevice device, const struct accel_sha
 	uint32_t trees = 0;
 	for (uint32_t i = 0; i < count; i++) {
 		s->count += accel_is_instance(&shapes[i]);
-		trees += accel_is_instance(&shapes[i]) && shapes[i].place->first == i;
+		trees += accel_is_instance(&shapes[i]) && shapes[i].placement->first_shape == i;
 	}
 	if (s->count == 0)
 		return 0;
 	uint32_t *tree_of = mem_alloc(count, sizeof *tree_of);
 	s->trees = mem_alloc(trees, sizeof *s->trees);
-	s->list = mem_alloc(s->count, sizeof *s->list);
-	int rc = tree_of && s->trees && s->list ? 0 : -ENOMEM;
+	s->items = mem_alloc(s->count, sizeof *s->items);
+	int rc = tree_of && s->trees && s->items ? 0 : -ENOMEM;
 	s->count = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		if (!accel_is_instance(&shapes[i]))
 			continue;
-		uint32_t first = shapes[i].place->first;
+		uint32_t first = shapes[i].placement->first_shape;
 		if (first == i) {
 			tree_of[i] = s->tree_count++;
 			rc = build_tree(&s->trees[tree_of[i]], device, &shapes[i]);
 		}
-		s->list[s->count++] = (struct instance){i, tree_of[first]};
+		s->items[s->count++] = (struct instance){i, tree_of[first]};
 	}
 	mem_free(tree_of);
 	return rc;
@@ -101,19 +101,19 @@ void instances_fini(struct instances *s)
 		if (s->trees[i].scene)
 			rtcReleaseScene(s->trees[i].scene);
 	mem_free(s->trees);
-	mem_free(s->list);
+	mem_free(s->items);
 	*s = (struct instances){.count = 0};
 }
 
 /* ---- Embree's callbacks */
 
 /* The bounds allow for the deviation of Embree's ray from the true one. */
-static void bounds(const struct RTCBoundsFunctionArguments *args)
+static void instance_bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct instances *s = args->geometryUserPtr;
-	const struct placement *m = s->shapes[s->list[args->primID].shape].place;
-	double r = 2 * (s->off + s->off_far * triangle_norm_max(m->center)) +
-		   0x1p-20 * (triangle_norm_max(m->half) + triangle_norm_max(m->center)) + m->vertex_is_off;
+	const struct placement *m = s->shapes[s->items[args->primID].shape].placement;
+	double r = 2 * (s->ray_error + s->ray_error_slope * triangle_norm_max(m->center)) +
+		   0x1p-20 * (triangle_norm_max(m->half) + triangle_norm_max(m->center)) + m->vertex_error;
 	struct RTCBounds *b = args->bounds_o;
 	b->lower_x = (float)(m->center.x - m->half.x - r);
 	b->lower_y = (float)(m->center.y - m->half.y - r);
@@ -124,7 +124,7 @@ static void bounds(const struct RTCBoundsFunctionArguments *args)
 }
 
 /* Clips [t0, t1] to the range between low and high along one axis. Returns false if nothing is left. */
-static bool clip(double o, double d, double low, double high, double *t0, double *t1)
+static bool clip_range(double o, double d, double low, double high, double *t0, double *t1)
 {
 	if (d == 0)
 		return o >= low && o <= high;
@@ -135,90 +135,91 @@ static bool clip(double o, double d, double low, double high, double *t0, double
 }
 
 /* Returns the unit normal, in the mesh's frame, of the surface on which an end is; 0 if it is on none. */
-static vec3 normal_at(const struct placement *m, const struct ray_end *end)
+static vec3 end_normal(const struct placement *m, const struct ray_end *end)
 {
-	vec3 n = end ? placement_normal_back(m, end->ng) : (vec3){0, 0, 0};
+	vec3 n = end ? placement_normal_to_mesh(m, end->ng) : (vec3){0, 0, 0};
 	double length = vec3_length(n);
 	return length > 0 ? vec3_scale(1 / length, n) : n;
 }
 
-/* Lifts p off a surface with normal n, to the side into which d leaves; *longer: the extra length by query_lowness. */
-static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double reach, double *longer)
+/* Lifts p off a surface with normal n, to the side into which d leaves; *longer: the extra length by
+ * query_grazing_factor. */
+static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double distance, double *extension)
 {
-	*longer = reach * query_lowness(n, d);
-	return vec3_madd(p, copysign(reach, vec3_dot(n, d)), n);
+	*extension = distance * query_grazing_factor(n, d);
+	return vec3_madd(p, copysign(distance, vec3_dot(n, d)), n);
 }
 
 /* Computes the part of the query up to t_max that is inside the instance's box. Returns false if there is none. */
-static bool enter_instance(struct within *w, const struct instances *s, const struct instance *it,
+static bool enter_instance(struct instance_query *w, const struct instances *s, const struct instance *it,
 			   const struct query *q, double t_max)
 {
-	const struct placement *m = placement_at(s->shapes[it->shape].place, q->from.time, &w->room);
+	const struct placement *m = placement_at(s->shapes[it->shape].placement, q->start_prim.time, &w->storage);
 	const struct instance_tree *tree = &s->trees[it->tree];
-	vec3 o = placement_point_back(m, q->o), d = placement_vector_back(m, q->d);
+	vec3 o = placement_point_to_mesh(m, q->o), d = placement_vector_to_mesh(m, q->d);
 	w->q = q;
 	w->shape = it->shape;
-	w->place = m;
-	w->reach = tree->reach + m->rounding + 0x1p-50 * triangle_norm1(o);
+	w->placement = m;
+	w->float_error = tree->float_error + m->rounding + 0x1p-50 * triangle_norm1(o);
 	w->t0 = q->t_min;
 	w->t1 = t_max;
-	double r = 2 * w->reach;
-	if (!clip(o.x, d.x, tree->low.x - r, tree->high.x + r, &w->t0, &w->t1) ||
-	    !clip(o.y, d.y, tree->low.y - r, tree->high.y + r, &w->t0, &w->t1) ||
-	    !clip(o.z, d.z, tree->low.z - r, tree->high.z + r, &w->t0, &w->t1))
+	double r = 2 * w->float_error;
+	if (!clip_range(o.x, d.x, tree->low.x - r, tree->high.x + r, &w->t0, &w->t1) ||
+	    !clip_range(o.y, d.y, tree->low.y - r, tree->high.y + r, &w->t0, &w->t1) ||
+	    !clip_range(o.z, d.z, tree->low.z - r, tree->high.z + r, &w->t0, &w->t1))
 		return false;
-	w->from = vec3_madd(o, w->t0, d);
-	w->before = w->beyond = w->reach;
-	vec3 to = vec3_madd(o, w->t1, d);
+	w->start = vec3_madd(o, w->t0, d);
+	w->lead = w->trail = w->float_error;
+	vec3 end = vec3_madd(o, w->t1, d);
 	if (w->t0 == 0)
-		w->from = lift_off_surface(w->from, normal_at(m, q->start), d, w->reach, &w->before);
-	if (q->segment && w->t1 == 1)
-		to = lift_off_surface(placement_point_back(m, q->end), normal_at(m, q->finish), vec3_neg(d), w->reach,
-				      &w->beyond);
-	vec3 along = vec3_sub(to, w->from);
-	w->length = vec3_length(along);
-	w->d = vec3_scale(1 / w->length, along);
+		w->start = lift_off_surface(w->start, end_normal(m, q->start_surface), d, w->float_error, &w->lead);
+	if (q->is_segment && w->t1 == 1)
+		end = lift_off_surface(placement_point_to_mesh(m, q->end), end_normal(m, q->end_surface), vec3_neg(d),
+				       w->float_error, &w->trail);
+	vec3 segment = vec3_sub(end, w->start);
+	w->length = vec3_length(segment);
+	w->d = vec3_scale(1 / w->length, segment);
 	return w->length > 0 && vec3_is_finite(w->d);
 }
 
 /* Fills in the float ray, which starts before the segment and ends after it by the error bound of floats, except where
  * the query's t_min clips it. */
-static void fill_ray(const struct within *w, struct RTCRay *ray)
+static void fill_ray(const struct instance_query *w, struct RTCRay *ray)
 {
-	vec3 o = vec3_madd(w->from, -w->before, w->d);
+	vec3 o = vec3_madd(w->start, -w->lead, w->d);
 	bool clipped = w->q->t_min > 0 && w->t0 == w->q->t_min;
 	*ray = (struct RTCRay){.org_x = (float)o.x,
 			       .org_y = (float)o.y,
 			       .org_z = (float)o.z,
-			       .tnear = clipped ? (float)w->before : 0,
+			       .tnear = clipped ? (float)w->lead : 0,
 			       .dir_x = (float)w->d.x,
 			       .dir_y = (float)w->d.y,
 			       .dir_z = (float)w->d.z,
-			       .tfar = (float)(w->length + w->before + w->beyond),
+			       .tfar = (float)(w->length + w->lead + w->trail),
 			       .mask = 0xFFFFFFFFu};
 }
 
 /* Returns the distance of a hit in units of q->d: that of the triangle's plane if it agrees with Embree's within the
  * precision of floats, otherwise Embree's. */
-static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
+static double hit_distance(const struct instance_query *w, const struct RTCRayHit *rh)
 {
-	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->before) * share;
+	double ratio = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->lead) * ratio;
 	const struct accel_shape *s = &w->q->shapes[w->shape];
-	const struct triangle k = placement_triangle(w->place, s->position, s->index[rh->hit.primID]);
-	double there = vec3_dot(k.n, vec3_sub(k.v[0], w->q->o)) / vec3_dot(k.n, w->q->d);
-	return fmax(fabs(there - t) <= 4 * w->before * share ? there : t, w->q->t_min);
+	const struct triangle k = placement_triangle(w->placement, s->position, s->index[rh->hit.primID]);
+	double exact = vec3_dot(k.n, vec3_sub(k.v[0], w->q->o)) / vec3_dot(k.n, w->q->d);
+	return fmax(fabs(exact - t) <= 4 * w->lead * ratio ? exact : t, w->q->t_min);
 }
 
-static void intersect(const struct RTCIntersectFunctionNArguments *args)
+static void instance_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
 	const struct instances *s = args->geometryUserPtr;
-	const struct instance *it = &s->list[args->primID];
+	const struct instance *it = &s->items[args->primID];
 	const struct query *q = (const struct query *)(const void *)args->context;
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit, inner;
-	struct within w;
-	double t_max = (double)rh->ray.tfar - q->back;
+	struct instance_query w;
+	double t_max = (double)rh->ray.tfar - q->origin_lead;
 	if (!enter_instance(&w, s, it, q, t_max))
 		return;
 	fill_ray(&w, &inner.ray);
@@ -227,27 +228,27 @@ static void intersect(const struct RTCIntersectFunctionNArguments *args)
 	embree_intersect(s->trees[it->tree].scene, &w.context, &inner);
 	if (inner.hit.geomID == RTC_INVALID_GEOMETRY_ID)
 		return;
-	double t = place_of_hit(&w, &inner);
+	double t = hit_distance(&w, &inner);
 	if (!(t < t_max))
 		return;
-	bool turned = s->shapes[it->shape].place->mirrored != s->trees[it->tree].mirrored;
-	rh->ray.tfar = (float)(t + q->back);
+	bool is_reversed = s->shapes[it->shape].placement->is_mirrored != s->trees[it->tree].is_mirrored;
+	rh->ray.tfar = (float)(t + q->origin_lead);
 	rh->hit.geomID = it->shape;
 	rh->hit.primID = inner.hit.primID;
-	rh->hit.u = turned ? inner.hit.v : inner.hit.u;
-	rh->hit.v = turned ? inner.hit.u : inner.hit.v;
+	rh->hit.u = is_reversed ? inner.hit.v : inner.hit.u;
+	rh->hit.v = is_reversed ? inner.hit.u : inner.hit.v;
 }
 
-static void occluded(const struct RTCOccludedFunctionNArguments *args)
+static void instance_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
 	const struct instances *s = args->geometryUserPtr;
-	const struct instance *it = &s->list[args->primID];
+	const struct instance *it = &s->items[args->primID];
 	const struct query *q = (const struct query *)(const void *)args->context;
-	struct within w;
+	struct instance_query w;
 	struct RTCRay inner;
-	if (!enter_instance(&w, s, it, q, q->segment ? 1 : INFINITY))
+	if (!enter_instance(&w, s, it, q, q->is_segment ? 1 : INFINITY))
 		return;
 	fill_ray(&w, &inner);
 	EMBREE_INIT_CONTEXT(&w.context);
@@ -256,4 +257,4 @@ static void occluded(const struct RTCOccludedFunctionNArguments *args)
 		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
 }
 
-const struct embree_ops instances_ops = {bounds, intersect, occluded};
+const struct embree_ops instances_ops = {instance_bounds, instance_intersect, instance_occluded};

@@ -11,13 +11,13 @@
 #ifndef WORKER_RENDER_GEOM_INSTANCES_H
 #define WORKER_RENDER_GEOM_INSTANCES_H
 
-#include "worker/render/geom/solved.h"
+#include "worker/render/geom/user_geometry.h"
 
 struct instance_tree {
 	RTCScene scene;
-	vec3 low, high; /* bounding box of the mesh, in its frame */
-	double reach;	/* error bound of Embree's floats in the mesh's frame */
-	bool mirrored;	/* its triangles are wound as in mirrored instances */
+	vec3 low, high;	    /* bounding box of the mesh, in its frame */
+	double float_error; /* error bound of Embree's floats in the mesh's frame */
+	bool is_mirrored;   /* its triangles are wound as in mirrored instances */
 };
 
 struct instance {
@@ -28,9 +28,9 @@ struct instances {
 	const struct accel_shape *shapes;
 	uint32_t tree_count, count;
 	struct instance_tree *trees; /* one for each mesh */
-	struct instance *list;
-	/* Error bound of a ray in world space at p: off + off_far |p|. */
-	double off, off_far;
+	struct instance *items;
+	/* Error bound of a ray in world space at p: ray_error + ray_error_slope |p|. */
+	double ray_error, ray_error_slope;
 };
 
 /* Builds the trees for all shapes with a placement. Embree's errors are reported through the device. Returns
@@ -38,8 +38,8 @@ struct instances {
 int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count);
 void instances_fini(struct instances *s);
 
-/* Callbacks whose user data is a struct instances. It must outlive the geometry, and off and off_far must be set when
- * the geometry is committed. */
+/* Callbacks whose user data is a struct instances. It must outlive the geometry, and off and ray_error_slope must be
+ * set when the geometry is committed. */
 extern const struct embree_ops instances_ops;
 
 #endif

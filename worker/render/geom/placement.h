@@ -18,18 +18,18 @@ struct movement {
 };
 
 struct placement {
-	vec3 x, y, z, at;  /* matrix columns: p maps to x p.x + y p.y + z p.z + at in world space */
-	vec3 back[3];	   /* rows of the inverse of the matrix x, y, z */
-	vec3 center, half; /* bounding box in world space */
+	vec3 x, y, z, origin; /* matrix columns: p maps to x p.x + y p.y + z p.z + origin in world space */
+	vec3 inverse_rows[3]; /* rows of the inverse of the matrix x, y, z */
+	vec3 center, half;    /* bounding box in world space */
 	/* Rounding error of world coordinates, expressed in the mesh's frame. */
 	double rounding;
 	/* Error of rounding vertices to float in the mesh's frame, expressed in world space. */
-	double vertex_is_off;
-	uint32_t first; /* index of the first shape that is an instance of the same mesh */
-	bool mirrored;	/* its triangles are wound in the opposite sense to those in the mesh's frame */
+	double vertex_error;
+	uint32_t first_shape; /* index of the first shape that is an instance of the same mesh */
+	bool is_mirrored;     /* its triangles are wound in the opposite sense to those in the mesh's frame */
 	/* NULL: the instance does not move. Otherwise this is its placement when the shutter opens, except that center,
-	 * half and vertex_is_off hold for all times. */
-	const struct movement *moves;
+	 * half and vertex_error hold for all times. */
+	const struct movement *movement;
 };
 
 /* Makes a placement from an affine map m from the mesh's frame, in which low and high bound it, to the world. Returns
@@ -38,17 +38,17 @@ struct placement {
 bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
 
 /* placement_make_moving is like placement_make(), but for an instance that moves; m must outlive the placement.
- * placement_move returns the placement at a time. */
+ * placement_compute_at returns the placement at a time. */
 bool placement_make_moving(struct placement *p, const struct movement *m);
-void placement_move(const struct placement *p, double time, struct placement *out);
+void placement_compute_at(const struct placement *p, double time, struct placement *out);
 
-/* Returns the placement at a time; `room` is used if the instance moves. */
-static inline const struct placement *placement_at(const struct placement *p, double time, struct placement *room)
+/* Returns the placement at a time; `storage` is used if the instance moves. */
+static inline const struct placement *placement_at(const struct placement *p, double time, struct placement *storage)
 {
-	if (!p->moves)
+	if (!p->movement)
 		return p;
-	placement_move(p, time, room);
-	return room;
+	placement_compute_at(p, time, storage);
+	return storage;
 }
 
 /* Whether the scales of m in different directions differ by no more than the limit of placement_make(). */
@@ -61,27 +61,29 @@ static inline vec3 placement_vector(const struct placement *m, vec3 v)
 
 static inline vec3 placement_point(const struct placement *m, vec3 p)
 {
-	return vec3_add(placement_vector(m, p), m->at);
+	return vec3_add(placement_vector(m, p), m->origin);
 }
 
 /* Transforms a normal to world space and normalises it. */
 static inline vec3 placement_normal(const struct placement *m, vec3 n)
 {
-	return vec3_normalize(vec3_madd(vec3_madd(vec3_scale(n.x, m->back[0]), n.y, m->back[1]), n.z, m->back[2]));
+	return vec3_normalize(vec3_madd(vec3_madd(vec3_scale(n.x, m->inverse_rows[0]), n.y, m->inverse_rows[1]), n.z,
+					m->inverse_rows[2]));
 }
 
-static inline vec3 placement_vector_back(const struct placement *m, vec3 v)
+static inline vec3 placement_vector_to_mesh(const struct placement *m, vec3 v)
 {
-	return (vec3){vec3_dot(m->back[0], v), vec3_dot(m->back[1], v), vec3_dot(m->back[2], v)};
+	return (vec3){vec3_dot(m->inverse_rows[0], v), vec3_dot(m->inverse_rows[1], v),
+		      vec3_dot(m->inverse_rows[2], v)};
 }
 
-static inline vec3 placement_point_back(const struct placement *m, vec3 p)
+static inline vec3 placement_point_to_mesh(const struct placement *m, vec3 p)
 {
-	return placement_vector_back(m, vec3_sub(p, m->at));
+	return placement_vector_to_mesh(m, vec3_sub(p, m->origin));
 }
 
 /* Transforms a normal to the mesh's frame without normalising it. */
-static inline vec3 placement_normal_back(const struct placement *m, vec3 n)
+static inline vec3 placement_normal_to_mesh(const struct placement *m, vec3 n)
 {
 	return (vec3){vec3_dot(m->x, n), vec3_dot(m->y, n), vec3_dot(m->z, n)};
 }

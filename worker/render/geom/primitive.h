@@ -11,10 +11,10 @@
 
 /* Ranks of surfaces. Where surfaces coincide, only the one of the lowest rank is present. */
 enum surface_rank {
-	SURFACE_SHINES,
+	SURFACE_EMITS,
 	SURFACE_OPAQUE,
 	SURFACE_TRANSMITS,
-	SURFACE_PASSES, /* transmits light straight through: null, mask */
+	SURFACE_SEE_THROUGH, /* transmits light straight through: null, mask */
 	SURFACE_RANKS
 };
 
@@ -29,34 +29,34 @@ struct accel_shape {
 	const uint32_t (*index)[3];
 	enum surface_rank rank;
 	/* The placement of this instance of a mesh, or the movement of a sphere; NULL: positions are in world space. */
-	const struct placement *place;
+	const struct placement *placement;
 	/* Vertices in double, for a shape too large for floats relative to small ones; NULL: `position` is exact. */
 	const double (*unrounded)[3];
 	/* The shape consists of these curves and has no triangles; NULL: it has no curves. */
 	const struct curves *curves;
-	bool culled; /* for curves: rays do not meet them from inside */
+	bool culls_backfaces; /* for curves: rays do not meet them from inside */
 };
 
 /* Returns the triangle `prim` at a time: see struct prim_ref. */
 static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim, double time)
 {
 	const uint32_t *i = s->index[prim];
-	struct placement room;
+	struct placement storage;
 	if (s->unrounded)
 		return triangle_unrounded(s->unrounded, i);
-	return s->place ? placement_triangle(placement_at(s->place, time, &room), s->position, i)
-			: triangle_from(s->position, i);
+	return s->placement ? placement_triangle(placement_at(s->placement, time, &storage), s->position, i)
+			    : triangle_from(s->position, i);
 }
 
 /* Whether the shape is an instance of a mesh. A sphere with a placement is not; it moves. */
 static inline bool accel_is_instance(const struct accel_shape *s)
 {
-	return s->place && !s->is_sphere;
+	return s->placement && !s->is_sphere;
 }
 
-static inline bool accel_moves(const struct accel_shape *s)
+static inline bool accel_shape_moves(const struct accel_shape *s)
 {
-	return s->place && s->place->moves;
+	return s->placement && s->placement->movement;
 }
 
 /* A primitive and a time: 0 when the shutter opens, 1 when it closes. The time only matters for shapes that move.

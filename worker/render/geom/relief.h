@@ -20,13 +20,13 @@ struct relief_site {
 };
 
 /* The derivatives of a relief_site as the point moves, per length. */
-struct relief_step {
+struct relief_derivatives {
 	vec3 dn, daxis, dtu, dtv;
 	double du, dv;
 };
 
 vec3 relief_normal(const struct relief *r, const struct relief_site *s);
 /* Returns the derivative of relief_normal; always finite. */
-vec3 relief_turn(const struct relief *r, const struct relief_site *s, const struct relief_step *d);
+vec3 relief_normal_derivative(const struct relief *r, const struct relief_site *s, const struct relief_derivatives *d);
 
 #endif

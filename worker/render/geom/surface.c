@@ -12,7 +12,7 @@
 #include "worker/render/geom/surface_curve.h"
 #include "worker/render/math/sphere.h"
 
-static vec3 vertex_at(const float (*a)[3], uint32_t i)
+static vec3 load_float3(const float (*a)[3], uint32_t i)
 {
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
@@ -28,10 +28,10 @@ static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 		vec3 a = vec3_scale(start[i][0], e1), g = vec3_madd(vec3_scale(step[i][0], e1), step[i][1], e2);
 		vec3 aq = vec3_sub(q, a);
 		double s = fmin(fmax(vec3_dot(aq, g) / vec3_dot(g, g), 0), 1);
-		vec3 miss = vec3_madd(aq, -s, g);
-		if (vec3_dot(miss, miss) >= best)
+		vec3 offset = vec3_madd(aq, -s, g);
+		if (vec3_dot(offset, offset) >= best)
 			continue;
-		best = vec3_dot(miss, miss);
+		best = vec3_dot(offset, offset);
 		*b1 = start[i][0] + s * step[i][0];
 		*b2 = start[i][1] + s * step[i][1];
 	}
@@ -58,7 +58,7 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 /* Returns a tangent that turns as little as possible from one triangle to the next: the shortest rotation from r to n
  * applied to a. Half vectors are coordinates in frames, and frames aligned with edges would turn at random. Every such
  * field has a singularity; this one's is at n = -r, which few surfaces face. */
-static vec3 carried_axis(vec3 n)
+static vec3 default_axis(vec3 n)
 {
 	const vec3 r = {2.0 / 7, 3.0 / 7, 6.0 / 7}, a = {3.0 / 7, -6.0 / 7, 2.0 / 7};
 	double k = 1 + vec3_dot(r, n);
@@ -68,12 +68,12 @@ static vec3 carried_axis(vec3 n)
 /* dp/du and dp/dv, computed from the texture coordinates. */
 struct tangents {
 	vec3 u, v;
-	bool any; /* false: texture coordinates are missing or degenerate */
+	bool are_valid; /* false: texture coordinates are missing or degenerate */
 };
 
-static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
+static struct tangents compute_tangents(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
 {
-	struct tangents t = {.any = false};
+	struct tangents t = {.are_valid = false};
 	if (!s->uv)
 		return t;
 	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0],
@@ -85,37 +85,37 @@ static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[
 		return t;
 	t.u = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
 	t.v = vec3_scale(1 / det, vec3_sub(vec3_scale(du1, e2), vec3_scale(du2, e1)));
-	t.any = vec3_is_finite(t.u) && vec3_dot(t.u, t.u) > 0;
+	t.are_valid = vec3_is_finite(t.u) && vec3_dot(t.u, t.u) > 0;
 	return t;
 }
 
 /* A shape in its position at a time. */
-struct posed {
+struct posed_shape {
 	struct geom_shape shape;
-	struct placement place;
+	struct placement placement;
 };
 
 /* Not inline, to keep it out of the path of shapes that do not move. */
 __attribute__((noinline)) static const struct geom_shape *pose_moving(const struct geom_shape *s, double time,
-								      struct posed *room)
+								      struct posed_shape *storage)
 {
-	const struct placement *p = &room->place;
-	placement_move(s->place, time, &room->place);
-	room->shape = *s;
-	room->shape.place = p;
+	const struct placement *p = &storage->placement;
+	placement_compute_at(s->placement, time, &storage->placement);
+	storage->shape = *s;
+	storage->shape.placement = p;
 	if (!s->is_sphere)
-		return &room->shape;
-	room->shape.center = placement_point(p, s->center);
-	room->shape.radius = s->radius * vec3_length(p->x);
-	room->shape.sphere_axes = (struct frame){vec3_normalize(placement_vector(p, s->sphere_axes.s)),
-						 vec3_normalize(placement_vector(p, s->sphere_axes.t)),
-						 vec3_normalize(placement_vector(p, s->sphere_axes.n))};
-	return &room->shape;
+		return &storage->shape;
+	storage->shape.center = placement_point(p, s->center);
+	storage->shape.radius = s->radius * vec3_length(p->x);
+	storage->shape.sphere_axes = (struct frame){vec3_normalize(placement_vector(p, s->sphere_axes.s)),
+						    vec3_normalize(placement_vector(p, s->sphere_axes.t)),
+						    vec3_normalize(placement_vector(p, s->sphere_axes.n))};
+	return &storage->shape;
 }
 
-static inline const struct geom_shape *shape_at(const struct geom_shape *s, double time, struct posed *room)
+static inline const struct geom_shape *shape_at(const struct geom_shape *s, double time, struct posed_shape *storage)
 {
-	return surface_moves(s) ? pose_moving(s, time, room) : s;
+	return surface_moves(s) ? pose_moving(s, time, storage) : s;
 }
 
 /* A triangle's first vertex and its edges from there. */
@@ -125,9 +125,10 @@ struct corner {
 
 static struct corner placed_corner(const struct geom_shape *s, const uint32_t i[3])
 {
-	vec3 p0 = vertex_at(s->position, i[0]), p1 = vertex_at(s->position, i[1]), p2 = vertex_at(s->position, i[2]);
-	return (struct corner){placement_point(s->place, p0), placement_vector(s->place, vec3_sub(p1, p0)),
-			       placement_vector(s->place, vec3_sub(p2, p0))};
+	vec3 p0 = load_float3(s->position, i[0]), p1 = load_float3(s->position, i[1]),
+	     p2 = load_float3(s->position, i[2]);
+	return (struct corner){placement_point(s->placement, p0), placement_vector(s->placement, vec3_sub(p1, p0)),
+			       placement_vector(s->placement, vec3_sub(p2, p0))};
 }
 
 static struct corner unrounded_corner(const struct geom_shape *s, const uint32_t i[3])
@@ -136,20 +137,20 @@ static struct corner unrounded_corner(const struct geom_shape *s, const uint32_t
 	return (struct corner){t.v[0], vec3_sub(t.v[1], t.v[0]), vec3_sub(t.v[2], t.v[0])};
 }
 
-static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
+static struct corner load_corner(const struct geom_shape *s, const uint32_t i[3])
 {
-	if (s->place)
+	if (s->placement)
 		return placed_corner(s, i);
 	if (s->unrounded)
 		return unrounded_corner(s, i);
-	vec3 v0 = vertex_at(s->position, i[0]);
-	return (struct corner){v0, vec3_sub(vertex_at(s->position, i[1]), v0),
-			       vec3_sub(vertex_at(s->position, i[2]), v0)};
+	vec3 v0 = load_float3(s->position, i[0]);
+	return (struct corner){v0, vec3_sub(load_float3(s->position, i[1]), v0),
+			       vec3_sub(load_float3(s->position, i[2]), v0)};
 }
 
 static vec3 vertex_normal(const struct geom_shape *s, uint32_t i)
 {
-	return s->place ? placement_normal(s->place, vertex_at(s->normal, i)) : vertex_at(s->normal, i);
+	return s->placement ? placement_normal(s->placement, load_float3(s->normal, i)) : load_float3(s->normal, i);
 }
 
 /* Returns the interpolated normal, not normalised. */
@@ -166,9 +167,9 @@ static struct relief_site site_on_triangle(const struct geom_shape *s, const str
 	struct relief_site r = {
 		.ng = x->ng, .n = n, .axis = x->axis, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
 	if (s->uv) {
-		bool any = t->any && vec3_is_finite(t->v);
-		r.tu = any ? t->u : (vec3){0, 0, 0};
-		r.tv = any ? t->v : (vec3){0, 0, 0};
+		bool are_valid = t->are_valid && vec3_is_finite(t->v);
+		r.tu = are_valid ? t->u : (vec3){0, 0, 0};
+		r.tv = are_valid ? t->v : (vec3){0, 0, 0};
 	}
 	return r;
 }
@@ -184,16 +185,16 @@ static vec3 smooth_normal(const struct geom_shape *s, const uint32_t i[3], const
 }
 
 /* Computes the interpolated tangent, not normalised. Returns false if there is none or opposite tangents cancel. */
-static bool smooth_axis(const struct geom_shape *s, uint32_t prim, double b1, double b2, vec3 *axis)
+static bool interpolate_axis(const struct geom_shape *s, uint32_t prim, double b1, double b2, vec3 *axis)
 {
 	if (!s->tangent)
 		return false;
 	const float(*t)[3] = (const float(*)[3])s->tangent[prim];
-	vec3 a = vec3_madd(vec3_madd(vec3_scale(1 - b1 - b2, vertex_at(t, 0)), b1, vertex_at(t, 1)), b2,
-			   vertex_at(t, 2));
+	vec3 a = vec3_madd(vec3_madd(vec3_scale(1 - b1 - b2, load_float3(t, 0)), b1, load_float3(t, 1)), b2,
+			   load_float3(t, 2));
 	if (!(vec3_dot(a, a) > 0x1p-20))
 		return false;
-	*axis = s->place ? placement_vector(s->place, a) : a;
+	*axis = s->placement ? placement_vector(s->placement, a) : a;
 	return true;
 }
 
@@ -206,9 +207,9 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
-	struct tangents t = tangents_of(s, i, c->e1, c->e2);
-	if (!smooth_axis(s, x->prim.prim, b1, b2, &x->axis))
-		x->axis = t.any ? t.u : carried_axis(x->ng);
+	struct tangents t = compute_tangents(s, i, c->e1, c->e2);
+	if (!interpolate_axis(s, x->prim.prim, b1, b2, &x->axis))
+		x->axis = t.are_valid ? t.u : default_axis(x->ng);
 	vec3 n = smooth_normal(s, i, x);
 	x->u = b1;
 	x->v = b2;
@@ -226,31 +227,31 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
 			 struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *now = shape_at(s, prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *posed = shape_at(s, prim.time, &storage);
 	const uint32_t *i = s->index[prim.prim];
-	struct corner c = corner_of(now, i);
+	struct corner c = load_corner(posed, i);
 	x->prim = prim;
 	x->shape = s;
-	fill_triangle(now, i, &c, b1, b2, x);
+	fill_triangle(posed, i, &c, b1, b2, x);
 }
 
 bool surface_on_curve(const struct geom_shape *s, struct prim_ref prim, double along, double around,
 		      struct surface_point *x)
 {
-	struct curve_site at = {along, around};
-	if (!curves_have(s->curves, prim.prim, at))
+	struct curve_coordinates coordinates = {along, around};
+	if (!curves_have_point(s->curves, prim.prim, coordinates))
 		return false;
-	curve_fill(s, prim, at, x);
+	curve_fill_point(s, prim, coordinates, x);
 	return true;
 }
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x)
 {
-	struct posed room;
+	struct posed_shape storage;
 	if (!s->is_sphere)
 		return;
-	s = shape_at(s, x->prim.time, &room);
+	s = shape_at(s, x->prim.time, &storage);
 	sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
 }
 
@@ -268,7 +269,7 @@ static struct relief_site site_on_sphere(const struct geom_shape *s, const struc
 }
 
 /* Fills in everything except x->shape, and u and v unless there is relief. */
-static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+static void fill_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
@@ -288,17 +289,17 @@ static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, 
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *now = shape_at(s, prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *posed = shape_at(s, prim.time, &storage);
 	x->shape = s;
-	on_sphere(now, prim, w, x);
-	surface_uv(now, x);
+	fill_sphere(posed, prim, w, x);
+	surface_uv(posed, x);
 }
 
-static struct relief_site site_of(const struct surface_point *x)
+static struct relief_site relief_site_of(const struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &storage);
 	if (s->curves)
 		return curve_relief_site(s, x);
 	if (s->is_sphere) {
@@ -307,33 +308,33 @@ static struct relief_site site_of(const struct surface_point *x)
 		return site_on_sphere(s, &y);
 	}
 	const uint32_t *i = s->index[x->prim.prim];
-	struct corner c = corner_of(s, i);
-	struct tangents t = tangents_of(s, i, c.e1, c.e2);
+	struct corner c = load_corner(s, i);
+	struct tangents t = compute_tangents(s, i, c.e1, c.e2);
 	return site_on_triangle(s, &c, &t, smooth_normal(s, i, x), x);
 }
 
-static vec3 normal_with(const struct surface_point *x, const struct relief *r)
+static vec3 normal_with_relief(const struct surface_point *x, const struct relief *r)
 {
-	struct posed room;
-	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *s = shape_at(x->shape, x->prim.time, &storage);
 	if (!r && s->curves)
 		return curve_smooth_normal(s, x);
 	if (!r)
 		return s->is_sphere ? x->ng : smooth_normal(s, s->index[x->prim.prim], x);
-	struct relief_site site = site_of(x);
+	struct relief_site site = relief_site_of(x);
 	return relief_normal(r, &site);
 }
 
-struct frame surface_frame_with(const void *surface_point, const struct relief *r)
+struct frame surface_frame_with_relief(const void *surface_point, const struct relief *r)
 {
 	const struct surface_point *x = surface_point;
-	struct frame f = frame_along(normal_with(x, r), x->axis);
-	return frame_within(&x->sh, &f);
+	struct frame f = frame_along(normal_with_relief(x, r), x->axis);
+	return frame_relative_to(&x->sh, &f);
 }
 
-void surface_turn_relief(struct surface_point *x)
+void surface_flip_relief(struct surface_point *x)
 {
-	vec3 n0 = normal_with(x, NULL), n = vec3_madd(vec3_neg(x->sh.n), 2 * vec3_dot(x->sh.n, n0), n0);
+	vec3 n0 = normal_with_relief(x, NULL), n = vec3_madd(vec3_neg(x->sh.n), 2 * vec3_dot(x->sh.n, n0), n0);
 	x->sh = frame_along(vec3_normalize(n), x->axis);
 }
 
@@ -345,17 +346,17 @@ static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double 
 	vec3 nearest = vec3_madd(oc, -b, d);
 	double disc = fmax(s->radius * s->radius - vec3_dot(nearest, nearest), 0);
 	double k = -b - copysign(sqrt(disc), b);
-	double other = k != 0 ? c / k : k;
-	double root = fabs(k - t) < fabs(other - t) ? k : other;
+	double other_root = k != 0 ? c / k : k;
+	double root = fabs(k - t) < fabs(other_root - t) ? k : other_root;
 	return vec3_normalize(vec3_madd(oc, root, d));
 }
 
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *now = shape_at(s, hit->prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *posed = shape_at(s, hit->prim.time, &storage);
 	if (s->is_sphere) {
-		surface_on_sphere(now, hit->prim, sphere_direction(now, o, d, hit->t), x);
+		surface_on_sphere(posed, hit->prim, sphere_direction(posed, o, d, hit->t), x);
 		x->shape = s;
 		return;
 	}
@@ -364,12 +365,12 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 		return;
 	}
 	const uint32_t *i = s->index[hit->prim.prim];
-	struct corner c = corner_of(now, i);
+	struct corner c = load_corner(posed, i);
 	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
 	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
 	x->prim = hit->prim;
 	x->shape = s;
-	fill_triangle(now, i, &c, b1, b2, x);
+	fill_triangle(posed, i, &c, b1, b2, x);
 }
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
@@ -385,39 +386,40 @@ void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
 	*dv = f.t;
 }
 
-static void change_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+static void sphere_derivatives(const struct geom_shape *s, const struct surface_point *x, struct surface_derivatives *c)
 {
-	double bend = 1 / s->radius;
-	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
-	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
-	/* du is the normalised axis x w. Per unit length along the circle of latitude, it turns by `bend` towards the
-	 * centre and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
+	double curvature = 1 / s->radius;
+	c->dn[0] = vec3_scale(s->normal_sign * curvature, c->du);
+	c->dn[1] = vec3_scale(s->normal_sign * curvature, c->dv);
+	/* du is the normalised axis x w. Per unit length along the circle of latitude, it turns by `curvature` towards
+	 * the centre and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
-	vec3 turn = vec3_scale(-bend, w);
+	vec3 turn = vec3_scale(-curvature, w);
 	if (sine > 0)
-		turn = vec3_madd(turn, bend * cosine / sine, vec3_cross(w, c->du));
-	c->daxis[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
+		turn = vec3_madd(turn, curvature * cosine / sine, vec3_cross(w, c->du));
+	c->daxis[0] = vec3_is_finite(turn) ? turn : vec3_scale(-curvature, w);
 }
 
-static void bend_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+static void bend_sphere_derivatives(const struct geom_shape *s, const struct surface_point *x,
+				    struct surface_derivatives *c)
 {
 	struct relief_site site = site_on_sphere(s, x);
 	double tu2 = vec3_dot(site.tu, site.tu), tv2 = vec3_dot(site.tv, site.tv),
-	       hand = vec3_dot(site.tu, x->axis) < 0 ? -1 : 1;
+	       orientation = vec3_dot(site.tu, x->axis) < 0 ? -1 : 1;
 	if (!(tu2 > 0) || !(tv2 > 0))
 		return;
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	site.axis = c->axis;
 	for (int k = 0; k < 2; k++) {
-		vec3 along = k ? c->dv : c->du;
-		struct relief_step d = {.dn = c->dn[k],
-					.daxis = c->daxis[k],
-					.du = vec3_dot(along, site.tu) / tu2,
-					.dv = vec3_dot(along, site.tv) / tv2};
-		d.dtu = vec3_scale(2 * M_PI * hand, vec3_cross(s->sphere_axes.n, along));
-		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, along), s->radius, vec3_cross(c->daxis[k], w)));
-		c->dn[k] = relief_turn(s->relief, &site, &d);
+		vec3 tangent = k ? c->dv : c->du;
+		struct relief_derivatives d = {.dn = c->dn[k],
+					       .daxis = c->daxis[k],
+					       .du = vec3_dot(tangent, site.tu) / tu2,
+					       .dv = vec3_dot(tangent, site.tv) / tv2};
+		d.dtu = vec3_scale(2 * M_PI * orientation, vec3_cross(s->sphere_axes.n, tangent));
+		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, tangent), s->radius, vec3_cross(c->daxis[k], w)));
+		c->dn[k] = relief_normal_derivative(s->relief, &site, &d);
 	}
 }
 
@@ -431,24 +433,24 @@ static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
 }
 
 /* Computes the unit axis and its derivatives from the interpolated tangent. */
-static void turn_axis(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+static void axis_derivatives(const struct geom_shape *s, const struct surface_point *x, struct surface_derivatives *c)
 {
 	vec3 a, g1, g2;
-	if (!smooth_axis(s, x->prim.prim, x->b1, x->b2, &a))
+	if (!interpolate_axis(s, x->prim.prim, x->b1, x->b2, &a))
 		return;
 	const float(*t)[3] = (const float(*)[3])s->tangent[x->prim.prim];
-	vec3 a1 = vec3_sub(vertex_at(t, 1), vertex_at(t, 0)), a2 = vec3_sub(vertex_at(t, 2), vertex_at(t, 0));
-	if (s->place) {
-		a1 = placement_vector(s->place, a1);
-		a2 = placement_vector(s->place, a2);
+	vec3 a1 = vec3_sub(load_float3(t, 1), load_float3(t, 0)), a2 = vec3_sub(load_float3(t, 2), load_float3(t, 0));
+	if (s->placement) {
+		a1 = placement_vector(s->placement, a1);
+		a2 = placement_vector(s->placement, a2);
 	}
-	struct corner k = corner_of(s, s->index[x->prim.prim]);
+	struct corner k = load_corner(s, s->index[x->prim.prim]);
 	barycentric_gradients(&k, &g1, &g2);
 	double length = vec3_length(a);
 	c->axis = vec3_scale(1 / length, a);
 	for (int d = 0; d < 2; d++) {
-		vec3 along = d ? c->dv : c->du;
-		vec3 da = vec3_madd(vec3_scale(vec3_dot(along, g1), a1), vec3_dot(along, g2), a2);
+		vec3 tangent = d ? c->dv : c->du;
+		vec3 da = vec3_madd(vec3_scale(vec3_dot(tangent, g1), a1), vec3_dot(tangent, g2), a2);
 		vec3 turn = vec3_scale(1 / length, vec3_madd(da, -vec3_dot(c->axis, da), c->axis));
 		if (vec3_is_finite(turn))
 			c->daxis[d] = turn;
@@ -456,7 +458,8 @@ static void turn_axis(const struct geom_shape *s, const struct surface_point *x,
 }
 
 /* Returns the normal without relief and sets its derivatives in c->dn. */
-static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+static vec3 triangle_derivatives(const struct geom_shape *s, const struct surface_point *x,
+				 struct surface_derivatives *c)
 {
 	const uint32_t *i = s->index[x->prim.prim];
 	if (!s->normal)
@@ -464,14 +467,14 @@ static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_
 	vec3 m = interpolated_normal(s, i, x->b1, x->b2), n0 = vertex_normal(s, i[0]), g1, g2;
 	if (!(vec3_dot(m, x->ng) > 0))
 		return x->ng;
-	struct corner k = corner_of(s, i);
+	struct corner k = load_corner(s, i);
 	barycentric_gradients(&k, &g1, &g2);
 	vec3 m1 = vec3_sub(vertex_normal(s, i[1]), n0), m2 = vec3_sub(vertex_normal(s, i[2]), n0),
 	     n = s->relief ? vec3_normalize(m) : x->sh.n;
 	double length = vec3_length(m);
 	for (int d = 0; d < 2; d++) {
-		vec3 along = d ? c->dv : c->du;
-		vec3 dm = vec3_madd(vec3_scale(vec3_dot(along, g1), m1), vec3_dot(along, g2), m2);
+		vec3 tangent = d ? c->dv : c->du;
+		vec3 dm = vec3_madd(vec3_scale(vec3_dot(tangent, g1), m1), vec3_dot(tangent, g2), m2);
 		vec3 dn = vec3_scale(1 / length, vec3_madd(dm, -vec3_dot(n, dm), n));
 		if (vec3_is_finite(dn))
 			c->dn[d] = dn;
@@ -479,12 +482,12 @@ static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_
 	return n;
 }
 
-static void bend_on_triangle(const struct geom_shape *s, const struct surface_point *x, vec3 n,
-			     struct surface_change *c)
+static void bend_triangle_derivatives(const struct geom_shape *s, const struct surface_point *x, vec3 n,
+				      struct surface_derivatives *c)
 {
 	const uint32_t *i = s->index[x->prim.prim];
-	struct corner k = corner_of(s, i);
-	struct tangents t = tangents_of(s, i, k.e1, k.e2);
+	struct corner k = load_corner(s, i);
+	struct tangents t = compute_tangents(s, i, k.e1, k.e2);
 	struct relief_site site = site_on_triangle(s, &k, &t, n, x);
 	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* derivatives of (u,v) with respect to the barycentrics */
 	for (int a = 0; s->uv && a < 2; a++) {
@@ -495,34 +498,35 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 	barycentric_gradients(&k, &g1, &g2);
 	site.axis = c->axis;
 	for (int a = 0; a < 2; a++) {
-		vec3 along = a ? c->dv : c->du;
-		double b1 = vec3_dot(along, g1), b2 = vec3_dot(along, g2);
-		struct relief_step d = {.dn = c->dn[a],
-					.daxis = c->daxis[a],
-					.du = b1 * t1[0] + b2 * t2[0],
-					.dv = b1 * t1[1] + b2 * t2[1]};
-		c->dn[a] = relief_turn(s->relief, &site, &d);
+		vec3 tangent = a ? c->dv : c->du;
+		double b1 = vec3_dot(tangent, g1), b2 = vec3_dot(tangent, g2);
+		struct relief_derivatives d = {.dn = c->dn[a],
+					       .daxis = c->daxis[a],
+					       .du = b1 * t1[0] + b2 * t2[0],
+					       .dv = b1 * t1[1] + b2 * t2[1]};
+		c->dn[a] = relief_normal_derivative(s->relief, &site, &d);
 	}
 }
 
-void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+void surface_compute_derivatives(const struct geom_shape *s, const struct surface_point *x,
+				 struct surface_derivatives *c)
 {
-	struct posed room;
-	*c = (struct surface_change){.dn = {{0, 0, 0}}};
+	struct posed_shape storage;
+	*c = (struct surface_derivatives){.dn = {{0, 0, 0}}};
 	surface_tangents(x, &c->du, &c->dv);
 	c->axis = c->du;
-	s = shape_at(s, x->prim.time, &room);
+	s = shape_at(s, x->prim.time, &storage);
 	if (s->curves) {
-		curve_change(s, x, c);
+		curve_derivatives(s, x, c);
 	} else if (s->is_sphere) {
-		change_on_sphere(s, x, c);
+		sphere_derivatives(s, x, c);
 		if (s->relief)
-			bend_on_sphere(s, x, c);
+			bend_sphere_derivatives(s, x, c);
 	} else if (s->normal || s->relief) {
-		turn_axis(s, x, c);
-		vec3 n = change_on_triangle(s, x, c);
+		axis_derivatives(s, x, c);
+		vec3 n = triangle_derivatives(s, x, c);
 		if (s->relief)
-			bend_on_triangle(s, x, n, c);
+			bend_triangle_derivatives(s, x, n, c);
 	}
 }
 
@@ -530,81 +534,82 @@ static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim,
 			       struct surface_point *x)
 {
 	const uint32_t *i = s->index[prim.prim];
-	struct corner c = corner_of(s, i);
-	vec3 h = vec3_cross(d, c.e2), to = vec3_sub(o, c.v0), q = vec3_cross(to, c.e1);
+	struct corner c = load_corner(s, i);
+	vec3 h = vec3_cross(d, c.e2), offset = vec3_sub(o, c.v0), q = vec3_cross(offset, c.e1);
 	double det = vec3_dot(c.e1, h), side = copysign(1, det);
-	double b1 = side * vec3_dot(to, h), b2 = side * vec3_dot(d, q), most = fabs(det);
-	if (!(b1 >= 0) || !(b2 >= 0) || !(b1 + b2 <= most) || !(side * vec3_dot(c.e2, q) > 0) || !(most > 0))
+	double b1 = side * vec3_dot(offset, h), b2 = side * vec3_dot(d, q), scale = fabs(det);
+	if (!(b1 >= 0) || !(b2 >= 0) || !(b1 + b2 <= scale) || !(side * vec3_dot(c.e2, q) > 0) || !(scale > 0))
 		return false;
 	x->prim = prim;
-	fill_triangle(s, i, &c, b1 / most, b2 / most, x);
+	fill_triangle(s, i, &c, b1 / scale, b2 / scale, x);
 	return true;
 }
 
-static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_it, vec3 o, vec3 d,
+static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_sphere, vec3 o, vec3 d,
 			     double t_near, struct surface_point *x)
 {
 	vec3 oc = vec3_sub(o, s->center);
 	double b = vec3_dot(oc, d), root;
-	if (starts_on_it) {
+	if (starts_on_sphere) {
 		root = -2 * b; /* the other root is the start */
 	} else {
-		double miss = vec3_length(vec3_madd(oc, -b, d)), l = vec3_length(oc);
-		double disc = (s->radius - miss) * (s->radius + miss), c = (l - s->radius) * (l + s->radius);
+		double line_distance = vec3_length(vec3_madd(oc, -b, d)), l = vec3_length(oc);
+		double disc = (s->radius - line_distance) * (s->radius + line_distance),
+		       c = (l - s->radius) * (l + s->radius);
 		if (!(disc >= 0))
 			return false;
 		double k = -b - copysign(sqrt(disc), b), other = k != 0 ? c / k : k;
-		double near = fmin(k, other), far = fmax(k, other);
-		root = near > 0 && fabs(near - t_near) <= fabs(far - t_near) ? near : far;
+		double nearer = fmin(k, other), farther = fmax(k, other);
+		root = nearer > 0 && fabs(nearer - t_near) <= fabs(farther - t_near) ? nearer : farther;
 	}
 	if (!(root > 0) || !isfinite(root))
 		return false;
-	on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
+	fill_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
 	return true;
 }
 
 bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
 		       double t_near, struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *now = shape_at(s, prim.time, &room);
-	bool same = prim.shape == from.shape && prim.prim == from.prim;
+	struct posed_shape storage;
+	const struct geom_shape *posed = shape_at(s, prim.time, &storage);
+	bool starts_on_prim = prim.shape == from.shape && prim.prim == from.prim;
 	x->shape = s;
 	if (s->is_sphere)
-		return reproject_sphere(now, prim, same, o, d, t_near, x);
+		return reproject_sphere(posed, prim, starts_on_prim, o, d, t_near, x);
 	if (s->curves)
 		return curve_reproject(s, prim, from, o, d, t_near, x);
-	return !same && reproject_triangle(now, prim, o, d, x);
+	return !starts_on_prim && reproject_triangle(posed, prim, o, d, x);
 }
 
-bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
+bool surface_nearest(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
 {
-	struct posed room;
-	const struct geom_shape *now = shape_at(s, prim.time, &room);
+	struct posed_shape storage;
+	const struct geom_shape *posed = shape_at(s, prim.time, &storage);
 	if (s->is_sphere) {
-		vec3 d = vec3_sub(p, now->center);
+		vec3 d = vec3_sub(p, posed->center);
 		if (!(vec3_dot(d, d) > 0))
 			return false;
 		surface_on_sphere(s, prim, vec3_normalize(d), x);
 		return true;
 	}
 	if (s->curves)
-		return curve_near(s, prim, p, x);
+		return curve_nearest_point(s, prim, p, x);
 	if (prim.prim >= s->triangle_count)
 		return false;
 	const uint32_t *i = s->index[prim.prim];
-	struct corner c = corner_of(now, i);
+	struct corner c = load_corner(posed, i);
 	vec3 area = vec3_cross(c.e1, c.e2), d = vec3_sub(p, c.v0);
-	double square = vec3_dot(area, area);
-	if (!(square > 0))
+	double area2 = vec3_dot(area, area);
+	if (!(area2 > 0))
 		return false;
-	double b1 = vec3_dot(vec3_cross(d, c.e2), area) / square, b2 = vec3_dot(vec3_cross(c.e1, d), area) / square;
+	double b1 = vec3_dot(vec3_cross(d, c.e2), area) / area2, b2 = vec3_dot(vec3_cross(c.e1, d), area) / area2;
 	if (!isfinite(b1) || !isfinite(b2))
 		return false;
 	if (b1 < 0 || b2 < 0 || b1 + b2 > 1)
 		move_inside(c.e1, c.e2, &b1, &b2);
 	x->prim = prim;
 	x->shape = s;
-	fill_triangle(now, i, &c, b1, b2, x);
+	fill_triangle(posed, i, &c, b1, b2, x);
 	return true;
 }

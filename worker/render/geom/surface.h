@@ -14,7 +14,7 @@
 
 /* Computes the point of a primitive nearest to p, which should be on it. Its precision is relative to the size of the
  * primitive, wherever the primitive is. Returns false if there is no such point. */
-bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
+bool surface_nearest(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
 /* Computes the point where the ray o + t d hits the primitive named by `hit`. */
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
 /* Compute the point with barycentrics (b1, b2) on a triangle, and the point in the unit direction
@@ -33,17 +33,18 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 		       double t_near, struct surface_point *x);
 
 /* Returns the shading frame that the surface_point would have with another relief (NULL for none), expressed in its
- * present shading frame: as in struct relief_place. */
-struct frame surface_frame_with(const void *surface_point, const struct relief *r);
+ * present shading frame: as in struct relief_frames. */
+struct frame surface_frame_with_relief(const void *surface_point, const struct relief *r);
 
 /* Mirrors a shading normal n bent by relief at the unbent normal n0: n' = 2 (n.n0) n0 - n. */
-void surface_turn_relief(struct surface_point *x);
+void surface_flip_relief(struct surface_point *x);
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x);
 
-/* Computes only du and dv of struct surface_change. */
+/* Computes only du and dv of struct surface_derivatives. */
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv);
 /* Computes how x changes as it moves; all results are finite. */
-void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c);
+void surface_compute_derivatives(const struct geom_shape *s, const struct surface_point *x,
+				 struct surface_derivatives *c);
 
 #endif

@@ -13,15 +13,16 @@
 #include "worker/render/geom/curves.h"
 #include "worker/render/geom/surface_point.h"
 
-void curve_fill(const struct geom_shape *s, struct prim_ref prim, struct curve_site at, struct surface_point *x);
+void curve_fill_point(const struct geom_shape *s, struct prim_ref prim, struct curve_coordinates coordinates,
+		      struct surface_point *x);
 void curve_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
 bool curve_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
 		     double t_near, struct surface_point *x);
-bool curve_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
+bool curve_nearest_point(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
 
 vec3 curve_smooth_normal(const struct geom_shape *s, const struct surface_point *x);
 struct relief_site curve_relief_site(const struct geom_shape *s, const struct surface_point *x);
 /* Computes c->dn and c->daxis. On entry, c has du and dv, axis is du, and the rest is 0. */
-void curve_change(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c);
+void curve_derivatives(const struct geom_shape *s, const struct surface_point *x, struct surface_derivatives *c);
 
 #endif

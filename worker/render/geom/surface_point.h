@@ -27,22 +27,22 @@ struct geom_shape {
 	/* The shape consists of these curves, oriented by normal_sign; NULL: it has no curves. */
 	const struct curves *curves;
 	/* For curves: rays do not meet them from inside; normals point outwards. */
-	bool culled;
+	bool culls_backfaces;
 	/* For instances and for spheres that move; NULL: positions and normals are in world space. */
-	const struct placement *place;
+	const struct placement *placement;
 	double unit; /* the scene's unit of length in world units, for relief */
 };
 
 static inline bool surface_moves(const struct geom_shape *s)
 {
-	return s->place && s->place->moves;
+	return s->placement && s->placement->movement;
 }
 
 struct surface_point {
 	vec3 p, ng;
 	struct frame sh; /* sh.n is the shading normal, bent by relief */
 	double u, v;
-	/* Barycentrics on a triangle; the coordinates of struct curve_site on a curve; 0 on a sphere. */
+	/* Barycentrics on a triangle; the coordinates of struct curve_coordinates on a curve; 0 on a sphere. */
 	double b1, b2;
 	/* The direction along which the shading frame is aligned (frame_along): the interpolated tangent, dp/du, or a
 	 * substitute where neither exists. */
@@ -52,7 +52,7 @@ struct surface_point {
 };
 
 /* Derivatives of a point's frame as it moves, per unit length, [0] along du and [1] along dv. */
-struct surface_change {
+struct surface_derivatives {
 	vec3 du, dv; /* orthonormal, in the plane perpendicular to ng: frame_along(ng, axis) */
 	vec3 dn[2];  /* derivatives of the shading normal; 0 on flat-shaded triangles */
 	vec3 axis;   /* the unit axis */

@@ -3,12 +3,12 @@
 
 float triangle_extent(const float (*position)[3], const uint32_t i[3])
 {
-	float most = 0;
+	float max = 0;
 	for (int k = 0; k < 3; k++) {
 		float a = position[i[0]][k], b = position[i[1]][k], c = position[i[2]][k];
-		most = fmaxf(most, fmaxf(a, fmaxf(b, c)) - fminf(a, fminf(b, c)));
+		max = fmaxf(max, fmaxf(a, fmaxf(b, c)) - fminf(a, fminf(b, c)));
 	}
-	return most;
+	return max;
 }
 
 static bool comes_first(vec3 a, vec3 b)
@@ -18,18 +18,18 @@ static bool comes_first(vec3 a, vec3 b)
 
 /* Returns a number whose sign tells on which side of the line through a and b the ray passes: the volume spanned by d,
  * a - o, b - o. Exchanging a and b gives exactly the opposite number. */
-static double side_of(vec3 o, vec3 d, vec3 a, vec3 b)
+static double edge_side(vec3 o, vec3 d, vec3 a, vec3 b)
 {
-	bool turned = comes_first(b, a);
-	vec3 p = vec3_sub(turned ? b : a, o), q = vec3_sub(turned ? a : b, o);
+	bool is_swapped = comes_first(b, a);
+	vec3 p = vec3_sub(is_swapped ? b : a, o), q = vec3_sub(is_swapped ? a : b, o);
 	double volume = vec3_dot(d, vec3_cross(p, q));
-	return turned ? -volume : volume;
+	return is_swapped ? -volume : volume;
 }
 
-bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t)
+bool triangle_intersect(const struct triangle *k, vec3 o, vec3 d, double *t)
 {
-	double u = side_of(o, d, k->v[1], k->v[2]), v = side_of(o, d, k->v[2], k->v[0]),
-	       w = side_of(o, d, k->v[0], k->v[1]);
+	double u = edge_side(o, d, k->v[1], k->v[2]), v = edge_side(o, d, k->v[2], k->v[0]),
+	       w = edge_side(o, d, k->v[0], k->v[1]);
 	if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0))
 		return false;
 	double slope = vec3_dot(k->n, d);

@@ -10,9 +10,9 @@
 #include <stdint.h>
 
 struct triangle {
-	vec3 v[3], n;	 /* vertices, and normal n, not normalised */
-	double edges;	 /* upper bound on the terms of n */
-	double rounding; /* error of the vertices, relative to their coordinates */
+	vec3 v[3], n;	     /* vertices, and normal n, not normalised */
+	double edge_product; /* upper bound on the terms of n */
+	double rounding;     /* error of the vertices, relative to their coordinates */
 };
 
 static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
@@ -59,12 +59,12 @@ static inline struct triangle triangle_unrounded(const double (*position)[3], co
 }
 
 /* Returns the height of p over the plane, times |n|; 0 if p is in the plane as far as double can tell. p and n carry
- * the rounding errors of a few operations, whose terms `edges` bounds. */
+ * the rounding errors of a few operations, whose terms `edge_product` bounds. */
 static inline double triangle_height(const struct triangle *t, vec3 p)
 {
-	vec3 to = vec3_sub(t->v[0], p);
-	double h = vec3_dot(t->n, to);
-	return fabs(h) <= 0x1p-49 * t->edges * (triangle_norm1(p) + triangle_norm1(to)) ? 0 : h;
+	vec3 offset = vec3_sub(t->v[0], p);
+	double h = vec3_dot(t->n, offset);
+	return fabs(h) <= 0x1p-49 * t->edge_product * (triangle_norm1(p) + triangle_norm1(offset)) ? 0 : h;
 }
 
 /* Returns the smallest of the three altitudes; 0 if the triangle is a point. */
@@ -80,6 +80,6 @@ float triangle_extent(const float (*position)[3], const uint32_t i[3]);
 
 /* Sets *t to where o + t d crosses the plane; returns false unless that is within the triangle. Two triangles that
  * share an edge leave no gap, because both test it with the same operations. */
-bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t);
+bool triangle_intersect(const struct triangle *k, vec3 o, vec3 d, double *t);
 
 #endif

@@ -27,12 +27,12 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
+enum { VISITED_NODES_MAX = 1 << 17, GLB_HEADER_SIZE = 12, GLB_CHUNK_HEADER_SIZE = 8 };
 #define GLB_MAGIC 0x46546c67u  /* "glTF" */
 #define GLB_JSON 0x4e4f534au   /* "JSON" */
 #define GLB_BINARY 0x004e4942u /* "BIN" */
 
-bool gltf_is(const char *name)
+bool gltf_is_file_name(const char *name)
 {
 	size_t n = strlen(name);
 	return (n > 5 && strcmp(name + n - 5, ".gltf") == 0) || (n > 4 && strcmp(name + n - 4, ".glb") == 0);
@@ -42,7 +42,7 @@ bool gltf_is(const char *name)
 
 /* Returns the array with that name and makes room for the lines of its entries; GLTF_ARRAYS if there is no such
  * array. */
-static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
+static enum gltf_array prepare_lines(struct gltf *g, const char *key, size_t n)
 {
 	for (int i = 0; i < GLTF_ARRAYS; i++) {
 		const char *name = gltf_array_name((enum gltf_array)i);
@@ -51,7 +51,7 @@ static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 		size_t count = json_array_size(json_object_get(g->root, name));
 		if (!g->lines[i] && count)
 			g->lines[i] = arena_alloc(g->arena, count, sizeof *g->lines[i]);
-		g->line_room[i] = g->lines[i] ? count : 0;
+		g->line_capacity[i] = g->lines[i] ? count : 0;
 		return (enum gltf_array)i;
 	}
 	return GLTF_ARRAYS;
@@ -59,7 +59,7 @@ static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 
 /* Finds the lines on which the entries of the top-level arrays begin, in JSON that is known to be well formed and to
  * have no duplicate keys. */
-static void find_lines(struct gltf *g, const char *text, size_t size)
+static void find_entry_lines(struct gltf *g, const char *text, size_t size)
 {
 	int depth = 0, line = 1;
 	enum gltf_array array = GLTF_ARRAYS;
@@ -70,9 +70,9 @@ static void find_lines(struct gltf *g, const char *text, size_t size)
 			for (; i < size && text[i] != '"'; i++)
 				i += text[i] == '\\';
 			if (depth == 1)
-				array = lines_of(g, text + begin, i - begin);
+				array = prepare_lines(g, text + begin, i - begin);
 		} else if (c == '{' || c == '[') {
-			if (depth == 2 && array < GLTF_ARRAYS && g->line_count[array] < g->line_room[array])
+			if (depth == 2 && array < GLTF_ARRAYS && g->line_count[array] < g->line_capacity[array])
 				g->lines[array][g->line_count[array]++] = line;
 			depth++;
 		} else if (c == '}' || c == ']') {
@@ -91,45 +91,45 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	const unsigned char *p = g->bytes;
 	*text = (const char *)p;
 	*size = g->size;
-	if (g->size < GLB_HEADER || get32(p) != GLB_MAGIC)
+	if (g->size < GLB_HEADER_SIZE || get32(p) != GLB_MAGIC)
 		return 0;
 	if (get32(p + 4) != 2)
 		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", get32(p + 4));
 	if (get32(p + 8) > g->size)
 		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, but it has %zu", get32(p + 8), g->size);
-	size_t end = get32(p + 8), at = GLB_HEADER;
+	size_t end = get32(p + 8), offset = GLB_HEADER_SIZE;
 	*size = 0;
-	for (int i = 0; at + GLB_CHUNK <= end; i++) {
-		size_t length = get32(p + at);
-		uint32_t type = get32(p + at + 4);
-		at += GLB_CHUNK;
-		if (length > end - at)
+	for (int i = 0; offset + GLB_CHUNK_HEADER_SIZE <= end; i++) {
+		size_t length = get32(p + offset);
+		uint32_t type = get32(p + offset + 4);
+		offset += GLB_CHUNK_HEADER_SIZE;
+		if (length > end - offset)
 			return gltf_fail(g, NULL, EINVAL, "a chunk exceeds the file");
 		if (i == 0 && type == GLB_JSON) {
-			*text = (const char *)p + at;
+			*text = (const char *)p + offset;
 			*size = length;
 			while (*size && !(*text)[*size - 1]) /* some writers pad with zeros instead of blanks */
 				--*size;
 		} else if (i == 1 && type == GLB_BINARY) {
-			g->binary_first = at;
-			g->binary_count = length;
+			g->binary_offset = offset;
+			g->binary_size = length;
 		}
-		at += length;
+		offset += length;
 	}
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
 /* Notes the extensions that the file uses and the reader does not know: their effect is missing. */
-static void note_unknown(struct gltf *g)
+static void note_unknown_extensions(struct gltf *g)
 {
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
 	char text[512] = "";
 	struct text t = {text, sizeof text};
 	for (size_t i = 0; i < json_array_size(used); i++) {
 		const char *name = json_string_value(json_array_get(used, i));
-		if (name && !gltf_knows(name))
-			text_put(&t, "%s%.64s",
-				 *text ? ", " : "these extensions are not supported and ignored: ", name);
+		if (name && !gltf_is_known_extension(name))
+			text_appendf(&t, "%s%.64s",
+				     *text ? ", " : "these extensions are not supported and ignored: ", name);
 	}
 	if (*text)
 		gltf_note(g, text);
@@ -137,22 +137,22 @@ static void note_unknown(struct gltf *g)
 
 /* Determines the exporter from `generator`, which ends in its version. Since 3.4, Blender's exporter writes lamps in
  * lumens by default; since 4.0, Blender's diffuse surfaces are those of the format. */
-static void note_writer(struct gltf *g, const char *generator)
+static void detect_exporter(struct gltf *g, const char *generator)
 {
 	static const char blender[] = "Khronos glTF Blender I/O v";
 	unsigned major = 0, minor = 0;
 	g->lamp_scale = 1;
-	g->is_blenders = generator && strncmp(generator, blender, strlen(blender)) == 0;
-	if (!g->is_blenders || sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) != 2)
+	g->is_from_blender = generator && strncmp(generator, blender, strlen(blender)) == 0;
+	if (!g->is_from_blender || sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) != 2)
 		return;
-	g->is_burleys = major < 4;
+	g->uses_burley_diffuse = major < 4;
 	if (major > 3 || (major == 3 && minor >= 4))
 		g->lamp_scale = 1.0 / 683;
 }
 
 /* Refuses all required extensions that are not supported in one error, so that one run shows everything that has to
  * be exported differently. */
-static void check_required(struct gltf *g)
+static void check_required_extensions(struct gltf *g)
 {
 	const json_t *required = json_object_get(g->root, "extensionsRequired");
 	char unknown[384] = "";
@@ -161,9 +161,9 @@ static void check_required(struct gltf *g)
 		char name[65];
 		const char *text = json_string_value(json_array_get(required, i));
 		snprintf(name, sizeof name, "%s", text ? text : "(no text)");
-		if (text && gltf_knows(text))
+		if (text && gltf_is_known_extension(text))
 			continue;
-		spelling_list(unknown, sizeof unknown, name);
+		spelling_append_to_list(unknown, sizeof unknown, name);
 		count++;
 	}
 	if (count)
@@ -179,107 +179,108 @@ static void check_file(struct gltf *g)
 		gltf_fail(g, NULL, EINVAL, "glTF of version %.3g; 2.0 is supported", json_number_value(number));
 		return;
 	}
-	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
+	const char *version = asset ? gltf_string(g, NULL, asset, "version", "") : "";
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
-	if (g->failed)
+	if (g->error_code)
 		return;
-	note_writer(g, json_string_value(json_object_get(asset, "generator")));
-	check_required(g);
-	gltf_go_on(g);
-	note_unknown(g);
+	detect_exporter(g, json_string_value(json_object_get(asset, "generator")));
+	check_required_extensions(g);
+	gltf_record_failure(g);
+	note_unknown_extensions(g);
 }
 
 /* ---- nodes */
 
-struct walk {
+struct node_walk {
 	struct gltf *g;
-	bool *above; /* for each node: it is an ancestor of the current one */
-	size_t nodes, visited;
+	bool *is_ancestor; /* for each node: it is an ancestor of the current one */
+	size_t node_count, visited_count;
 };
 
-static bool is_hidden(struct gltf *g, const struct gltf_at *node)
+static bool is_hidden(struct gltf *g, const struct gltf_entry *node)
 {
 	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
 }
 
 /* Returns whether a scale of 0 in two or three directions reduces the node's mesh to a line or a point, which is how
  * animations hide objects. A skinned mesh is placed by its joints and therefore not affected. */
-static bool is_scaled_away(const struct gltf_at *node, const mat4 *to_world)
+static bool is_scaled_away(const struct gltf_entry *node, const mat4 *to_world)
 {
-	int flat = 0;
+	int flat_axes = 0;
 	for (int k = 0; k < 3; k++)
-		flat += to_world->m[0][k] == 0 && to_world->m[1][k] == 0 && to_world->m[2][k] == 0;
-	return flat > 1 && !json_object_get(node->json, "skin");
+		flat_axes += to_world->m[0][k] == 0 && to_world->m[1][k] == 0 && to_world->m[2][k] == 0;
+	return flat_axes > 1 && !json_object_get(node->json, "skin");
 }
 
-/* Adds the camera, mesh and light of a node. hidden: only the camera. */
-static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world, bool hidden)
+/* Adds the camera, mesh and light of a node. is_hidden_node: only the camera. */
+static void add_node_contents(struct gltf *g, const struct gltf_entry *node, const mat4 *to_world, bool is_hidden_node)
 {
-	struct gltf_at what;
-	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
-		gltf_camera(g, &what, to_world);
-	gltf_go_on(g);
-	if (hidden)
+	struct gltf_entry entry;
+	if (gltf_resolve(g, node, node->json, "camera", GLTF_CAMERAS, &entry) > 0)
+		gltf_add_camera(g, &entry, to_world);
+	gltf_record_failure(g);
+	if (is_hidden_node)
 		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
-	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0;
-	if (mesh && is_scaled_away(node, to_world)) {
-		g->first_away = g->scaled_away++ == 0 ? node->index : g->first_away;
-		mesh = false;
+	bool has_mesh = gltf_resolve(g, node, node->json, "mesh", GLTF_MESHES, &entry) > 0;
+	if (has_mesh && is_scaled_away(node, to_world)) {
+		g->first_scaled_away = g->scaled_away_count++ == 0 ? node->index : g->first_scaled_away;
+		has_mesh = false;
 	}
-	if (mesh && instances)
-		gltf_mesh_instances(g, &what, node, instances, to_world);
-	else if (mesh)
-		gltf_mesh(g, &what, node, to_world);
-	gltf_go_on(g);
-	gltf_follow(g, node, node->json, "skin", GLTF_SKINS, &what); /* the mesh may have no joints to use it for */
-	gltf_go_on(g);
+	if (has_mesh && instances)
+		gltf_add_mesh_instances(g, &entry, node, instances, to_world);
+	else if (has_mesh)
+		gltf_add_mesh(g, &entry, node, to_world);
+	gltf_record_failure(g);
+	gltf_resolve(g, node, node->json, "skin", GLTF_SKINS, &entry); /* the mesh may have no joints to use it for */
+	gltf_record_failure(g);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
-	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
-		gltf_light(g, &what, to_world);
-	gltf_go_on(g);
+	if (light && gltf_resolve(g, node, light, "light", GLTF_LIGHTS, &entry) > 0)
+		gltf_add_light(g, &entry, to_world);
+	gltf_record_failure(g);
 }
 
-static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, bool hidden)
+static void visit_node(struct node_walk *w, uint64_t index, const mat4 *parent_to_world, int depth, bool is_hidden_node)
 {
 	struct gltf *g = w->g;
-	struct gltf_at node;
-	if (g->failed || !gltf_entry(g, GLTF_NODES, index, &node))
+	struct gltf_entry node;
+	if (g->error_code || !gltf_find_entry(g, GLTF_NODES, index, &node))
 		return;
-	if (w->above[index] || depth > GLTF_NODES_DEEP) {
-		gltf_fail(g, &node, ELOOP, w->above[index] ? "it is its own ancestor" : "nodes are more than %d deep",
-			  GLTF_NODES_DEEP);
-		return;
-	}
-	if (++w->visited > INSTANCES_MAX) {
-		gltf_fail(g, &node, E2BIG, "more than %d nodes", INSTANCES_MAX);
+	if (w->is_ancestor[index] || depth > GLTF_NODE_DEPTH_MAX) {
+		gltf_fail(g, &node, ELOOP,
+			  w->is_ancestor[index] ? "it is its own ancestor" : "nodes are more than %d deep",
+			  GLTF_NODE_DEPTH_MAX);
 		return;
 	}
-	mat4 own = gltf_node_matrix(g, &node), to_world = mat4_mul(*above, own);
-	hidden |= is_hidden(g, &node);
-	visit_lists(g, &node, &to_world, hidden);
+	if (++w->visited_count > VISITED_NODES_MAX) {
+		gltf_fail(g, &node, E2BIG, "more than %d nodes", VISITED_NODES_MAX);
+		return;
+	}
+	mat4 to_parent = gltf_node_matrix(g, &node), to_world = mat4_mul(*parent_to_world, to_parent);
+	is_hidden_node |= is_hidden(g, &node);
+	add_node_contents(g, &node, &to_world, is_hidden_node);
 	const json_t *children = json_object_get(node.json, "children");
-	w->above[index] = true;
-	for (size_t i = 0; i < json_array_size(children) && !g->failed; i++) {
+	w->is_ancestor[index] = true;
+	for (size_t i = 0; i < json_array_size(children) && !g->error_code; i++) {
 		const json_t *child = json_array_get(children, i);
 		if (!json_is_integer(child) || json_integer_value(child) < 0)
 			gltf_fail(g, &node, EINVAL, "its children are not indices");
 		else
-			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1, hidden);
-		gltf_go_on(g);
+			visit_node(w, (uint64_t)json_integer_value(child), &to_world, depth + 1, is_hidden_node);
+		gltf_record_failure(g);
 	}
-	w->above[index] = false;
+	w->is_ancestor[index] = false;
 }
 
 /* Visits the root nodes of a file without scenes, which is a library of meshes: most viewers show all of it. */
-static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
+static void visit_root_nodes(struct gltf *g, struct node_walk *w, const mat4 *world)
 {
 	gltf_note(g, "it has no scenes: all of its nodes are shown");
-	for (size_t i = 0; i < w->nodes && !g->failed; i++) {
+	for (size_t i = 0; i < w->node_count && !g->error_code; i++) {
 		if (gltf_node_is_root(g, i))
-			visit(w, i, world, 0, false);
-		gltf_go_on(g);
+			visit_node(w, i, world, 0, false);
+		gltf_record_failure(g);
 	}
 }
 
@@ -289,53 +290,54 @@ static void note_scaled_away(struct gltf *g)
 	snprintf(
 		text, sizeof text,
 		"the mesh%s of %zu node%s, which a scale of 0 makes a line or a point, %s left out (first: nodes[%zu])",
-		g->scaled_away == 1 ? "" : "es", g->scaled_away, g->scaled_away == 1 ? "" : "s",
-		g->scaled_away == 1 ? "is" : "are", g->first_away);
-	if (g->scaled_away)
+		g->scaled_away_count == 1 ? "" : "es", g->scaled_away_count, g->scaled_away_count == 1 ? "" : "s",
+		g->scaled_away_count == 1 ? "is" : "are", g->first_scaled_away);
+	if (g->scaled_away_count)
 		gltf_note(g, text);
 }
 
 static void read_scene(struct gltf *g)
 {
-	struct gltf_at scene;
-	struct walk w = {.g = g, .nodes = json_array_size(json_object_get(g->root, "nodes"))};
+	struct gltf_entry scene;
+	struct node_walk w = {.g = g, .node_count = json_array_size(json_object_get(g->root, "nodes"))};
 	mat4 world = mat4_identity();
-	bool none = !json_object_get(g->root, "scene") && json_array_size(json_object_get(g->root, "scenes")) == 0;
-	if (!none && !gltf_entry(g, GLTF_SCENES, gltf_whole(g, NULL, g->root, "scene", 0), &scene))
+	bool has_no_scenes =
+		!json_object_get(g->root, "scene") && json_array_size(json_object_get(g->root, "scenes")) == 0;
+	if (!has_no_scenes && !gltf_find_entry(g, GLTF_SCENES, gltf_integer(g, NULL, g->root, "scene", 0), &scene))
 		return;
-	w.above = arena_alloc(g->arena, w.nodes ? w.nodes : 1, sizeof *w.above);
-	if (!w.above) {
+	w.is_ancestor = arena_alloc(g->arena, w.node_count ? w.node_count : 1, sizeof *w.is_ancestor);
+	if (!w.is_ancestor) {
 		gltf_fail(g, NULL, ENOMEM, "out of memory");
 		return;
 	}
-	memset(w.above, 0, w.nodes * sizeof *w.above);
-	if (none) {
-		visit_all(g, &w, &world);
+	memset(w.is_ancestor, 0, w.node_count * sizeof *w.is_ancestor);
+	if (has_no_scenes) {
+		visit_root_nodes(g, &w, &world);
 		note_scaled_away(g);
 		return;
 	}
 	const json_t *roots = json_object_get(scene.json, "nodes");
-	for (size_t i = 0; i < json_array_size(roots) && !g->failed; i++) {
+	for (size_t i = 0; i < json_array_size(roots) && !g->error_code; i++) {
 		const json_t *root = json_array_get(roots, i);
 		if (!json_is_integer(root) || json_integer_value(root) < 0)
 			gltf_fail(g, &scene, EINVAL, "its nodes are not indices");
 		else
-			visit(&w, (uint64_t)json_integer_value(root), &world, 0, false);
-		gltf_go_on(g);
+			visit_node(&w, (uint64_t)json_integer_value(root), &world, 0, false);
+		gltf_record_failure(g);
 	}
 	note_scaled_away(g);
 }
 
 /* Returns whether the number of values is within its limit, by an upper bound: each value begins with, or comes
  * after, one of the counted characters. */
-static bool is_moderate(const char *text, size_t size)
+static bool has_moderate_value_count(const char *text, size_t size)
 {
 	size_t values = 0;
-	bool quoted = false;
+	bool in_string = false;
 	for (size_t i = 0; i < size; i++) {
 		if (text[i] == '"')
-			quoted = !quoted;
-		else if (quoted)
+			in_string = !in_string;
+		else if (in_string)
 			i += text[i] == '\\';
 		else
 			values += text[i] == ',' || text[i] == '[' || text[i] == '{';
@@ -347,7 +349,7 @@ static int read_json(struct gltf *g)
 {
 	const char *text;
 	size_t size;
-	json_error_t where;
+	json_error_t location;
 	int rc = find_json(g, &text, &size);
 	if (rc)
 		return rc;
@@ -358,68 +360,68 @@ static int read_json(struct gltf *g)
 	}
 	if (size > GLTF_JSON_MAX)
 		return gltf_fail(g, NULL, EFBIG, "more than %d MB of JSON", GLTF_JSON_MAX >> 20);
-	if (!is_moderate(text, size))
+	if (!has_moderate_value_count(text, size))
 		return gltf_fail(g, NULL, E2BIG, "more than %d values in its JSON", GLTF_VALUES_MAX);
-	g->root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &where);
+	g->root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &location);
 	if (!g->root) {
-		rc = json_error_code(&where) == json_error_out_of_memory ? ENOMEM : EINVAL;
-		g->failed = error_set(g->error, rc, "%s:%d: %.160s", g->file, where.line, where.text);
-		return g->failed;
+		rc = json_error_code(&location) == json_error_out_of_memory ? ENOMEM : EINVAL;
+		g->error_code = error_set(g->error, rc, "%s:%d: %.160s", g->file, location.line, location.text);
+		return g->error_code;
 	}
 	if (!json_is_object(g->root))
 		return gltf_fail(g, NULL, EINVAL, "it is not a JSON object");
-	find_lines(g, text, size);
+	find_entry_lines(g, text, size);
 	const json_t *lights = gltf_extension(g, NULL, g->root, "KHR_lights_punctual");
 	g->lights = json_object_get(lights, "lights");
-	return g->failed;
+	return g->error_code;
 }
 
-static void *allocate(struct gltf *g, enum gltf_array array, size_t size)
+static void *alloc_per_entry(struct gltf *g, enum gltf_array array, size_t size)
 {
 	return arena_alloc(g->arena, json_array_size(json_object_get(g->root, gltf_array_name(array))) + 1, size);
 }
 
 /* Counts the nodes that use each mesh, which decides between copies and instances. Nodes outside the scene count,
  * too: that saves a search and affects only the speed. */
-static void count_uses(struct gltf *g)
+static void count_mesh_uses(struct gltf *g)
 {
 	const json_t *nodes = json_object_get(g->root, "nodes");
 	size_t meshes = json_array_size(json_object_get(g->root, "meshes"));
 	for (size_t i = 0; i < json_array_size(nodes); i++) {
 		const json_t *mesh = json_object_get(json_array_get(nodes, i), "mesh");
 		if (json_is_integer(mesh) && json_integer_value(mesh) >= 0 && (size_t)json_integer_value(mesh) < meshes)
-			g->mesh_uses[json_integer_value(mesh)]++;
+			g->mesh_use_counts[json_integer_value(mesh)]++;
 	}
 }
 
 static int read_file(struct gltf *g)
 {
 	if (read_json(g))
-		return g->failed;
-	g->buffers = allocate(g, GLTF_BUFFERS, sizeof *g->buffers);
-	g->images = allocate(g, GLTF_IMAGES, sizeof *g->images);
-	g->material_made = allocate(g, GLTF_MATERIALS, sizeof *g->material_made);
-	g->mesh_uses = allocate(g, GLTF_MESHES, sizeof *g->mesh_uses);
-	g->mesh_made = allocate(g, GLTF_MESHES, sizeof *g->mesh_made);
-	if (!g->buffers || !g->images || !g->material_made || !g->mesh_uses || !g->mesh_made)
+		return g->error_code;
+	g->buffers = alloc_per_entry(g, GLTF_BUFFERS, sizeof *g->buffers);
+	g->images = alloc_per_entry(g, GLTF_IMAGES, sizeof *g->images);
+	g->materials_made = alloc_per_entry(g, GLTF_MATERIALS, sizeof *g->materials_made);
+	g->mesh_use_counts = alloc_per_entry(g, GLTF_MESHES, sizeof *g->mesh_use_counts);
+	g->meshes_made = alloc_per_entry(g, GLTF_MESHES, sizeof *g->meshes_made);
+	if (!g->buffers || !g->images || !g->materials_made || !g->mesh_use_counts || !g->meshes_made)
 		return gltf_fail(g, NULL, ENOMEM, "out of memory");
-	count_uses(g);
-	g->scene = gltf_element(g, NULL, NULL, "scene");
-	gltf_attribute(g, g->scene, "version", "3.0.0");
+	count_mesh_uses(g);
+	g->scene = gltf_add_element(g, NULL, NULL, "scene");
+	gltf_add_attribute(g, g->scene, "version", "3.0.0");
 	g->tree->root = g->scene;
-	g->tree->dialect_3 = true;
+	g->tree->is_dialect_3 = true;
 	check_file(g);
-	if (g->failed)
-		return g->failed;
-	gltf_animation_begin(g);
-	gltf_go_on(g);
+	if (g->error_code)
+		return g->error_code;
+	gltf_apply_animation_start(g);
+	gltf_record_failure(g);
 	read_scene(g);
-	gltf_go_on(g);
+	gltf_record_failure(g);
 	if (!g->has_camera)
-		gltf_default_camera(g);
+		gltf_add_default_camera(g);
 	if (!g->has_light)
-		gltf_default_light(g);
-	return g->failed;
+		gltf_add_default_light(g);
+	return g->error_code;
 }
 
 int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char *name, struct arena *arena,
@@ -442,7 +444,7 @@ int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char 
 	g.bytes = file.bytes;
 	g.size = file.size;
 	rc = read_file(&g);
-	gltf_numbers_close(&g);
+	gltf_buffers_close(&g);
 	json_decref(g.root);
 	assets->close(assets->user, &file);
 	return rc;

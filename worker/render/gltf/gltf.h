@@ -10,7 +10,7 @@
 #include "worker/render/xml/xml.h"
 
 /* Returns whether the name ends in .gltf or .glb. */
-bool gltf_is(const char *name);
+bool gltf_is_file_name(const char *name);
 
 int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char *name, struct arena *arena,
 	      struct error *e);

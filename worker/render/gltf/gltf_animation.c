@@ -17,96 +17,97 @@
 
 enum { VALUES_MAX = 1 << 22 }; /* for all channels together */
 
-struct animation {
+struct animation_reader {
 	struct gltf *g;
 	const json_t *samplers;
-	uint64_t values; /* number of values read so far */
+	uint64_t value_count; /* number of values read so far */
 };
 
-/* What a channel changes: `count` numbers of a node. They follow `skip` others in the first `vectors` vectors of the
- * accessor. */
-struct channel {
-	struct gltf_at node, output;
+/* What a channel changes: `value_count` numbers of a node. They follow `skip_count` others in the first `vector_count`
+ * vectors of the accessor. */
+struct animation_channel {
+	struct gltf_entry node, output;
 	const char *path;
-	uint64_t count, skip, vectors;
+	uint64_t value_count, skip_count, vector_count;
 	unsigned components;
 };
 
 /* Returns the number of morph targets of a node's mesh. */
-static uint64_t targets_of(struct gltf *g, const struct gltf_at *node)
+static uint64_t morph_target_count(struct gltf *g, const struct gltf_entry *node)
 {
-	struct gltf_at mesh;
-	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &mesh) <= 0)
+	struct gltf_entry mesh;
+	if (gltf_resolve(g, node, node->json, "mesh", GLTF_MESHES, &mesh) <= 0)
 		return 0;
 	return json_array_size(json_object_get(json_array_get(json_object_get(mesh.json, "primitives"), 0), "targets"));
 }
 
 /* Returns false if the channel is left out, or after a failure. */
-static bool read_channel(struct animation *a, const json_t *json, struct channel *c)
+static bool read_channel(struct animation_reader *a, const json_t *json, struct animation_channel *c)
 {
 	struct gltf *g = a->g;
 	const json_t *target = gltf_object(g, NULL, json, "target"),
-		     *sampler = json_array_get(a->samplers, gltf_whole(g, NULL, json, "sampler", SIZE_MAX));
-	c->path = gltf_text(g, NULL, target, "path", "");
-	bool turn = strcmp(c->path, "rotation") == 0, weights = strcmp(c->path, "weights") == 0,
-	     place = strcmp(c->path, "translation") == 0 || strcmp(c->path, "scale") == 0,
-	     known = target && json_object_get(target, "node") && (turn || weights || place);
-	if (known && !json_is_object(sampler))
+		     *sampler = json_array_get(a->samplers, gltf_integer(g, NULL, json, "sampler", SIZE_MAX));
+	c->path = gltf_string(g, NULL, target, "path", "");
+	bool is_rotation = strcmp(c->path, "rotation") == 0, is_weights = strcmp(c->path, "weights") == 0,
+	     is_translation_or_scale = strcmp(c->path, "translation") == 0 || strcmp(c->path, "scale") == 0,
+	     is_supported = target && json_object_get(target, "node") &&
+			    (is_rotation || is_weights || is_translation_or_scale);
+	if (is_supported && !json_is_object(sampler))
 		gltf_fail(g, NULL, EINVAL, "animations[0]: a channel without a sampler");
-	if (!known || g->failed || gltf_follow(g, NULL, target, "node", GLTF_NODES, &c->node) <= 0 ||
-	    gltf_follow(g, NULL, sampler, "output", GLTF_ACCESSORS, &c->output) <= 0 ||
+	if (!is_supported || g->error_code || gltf_resolve(g, NULL, target, "node", GLTF_NODES, &c->node) <= 0 ||
+	    gltf_resolve(g, NULL, sampler, "output", GLTF_ACCESSORS, &c->output) <= 0 ||
 	    json_object_get(c->output.json, "sparse")) {
 		gltf_note(
 			g,
 			"animations of anything but the placement and weights of nodes, and those in sparse accessors, are ignored");
 		return false;
 	}
-	bool cubic = strcmp(gltf_text(g, NULL, sampler, "interpolation", ""), "CUBICSPLINE") == 0;
-	c->count = weights ? targets_of(g, &c->node) : turn ? 4 : 3;
-	c->components = weights ? 1 : (unsigned)c->count;
-	c->vectors = (weights ? c->count : 1) * (cubic ? 3 : 1);
-	c->skip = cubic ? c->count : 0;
-	a->values += c->skip + c->count;
-	if (a->values > VALUES_MAX)
+	bool is_cubic = strcmp(gltf_string(g, NULL, sampler, "interpolation", ""), "CUBICSPLINE") == 0;
+	c->value_count = is_weights ? morph_target_count(g, &c->node) : is_rotation ? 4 : 3;
+	c->components = is_weights ? 1 : (unsigned)c->value_count;
+	c->vector_count = (is_weights ? c->value_count : 1) * (is_cubic ? 3 : 1);
+	c->skip_count = is_cubic ? c->value_count : 0;
+	a->value_count += c->skip_count + c->value_count;
+	if (a->value_count > VALUES_MAX)
 		gltf_fail(g, NULL, E2BIG, "more than %d values at the beginning of the animation", VALUES_MAX);
-	return c->count > 0 && !g->failed;
+	return c->value_count > 0 && !g->error_code;
 }
 
 /* Reads the values, from a copy of the accessor that is shortened to the vectors needed. NULL after a failure. */
-static json_t *first_values(struct gltf *g, const struct channel *c)
+static json_t *read_first_values(struct gltf *g, const struct animation_channel *c)
 {
 	struct gltf_vectors v;
-	struct gltf_at part = c->output;
+	struct gltf_entry shortened = c->output;
 	json_t *copy = json_copy(json_array_get(json_object_get(g->root, "accessors"), c->output.index)),
 	       *values = json_array();
-	part.json = copy;
-	if (!copy || !values || json_object_set_new(copy, "count", json_integer((json_int_t)c->vectors)))
+	shortened.json = copy;
+	if (!copy || !values || json_object_set_new(copy, "count", json_integer((json_int_t)c->vector_count)))
 		gltf_fail(g, &c->output, ENOMEM, "out of memory");
-	else if (gltf_whole(g, &c->output, c->output.json, "count", 0) < c->vectors)
+	else if (gltf_integer(g, &c->output, c->output.json, "count", 0) < c->vector_count)
 		gltf_fail(g, &c->output, EINVAL, "fewer values than the animation needs");
-	else if (gltf_vectors_read(g, &part, "animation", c->components, &v)) {
-		for (uint64_t i = 0; i < c->count; i++)
-			if (json_array_append_new(values, json_real(v.x[c->skip + i])))
+	else if (gltf_vectors_read(g, &shortened, "animation", c->components, &v)) {
+		for (uint64_t i = 0; i < c->value_count; i++)
+			if (json_array_append_new(values, json_real(v.values[c->skip_count + i])))
 				gltf_fail(g, &c->output, EINVAL, "a value that is not finite");
 		gltf_vectors_fini(&v);
 	}
 	json_decref(copy);
-	if (!g->failed)
+	if (!g->error_code)
 		return values;
 	json_decref(values);
 	return NULL;
 }
 
-void gltf_animation_begin(struct gltf *g)
+void gltf_apply_animation_start(struct gltf *g)
 {
 	const json_t *first = json_array_get(json_object_get(g->root, "animations"), 0),
 		     *channels = json_object_get(first, "channels");
-	struct animation a = {g, json_object_get(first, "samplers"), 0};
+	struct animation_reader a = {g, json_object_get(first, "samplers"), 0};
 	json_t *nodes = json_object_get(g->root, "nodes");
 	char text[160];
-	for (size_t i = 0; i < json_array_size(channels) && !g->failed; i++) {
-		struct channel c;
-		json_t *values = read_channel(&a, json_array_get(channels, i), &c) ? first_values(g, &c) : NULL;
+	for (size_t i = 0; i < json_array_size(channels) && !g->error_code; i++) {
+		struct animation_channel c;
+		json_t *values = read_channel(&a, json_array_get(channels, i), &c) ? read_first_values(g, &c) : NULL;
 		if (values && json_object_set_new(json_array_get(nodes, c.node.index), c.path, values))
 			gltf_fail(g, &c.node, ENOMEM, "out of memory");
 	}

@@ -6,6 +6,6 @@
 #include "worker/render/gltf/gltf_tree.h"
 
 /* Moves nodes to where they are when the first animation begins, with a note. Does nothing if there is no animation. */
-void gltf_animation_begin(struct gltf *g);
+void gltf_apply_animation_start(struct gltf *g);
 
 #endif

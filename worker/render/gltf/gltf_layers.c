@@ -17,7 +17,8 @@
 #include <string.h>
 
 /* Notes that members are left out, if there are any. note: which layer they belong to, and why that matters little. */
-static void note_members(struct gltf *g, const json_t *extension, const char *const *members, const char *note)
+static void note_unsupported_members(struct gltf *g, const json_t *extension, const char *const *members,
+				     const char *note)
 {
 	for (; *members; members++)
 		if (json_object_get(extension, *members)) {
@@ -27,12 +28,12 @@ static void note_members(struct gltf *g, const json_t *extension, const char *co
 }
 
 /* Only this many entries are checked for each material; an extension listed later may be reported twice. */
-enum { LISTED_MOST = 64 };
+enum { LISTED_MAX = 64 };
 
 static bool is_listed(const struct gltf *g, const char *list, const char *extension)
 {
 	const json_t *used = json_object_get(g->root, list);
-	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MOST; i++) {
+	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MAX; i++) {
 		const char *name = json_string_value(json_array_get(used, i));
 		if (name && strcmp(name, extension) == 0)
 			return true;
@@ -44,136 +45,137 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
  * is the reflectance of the index at normal incidence, f a strength and c a colour. Here f is `specular_strength` and c
  * `specular_color`. If c's factor has a component above 1, the largest is included in the index, and the colour is
  * relative to it; for materials that transmit light the index stays as it is, and the components are at most 1. */
-static void put_reflection(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_reflection(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
-	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
-		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular"),
-		     *transmission = gltf_extension(g, at, at->json, "KHR_materials_transmission");
-	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5, strength = 1, rgb[3] = {1, 1, 1};
+	const json_t *ior = gltf_extension(g, material, material->json, "KHR_materials_ior"),
+		     *specular = gltf_extension(g, material, material->json, "KHR_materials_specular"),
+		     *transmission = gltf_extension(g, material, material->json, "KHR_materials_transmission");
+	double eta = ior ? gltf_number(g, material, ior, "ior", 1.5) : 1.5, strength = 1, rgb[3] = {1, 1, 1};
 	if (specular) {
-		strength = fmin(fmax(gltf_number(g, at, specular, "specularFactor", 1), 0), 1);
-		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
+		strength = fmin(fmax(gltf_number(g, material, specular, "specularFactor", 1), 0), 1);
+		gltf_numbers(g, material, specular, "specularColorFactor", rgb, 3);
 	}
-	const json_t *texture = specular ? gltf_object(g, at, specular, "specularTexture") : NULL,
-		     *colour = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
-	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), whole = fmax(most, 1);
-	bool enters = transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0;
-	if (enters && whole > 1) {
+	const json_t *texture = specular ? gltf_object(g, material, specular, "specularTexture") : NULL,
+		     *colour = specular ? gltf_object(g, material, specular, "specularColorTexture") : NULL;
+	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2])), divisor = fmax(largest, 1);
+	bool transmits = transmission && gltf_number(g, material, transmission, "transmissionFactor", 0) > 0;
+	if (transmits && divisor > 1) {
 		gltf_note(g, "specular colours above 1 of materials that transmit light count as 1");
-		whole = 1;
+		divisor = 1;
 	}
 	for (int k = 0; k < 3; k++)
-		rgb[k] = fmin(fmax(rgb[k], 0) / whole, 1);
-	bool coloured = colour || rgb[0] != 1 || rgb[1] != 1 || rgb[2] != 1;
+		rgb[k] = fmin(fmax(rgb[k], 0) / divisor, 1);
+	bool is_coloured = colour || rgb[0] != 1 || rgb[1] != 1 || rgb[2] != 1;
 	/* In the format an index of 0 means total reflection. */
-	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1, scaled = fmin(root * sqrt(whole), 1);
-	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
+	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1, scaled = fmin(root * sqrt(divisor), 1);
+	gltf_put_number(g, el, material, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
 	if (strength < 1 || texture)
-		gltf_put_share(g, el, at, "specular_strength", strength, strength > 0 ? texture : NULL, "a");
-	if (coloured)
-		gltf_put_colour(g, el, at, "specular_color", rgb, most > 0 ? colour : NULL);
+		gltf_put_factor(g, el, material, "specular_strength", strength, strength > 0 ? texture : NULL, "a");
+	if (is_coloured)
+		gltf_put_colour(g, el, material, "specular_color", rgb, largest > 0 ? colour : NULL);
 }
 
-static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
-	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
-	double factor = coat ? gltf_number(g, at, coat, "clearcoatFactor", 0) : 0;
+	const json_t *coat = gltf_extension(g, material, material->json, "KHR_materials_clearcoat");
+	double factor = coat ? gltf_number(g, material, coat, "clearcoatFactor", 0) : 0;
 	if (!(factor > 0))
 		return;
-	double roughness = gltf_number(g, at, coat, "clearcoatRoughnessFactor", 0);
-	gltf_put_share(g, el, at, "coat", factor, gltf_object(g, at, coat, "clearcoatTexture"), "r");
-	gltf_put_share(g, el, at, "coat_roughness", roughness,
-		       roughness > 0 ? gltf_object(g, at, coat, "clearcoatRoughnessTexture") : NULL, "g");
-	note_members(g, coat, (const char *const[]){"clearcoatNormalTexture", NULL},
-		     "clear coats use the normals of the surface: their own normal maps are left out");
+	double roughness = gltf_number(g, material, coat, "clearcoatRoughnessFactor", 0);
+	gltf_put_factor(g, el, material, "coat", factor, gltf_object(g, material, coat, "clearcoatTexture"), "r");
+	gltf_put_factor(g, el, material, "coat_roughness", roughness,
+			roughness > 0 ? gltf_object(g, material, coat, "clearcoatRoughnessTexture") : NULL, "g");
+	note_unsupported_members(g, coat, (const char *const[]){"clearcoatNormalTexture", NULL},
+				 "clear coats use the normals of the surface: their own normal maps are left out");
 }
 
 /* The format's sheen is that of cloth (Estevez and Kulla 2017); Burley's is a brightening at grazing angles. */
-static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
-	const json_t *sheen = gltf_extension(g, at, at->json, "KHR_materials_sheen");
+	const json_t *sheen = gltf_extension(g, material, material->json, "KHR_materials_sheen");
 	double rgb[3] = {0, 0, 0};
 	if (sheen)
-		gltf_numbers(g, at, sheen, "sheenColorFactor", rgb, 3);
-	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), least = fmin(rgb[0], fmin(rgb[1], rgb[2]));
-	if (!(most > 0))
+		gltf_numbers(g, material, sheen, "sheenColorFactor", rgb, 3);
+	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2])), smallest = fmin(rgb[0], fmin(rgb[1], rgb[2]));
+	if (!(largest > 0))
 		return;
 	gltf_note(g,
 		  "sheen is that of `principled`, which differs from the format's: no roughness, no textures, and its "
 		  "colour is white or the surface's");
-	gltf_put_number(g, el, at, "sheen", fmin(most, 1));
-	gltf_put_number(g, el, at, "sheen_tint", fmin(1 - least / most, 1));
+	gltf_put_number(g, el, material, "sheen", fmin(largest, 1));
+	gltf_put_number(g, el, material, "sheen_tint", fmin(1 - smallest / largest, 1));
 }
 
 /* The format widens the roughness along the tangent to a_t = a + (1 - a) s^2, and keeps a across it; `principled`
  * divides and multiplies a by sqrt(1 - 0.9 x). With their ratio r = a_t / a: x = (1 - 1 / r) / 0.9, and a becomes
  * sqrt(a_t a). */
-static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double *roughness,
-			   bool textured)
+static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct gltf_entry *material, double *roughness,
+			   bool has_texture)
 {
-	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_anisotropy");
-	double s = o ? gltf_number(g, at, o, "anisotropyStrength", 0) : 0,
-	       turn = o ? gltf_number(g, at, o, "anisotropyRotation", 0) : 0, a = *roughness * *roughness;
+	const json_t *o = gltf_extension(g, material, material->json, "KHR_materials_anisotropy");
+	double s = o ? gltf_number(g, material, o, "anisotropyStrength", 0) : 0,
+	       rotation = o ? gltf_number(g, material, o, "anisotropyRotation", 0) : 0, a = *roughness * *roughness;
 	if (s == 0)
 		return;
-	double wide = a + (1 - a) * s * s, ratio = a > 0 ? wide / a : INFINITY;
-	if (textured || turn != 0 || json_object_get(o, "anisotropyTexture") || !(ratio < 10)) {
+	double tangent_alpha = a + (1 - a) * s * s, ratio = a > 0 ? tangent_alpha / a : INFINITY;
+	if (has_texture || rotation != 0 || json_object_get(o, "anisotropyTexture") || !(ratio < 10)) {
 		gltf_note(g, "anisotropy is left out if it has a texture or a rotation, or if the surface is smooth");
 		return;
 	}
-	gltf_put_number(g, el, at, "anisotropic", (1 - 1 / ratio) / 0.9);
-	*roughness = sqrt(sqrt(wide * a));
+	gltf_put_number(g, el, material, "anisotropic", (1 - 1 / ratio) / 0.9);
+	*roughness = sqrt(sqrt(tangent_alpha * a));
 }
 
 /* Unlit surfaces show their colour whatever the light, which no BSDF can do. They are lit with a note, and refused
  * if the file requires the extension. */
-static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
 	const char *name = "KHR_materials_unlit";
-	if (!gltf_extension(g, at, at->json, name))
+	if (!gltf_extension(g, material, material->json, name))
 		return;
 	if (is_listed(g, "extensionsRequired", name))
-		gltf_put_text(g, el, at, name, ELEMENT_UNSUPPORTED);
+		gltf_put_string(g, el, material, name, ELEMENT_UNSUPPORTED);
 	else
 		gltf_note(g, "surfaces of KHR_materials_unlit are lit like others");
 }
 
-static void note_iridescence(struct gltf *g, const struct gltf_at *at)
+static void note_iridescence(struct gltf *g, const struct gltf_entry *material)
 {
-	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_iridescence");
-	if (o && gltf_number(g, at, o, "iridescenceFactor", 0) > 0)
+	const json_t *o = gltf_extension(g, material, material->json, "KHR_materials_iridescence");
+	if (o && gltf_number(g, material, o, "iridescenceFactor", 0) > 0)
 		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
 }
 
 /* Leaves out the dispersion of materials other than clear glass: `principled` has a single index of refraction. */
-static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
 	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))
-		gltf_put_text(g, el, at, "dispersion", ELEMENT_UNSUPPORTED);
+		gltf_put_string(g, el, material, "dispersion", ELEMENT_UNSUPPORTED);
 	else
 		gltf_note(g, "only clear glass without textures disperses light: KHR_materials_dispersion of other "
 			     "materials is left out");
 }
 
-static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
-	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission"),
-		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion");
-	double factor = t ? gltf_number(g, at, t, "transmissionFactor", 0) : 0;
+	const json_t *t = gltf_extension(g, material, material->json, "KHR_materials_transmission"),
+		     *dispersion = gltf_extension(g, material, material->json, "KHR_materials_dispersion");
+	double factor = t ? gltf_number(g, material, t, "transmissionFactor", 0) : 0;
 	if (factor > 0) {
-		gltf_put_share(g, el, at, "spec_trans", factor, gltf_object(g, at, t, "transmissionTexture"), "r");
-		if (dispersion && gltf_number(g, at, dispersion, "dispersion", 0) > 0)
-			put_dispersion(g, el, at);
+		gltf_put_factor(g, el, material, "spec_trans", factor,
+				gltf_object(g, material, t, "transmissionTexture"), "r");
+		if (dispersion && gltf_number(g, material, dispersion, "dispersion", 0) > 0)
+			put_dispersion(g, el, material);
 	}
 }
 
-void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
+void gltf_note_unlisted_extensions(struct gltf *g, const struct gltf_entry *material)
 {
-	json_t *all = json_object_get(at->json, "extensions");
+	json_t *all = json_object_get(material->json, "extensions");
 	for (void *i = json_object_iter(all); i; i = json_object_iter_next(all, i)) {
 		const char *name = json_object_iter_key(i);
 		char text[160];
-		if (gltf_knows(name) || is_listed(g, "extensionsUsed", name))
+		if (gltf_is_known_extension(name) || is_listed(g, "extensionsUsed", name))
 			continue;
 		snprintf(
 			text, sizeof text,
@@ -183,16 +185,16 @@ void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
 	}
 }
 
-void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double roughness,
+void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_entry *material, double roughness,
 		     const json_t *texture)
 {
-	put_anisotropy(g, el, at, &roughness, roughness > 0 && texture);
-	gltf_put_share(g, el, at, "roughness", roughness, roughness > 0 ? texture : NULL, "g");
-	put_sheen(g, el, at);
-	note_iridescence(g, at);
-	put_unlit(g, el, at);
-	put_reflection(g, el, at);
-	put_coat(g, el, at);
-	put_transmission(g, el, at);
-	gltf_note_foreign(g, at);
+	put_anisotropy(g, el, material, &roughness, roughness > 0 && texture);
+	gltf_put_factor(g, el, material, "roughness", roughness, roughness > 0 ? texture : NULL, "g");
+	put_sheen(g, el, material);
+	note_iridescence(g, material);
+	put_unlit(g, el, material);
+	put_reflection(g, el, material);
+	put_coat(g, el, material);
+	put_transmission(g, el, material);
+	gltf_note_unlisted_extensions(g, material);
 }

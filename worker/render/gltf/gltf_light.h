@@ -5,10 +5,10 @@
 
 #include "worker/render/gltf/gltf_tree.h"
 
-void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
-void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
+void gltf_add_light(struct gltf *g, const struct gltf_entry *light, const mat4 *to_world);
+void gltf_add_camera(struct gltf *g, const struct gltf_entry *camera, const mat4 *to_world);
 /* Supply what the file lacks: a camera that sees everything, an environment. */
-void gltf_default_camera(struct gltf *g);
-void gltf_default_light(struct gltf *g);
+void gltf_add_default_camera(struct gltf *g);
+void gltf_add_default_light(struct gltf *g);
 
 #endif

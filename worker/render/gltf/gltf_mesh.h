@@ -6,9 +6,9 @@
 #include "worker/render/gltf/gltf_tree.h"
 
 /* Adds the shapes of a node's mesh, under that matrix. */
-void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node, const mat4 *to_world);
-/* Like gltf_mesh(), once for each instance in the extension EXT_mesh_gpu_instancing. */
-void gltf_mesh_instances(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node,
-			 const json_t *extension, const mat4 *to_world);
+void gltf_add_mesh(struct gltf *g, const struct gltf_entry *mesh, const struct gltf_entry *node, const mat4 *to_world);
+/* Like gltf_add_mesh(), once for each instance in the extension EXT_mesh_gpu_instancing. */
+void gltf_add_mesh_instances(struct gltf *g, const struct gltf_entry *mesh, const struct gltf_entry *node,
+			     const json_t *extension, const mat4 *to_world);
 
 #endif

@@ -10,6 +10,6 @@ enum { GLTF_MESHOPT_V1 = 0xa1 }; /* the first byte of a stream */
 
 /* Decodes `count` elements of `stride` bytes, a multiple of 4 up to 256. Returns false if the bytes are not such a
  * stream. Pure. */
-bool gltf_meshopt_v1(const unsigned char *bytes, size_t size, size_t count, size_t stride, unsigned char *out);
+bool gltf_meshopt_v1_decode(const unsigned char *bytes, size_t size, size_t count, size_t stride, unsigned char *out);
 
 #endif

@@ -9,19 +9,19 @@
 #include "worker/render/gltf/gltf_tree.h"
 
 struct gltf_vectors {
-	double *x; /* allocated with mem_alloc(), or NULL */
+	double *values; /* allocated with mem_alloc(), or NULL */
 	uint64_t count;
-	unsigned components;
+	unsigned component_count;
 };
 
-/* Reads an accessor. `normalized` integers, which represent -1 to 1 or 0 to 1, are converted. components: the number
- * required, 1 to 4, or 16 for matrices; 0: any. use: what the numbers are for, in messages. Returns false after a
- * failure. */
-bool gltf_vectors_read(struct gltf *g, const struct gltf_at *accessor, const char *use, unsigned components,
+/* Reads an accessor. `normalized` integers, which represent -1 to 1 or 0 to 1, are converted. component_count: the
+ * number required, 1 to 4, or 16 for matrices; 0: any. purpose: what the numbers are for, in messages. Returns false
+ * after a failure. */
+bool gltf_vectors_read(struct gltf *g, const struct gltf_entry *accessor, const char *purpose, unsigned components,
 		       struct gltf_vectors *out);
 /* Returns what a normalized integer x of that type represents; floats and 32-bit integers are returned unchanged. */
-double gltf_normalized(double x, uint64_t component);
+double gltf_normalized_value(double x, uint64_t component);
 void gltf_vectors_fini(struct gltf_vectors *v);
-void gltf_numbers_close(struct gltf *g);
+void gltf_buffers_close(struct gltf *g);
 
 #endif

@@ -21,15 +21,16 @@ enum gltf_source {
 
 /* A primitive and its accessors; .json of an accessor is NULL if the primitive does not have it. */
 struct gltf_primitive {
-	const struct gltf_at *mesh, *node;
+	const struct gltf_entry *mesh, *node;
 	const json_t *json;
-	struct gltf_at sources[GLTF_SOURCES];
+	struct gltf_entry sources[GLTF_SOURCES];
 };
 
 /* Returns whether the primitive's vertices have to be computed. */
-bool gltf_is_posed(struct gltf *g, const struct gltf_primitive *p);
+bool gltf_has_computed_vertices(struct gltf *g, const struct gltf_primitive *p);
 /* Puts the vertices into the shape, in its own space; those of a skin in world space, in which case *to_world
  * becomes the identity. Extends the scene's bounding box by them. */
-void gltf_put_pose(struct gltf *g, struct xml_element *shape, const struct gltf_primitive *p, mat4 *to_world);
+void gltf_put_computed_vertices(struct gltf *g, struct xml_element *shape, const struct gltf_primitive *p,
+				mat4 *to_world);
 
 #endif

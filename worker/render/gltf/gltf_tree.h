@@ -15,7 +15,7 @@ enum {
 	GLTF_PRIMITIVES_MAX = 1 << 18, /* for all meshes, counted once per node that has them */
 };
 
-#define GLTF_WHOLE_MAX 9007199254740992.0 /* a double represents all integers up to here */
+#define GLTF_INTEGER_MAX 9007199254740992.0 /* a double represents all integers up to here */
 
 /* Top-level arrays whose entries are named in messages. */
 enum gltf_array {
@@ -46,25 +46,25 @@ enum gltf_component {
 };
 
 /* An entry of a top-level array. */
-struct gltf_at {
+struct gltf_entry {
 	enum gltf_array array;
 	size_t index;
 	const json_t *json; /* an object */
 };
 
 /* The bytes of a compressed view. */
-struct gltf_unpacked {
+struct gltf_unpacked_view {
 	unsigned char *bytes; /* allocated with mem_alloc(); NULL: not needed so far */
-	uint64_t count;
+	uint64_t byte_count;
 };
 
 /* Where the bytes of a buffer, a view or an image are. */
 struct gltf_range {
 	const char *file;
-	uint64_t first, count;
-	bool base64;   /* first and count are of the text, offsets of views of the decoded bytes */
-	uint64_t size; /* number of decoded bytes */
-	unsigned skip; /* number of decoded bytes to skip at the beginning */
+	uint64_t first_byte, byte_count;
+	bool is_base64;	     /* first and count are of the text, offsets of views of the decoded bytes */
+	uint64_t size;	     /* number of decoded bytes */
+	unsigned skip_bytes; /* number of decoded bytes to skip at the beginning */
 };
 
 struct gltf {
@@ -72,79 +72,85 @@ struct gltf {
 	const struct asset_source *assets;
 	struct arena *arena;
 	struct error *error;
-	int failed; /* negative errno of an error: nothing more is added to the tree until gltf_go_on() */
+	int error_code; /* negative errno of an error: nothing more is added to the tree until gltf_record_failure() */
 	const char *file;
 	const unsigned char *bytes; /* contents of the file */
 	size_t size;
-	uint64_t binary_first, binary_count; /* the binary chunk of a .glb */
+	uint64_t binary_offset, binary_size; /* the binary chunk of a .glb */
 	json_t *root;
 	const json_t *lights;	 /* NULL: none */
 	int *lines[GLTF_ARRAYS]; /* line on which each entry begins */
-	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
+	size_t line_count[GLTF_ARRAYS], line_capacity[GLTF_ARRAYS];
 	struct gltf_range *buffers, *images; /* embedded data located so far, by entry */
-	unsigned embedded, primitives;
-	unsigned char *material_made;	   /* by material: made for these bits 1 << enum gltf_colours */
-	struct gltf_open *plain, *decoded; /* open buffers: the last one in a file; a list of those in base64 */
-	struct gltf_unpacked *unpacked;	   /* by view; NULL: no compressed view was needed so far */
-	uint64_t unpacked_bytes;	   /* total size of these */
-	size_t *parents;		   /* by node (gltf_node.h); NULL: not needed so far */
-	uint64_t embedded_bytes;	   /* total size of computed vertices */
-	uint64_t read;			   /* bytes read so far from files with buffers */
-	double *mesh_uses;		   /* by mesh: number of nodes that use it */
-	bool *mesh_made;		   /* by mesh: a shapegroup was made of it */
+	unsigned embedded_count, primitive_count;
+	unsigned char *materials_made; /* by material: made for these bits 1 << enum gltf_vertex_colours */
+	struct gltf_open_buffer *open_file,
+		*decoded_buffers;		   /* open buffers: the last one in a file; a list of those in base64 */
+	struct gltf_unpacked_view *unpacked_views; /* by view; NULL: no compressed view was needed so far */
+	uint64_t unpacked_bytes;		   /* total size of these */
+	size_t *parents;			   /* by node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;		   /* total size of computed vertices */
+	uint64_t bytes_read;			   /* bytes read so far from files with buffers */
+	double *mesh_use_counts;		   /* by mesh: number of nodes that use it */
+	bool *meshes_made;			   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
-	size_t scaled_away, first_away; /* nodes whose meshes a scale of 0 makes lines or points; index of the first */
+	size_t scaled_away_count,
+		first_scaled_away; /* nodes whose meshes a scale of 0 makes lines or points; index of the first */
 	bool has_camera, has_light;
-	bool is_blenders;  /* Blender's exporter wrote the file */
-	bool is_burleys;   /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */
-	double lamp_scale; /* factor for the intensities of KHR_lights_punctual */
-	vec3 low, high;	   /* bounding box of all vertices */
+	bool is_from_blender;	  /* Blender's exporter wrote the file */
+	bool uses_burley_diffuse; /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */
+	double lamp_scale;	  /* factor for the intensities of KHR_lights_punctual */
+	vec3 low, high;		  /* bounding box of all vertices */
 };
 
 const char *gltf_array_name(enum gltf_array array);
 /* Finds the entry with that index. Returns false, after a failure, if there is none. */
-bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out);
+bool gltf_find_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_entry *out);
 /* Finds the entry whose index is the value of `key`. Returns 1 if found, 0 if there is no such key, negative after a
  * failure. */
-int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
-		enum gltf_array array, struct gltf_at *out);
-/* Sets g->failed, and the error with "file:line: array[index]: " before the text. Returns g->failed. */
-__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
+int gltf_resolve(struct gltf *g, const struct gltf_entry *referrer, const json_t *object, const char *key,
+		 enum gltf_array array, struct gltf_entry *out);
+/* Sets g->error_code, and the error with "file:line: array[index]: " before the text. Returns g->error_code. */
+__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_entry *at, int errno_value,
 						    const char *format, ...);
 
 /* Called after a node or a primitive, which is complete by itself: moves a failure to the list of what is missing,
  * so that reading goes on. A limit that was exceeded still ends the reading. */
-void gltf_go_on(struct gltf *g);
+void gltf_record_failure(struct gltf *g);
 
 /* Each returns a member of an object, or a default if it is missing; a member of another type is an error. */
-double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback);
-uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback);
-const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback);
-/* Stores `count` numbers in x, which keeps its values if the member is missing. */
-void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count);
-const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key); /* or NULL */
-const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name);
+double gltf_number(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, double fallback);
+uint64_t gltf_integer(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, uint64_t fallback);
+const char *gltf_string(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key,
+			const char *fallback);
+/* Stores `byte_count` numbers in x, which keeps its values if the member is missing. */
+void gltf_numbers(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, double *x,
+		  size_t count);
+const json_t *gltf_object(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key); /* or NULL */
+const json_t *gltf_extension(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *name);
 
 /* Make elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
-struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
-				 const char *name);
-__attribute__((format(printf, 4, 5))) void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name,
-							  const char *format, ...);
+struct xml_element *gltf_add_element(struct gltf *g, struct xml_element *parent, const struct gltf_entry *at,
+				     const char *name);
+__attribute__((format(printf, 4, 5))) void gltf_add_attribute(struct gltf *g, struct xml_element *el, const char *name,
+							      const char *format, ...);
 /* <cls type="..." name="...">; without a name if that is NULL */
-struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,
-				const char *type, const char *name);
-void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x);
-void gltf_put_whole(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, uint64_t x);
-void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, bool x);
-void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
-		   const char *text);
-void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+struct xml_element *gltf_add_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_entry *at,
+				    const char *cls, const char *type, const char *name);
+void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name, double x);
+void gltf_put_integer(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+		      uint64_t x);
+void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name, bool x);
+void gltf_put_string(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+		     const char *text);
+void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
 		  const double rgb[3]);
-void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
-void gltf_grow_box(struct gltf *g, vec3 p); /* extends the box by a vertex */
+void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+		     const mat4 *m);
+void gltf_extend_bounds(struct gltf *g, vec3 p); /* extends the box by a vertex */
 /* Adds a note, only once per file. */
 void gltf_note(struct gltf *g, const char *text);
 /* Returns whether the reader knows the extension, supported or not. */
-bool gltf_knows(const char *extension);
+bool gltf_is_known_extension(const char *extension);
 
 #endif

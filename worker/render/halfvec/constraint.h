@@ -28,7 +28,8 @@ struct constraint {
 
 /* Computes the constraints of the inner vertices c+1..b-1 of x; k[j] is that of vertex j. Edges c..b-1 must be joined
  * and the modes of the inner vertices set. */
-void constraints_of(const struct world *w, const struct full_path *x, unsigned b, unsigned c, struct constraint *k);
+void constraints_compute(const struct world *w, const struct full_path *x, unsigned b, unsigned c,
+			 struct constraint *k);
 /* Computes only h_j. */
 vec2 halfvec_of(const struct full_path *x, unsigned j);
 
@@ -40,31 +41,31 @@ vec2 halfvec_of(const struct full_path *x, unsigned j);
  * It is eliminated from the camera's end (L_{b-1} = b_{b-1}, L_j = b_j - c_j L_{j+1}^-1 a_{j+1}). Where a block L_j is
  * singular or nearly so although the matrix is not, a banded elimination with pivoting is used instead.
  */
-enum constraint_end { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
+enum constraint_result { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
 
 struct constraint_factors {
-	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* inverse of L_j, by vertex */
-	double det[FULL_PATH_MAX_VERTICES];   /* determinant of L_j */
+	mat2 inverse[FULL_PATH_VERTICES_MAX]; /* inverse of L_j, by vertex */
+	double det[FULL_PATH_VERTICES_MAX];   /* determinant of L_j */
 	/* The factors of the banded elimination, if pivoted: constraint_system.inc describes their layout. */
-	double band[2 * FULL_PATH_MAX_VERTICES][10];
+	double band[2 * FULL_PATH_VERTICES_MAX][10];
 };
 
 struct constraint_single {
 	mat2_single a, b, c;
 };
 struct constraint_factors_single {
-	mat2_single inverse[FULL_PATH_MAX_VERTICES];
-	float det[FULL_PATH_MAX_VERTICES];
-	float band[2 * FULL_PATH_MAX_VERTICES][10];
+	mat2_single inverse[FULL_PATH_VERTICES_MAX];
+	float det[FULL_PATH_VERTICES_MAX];
+	float band[2 * FULL_PATH_VERTICES_MAX][10];
 	/* The constraints of the factored system, in float. */
-	struct constraint_single k[FULL_PATH_MAX_VERTICES];
+	struct constraint_single k[FULL_PATH_VERTICES_MAX];
 };
 
 struct constraint_system {
 	unsigned b, c;
-	bool pivoted;
-	unsigned char order[2 * FULL_PATH_MAX_VERTICES]; /* pivots of the banded factors */
-	double log_det;					 /* log |det M| */
+	bool is_pivoted;
+	unsigned char pivot_offset[2 * FULL_PATH_VERTICES_MAX]; /* pivots of the banded factors */
+	double log_det;						/* log |det M| */
 	double log_transfer; /* log |det d x_{b-1} / d x_c| with all h held fixed: prod |det a_j| / |det M| */
 	union {
 		struct constraint_factors wide;
@@ -75,17 +76,17 @@ struct constraint_system {
 /* There are two solvers, one in double and one whose matrices and vectors are float. Derivatives, half vectors and
  * solutions are double for both. */
 struct constraint_solver {
-	enum constraint_end (*factor)(const struct constraint *k, unsigned b, unsigned c,
-				      struct constraint_system *out);
+	enum constraint_result (*factor)(const struct constraint *k, unsigned b, unsigned c,
+					 struct constraint_system *out);
 	/* Like factor, but without the two logarithms. */
-	enum constraint_end (*factor_to_solve)(const struct constraint *k, unsigned b, unsigned c,
-					       struct constraint_system *out);
+	enum constraint_result (*factor_to_solve)(const struct constraint *k, unsigned b, unsigned c,
+						  struct constraint_system *out);
 	/* Computes dx for a given dh, both indexed by vertex c+1..b-1. The result may be infinite but is never NaN; in
 	 * float it is also infinite where the solution is out of range. */
 	void (*solve)(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
 	/* Computes the ray differentials (sec. 3.1) D_j = d x_{b-1} / d h_j, for j = c+1..b-1.
 	 * CONSTRAINT_SINGULAR: they are not available. */
-	enum constraint_end (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
+	enum constraint_result (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
 };
 
 #endif

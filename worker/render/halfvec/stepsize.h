@@ -17,25 +17,25 @@
 #include "worker/render/halfvec/constraint.h"
 
 struct halfvec_step {
-	mat2 u;		 /* a rotation */
+	mat2 rotation;	 /* a rotation */
 	double sigma[2]; /* finite and above 0 */
 };
 
 /* Returns the standard deviation of a step on the film, in pixels: 2 % of the film's smaller side. */
-double halfvec_film_step(const struct camera *camera);
+double halfvec_film_sigma(const struct camera *camera);
 /* Returns the width of the narrowest lobe of a vertex that is not specular, in slopes; at most 1. */
 double halfvec_lobe_width(const struct path_vertex *v);
 
 /* Computes the steps of those vertices among c_end+1..b-1 that are not specular (step[] of the others is not written)
- * from their constraints. All vertices together move the image by at most halfvec_film_step. */
-void halfvec_steps(const struct path_context *c, const struct full_path *x, const struct constraint *k, unsigned b,
-		   unsigned c_end, struct halfvec_step *step);
+ * from their constraints. All vertices together move the image by at most halfvec_film_sigma. */
+void halfvec_compute_steps(const struct path_context *c, const struct full_path *x, const struct constraint *k,
+			   unsigned b, unsigned c_end, struct halfvec_step *step);
 
 /* Returns the step for E = e (any finite entries), with `scale` pixels and sigma at most `limit` (> 0). */
-struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit);
+struct halfvec_step halfvec_step_from_matrix(mat2 e, double scale, double limit);
 
 /* Returns h' - h for two standard normals. */
-vec2 halfvec_step_take(const struct halfvec_step *s, double g0, double g1);
+vec2 halfvec_step_sample(const struct halfvec_step *s, double g0, double g1);
 /* Returns the logarithm of the density of a step dh, per area of h; -INFINITY if it is out of reach. */
 double halfvec_step_log_pdf(const struct halfvec_step *s, vec2 dh);
 

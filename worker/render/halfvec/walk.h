@@ -14,7 +14,7 @@
 #include "worker/render/halfvec/constraint.h"
 
 /* Why a walk failed: the reason for which its last trial was rejected. */
-enum walk_end {
+enum walk_result {
 	WALK_OK,
 	WALK_MISSED,	 /* a ray hit nothing */
 	WALK_BLOCKED,	 /* another material was hit, or an edge is occluded */
@@ -28,18 +28,18 @@ enum walk_end {
 #define WALK_SPECULAR_TOLERANCE 1e-9
 /* Factor on the tolerances of a reverse walk. With those of a forward walk, 2 to 11 % of the reverse walks would miss
  * the original path for no other reason. */
-#define WALK_BACK_SCALE 0.1
+#define WALK_REVERSE_SCALE 0.1
 
 struct walk_limits {
-	unsigned iterations;
-	double least_step; /* smallest factor on a Newton step */
-	double scale;	   /* factor on all tolerances: 1, or 0.5 to show that they do not change the image */
+	unsigned max_iterations;
+	double min_step;	/* smallest factor on a Newton step */
+	double tolerance_scale; /* factor on all tolerances: 1, or 0.5 to show that they do not change the image */
 	/* At the end of a walk, tolerance of the distance of a half vector from its target, relative to the
 	 * smaller of lobe width and step. */
 	double tolerance;
 	/* Largest distance between the end of a reverse walk and the original path, relative to the
 	 * largest step of any vertex. */
-	double back;
+	double reverse_tolerance;
 	const struct constraint_solver *solver;
 };
 struct walk_limits walk_limits_of(const struct accuracy_settings *k);
@@ -52,30 +52,30 @@ struct walk_target {
 
 /* Caller's storage for one walk. */
 struct walk_scratch {
-	struct constraint k[FULL_PATH_MAX_VERTICES];
+	struct constraint k[FULL_PATH_VERTICES_MAX];
 	struct constraint_system system;
-	vec2 residual[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
-	struct path_vertex kept[FULL_PATH_MAX_VERTICES];
+	vec2 residual[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
+	struct path_vertex accepted[FULL_PATH_VERTICES_MAX];
 	unsigned iterations; /* output: iterations of the last walk */
 };
 
 /* Which parts of s->k and s->system, which belong to the path where the walk starts, are stale: nothing (0);
  * the constraint next to an end that has moved since, and the system (WALK_STALE_B, WALK_STALE_C); or
- * everything (WALK_STALE). */
-enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
+ * everything (WALK_STALE_ALL). */
+enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE_ALL = 4 };
 
 /* Moves the vertices c_end+1..b-1 of y from where they are until their half vectors have the targets; vertices b and
  * c_end stay. On WALK_OK the edges c_end..b-1 are joined and, except after a reverse walk, s->k has the constraints
  * there. Wavelengths (refractive indices) are y's.
  *
- * visible: a reverse walk, whose edges the caller knows to be unoccluded. Its tolerances are multiplied by
- * WALK_BACK_SCALE, which decides reliably whether it finds the original path again, and costs 0.2 more iterations and
- * no rays. Until it is within the tolerances of a forward walk its iterations are limited like a forward walk's, as
+ * is_reverse: a reverse walk, whose edges the caller knows to be unoccluded. Its tolerances are multiplied by
+ * WALK_REVERSE_SCALE, which decides reliably whether it finds the original path again, and costs 0.2 more iterations
+ * and no rays. Until it is within the tolerances of a forward walk its iterations are limited like a forward walk's, as
  * detailed balance requires: a path that y can propose must be found from y however few iterations are allowed.
  *
  * On failure y's vertices c_end+1..b-1 are undefined. Their cached values of f are dropped in any case. */
-enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
-			   unsigned stale, struct walk_scratch *s);
+enum walk_result halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
+			      const struct walk_target *target, bool is_reverse, const struct walk_limits *limits,
+			      unsigned stale, struct walk_scratch *s);
 
 #endif

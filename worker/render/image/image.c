@@ -20,7 +20,7 @@ static const struct image_format *const formats[] = {
 };
 
 /* Reduces the image to one channel, in place. A grey image stays as it is: its value counts for each channel. */
-static void keep_channel(struct image *img, enum image_channel channel)
+static void extract_channel(struct image *img, enum image_channel channel)
 {
 	size_t count = (size_t)img->width * img->height;
 	if (img->channels != 3)
@@ -30,7 +30,7 @@ static void keep_channel(struct image *img, enum image_channel channel)
 	img->channels = 1;
 }
 
-void image_grey(struct image *i, enum image_channel as)
+void image_convert_to_grey(struct image *i, enum image_channel channel)
 {
 	size_t count = (size_t)i->width * i->height;
 	if (i->channels != 3)
@@ -38,10 +38,11 @@ void image_grey(struct image *i, enum image_channel as)
 	for (size_t k = 0; k < count; k++) {
 		const float *p = i->pixels + 3 * k;
 		const double rgb[3] = {(double)p[0], (double)p[1], (double)p[2]};
-		bool same = p[0] == p[1] && p[0] == p[2]; /* equal channels keep their exact value, free of rounding */
-		i->pixels[k] = same		  ? p[0]
-			       : as == IMAGE_MEAN ? (float)((rgb[0] + rgb[1] + rgb[2]) / 3)
-						  : (float)rec709_luminance(rgb);
+		bool is_grey =
+			p[0] == p[1] && p[0] == p[2]; /* equal channels keep their exact value, free of rounding */
+		i->pixels[k] = is_grey		       ? p[0]
+			       : channel == IMAGE_MEAN ? (float)((rgb[0] + rgb[1] + rgb[2]) / 3)
+						       : (float)rec709_luminance(rgb);
 	}
 	i->channels = 1;
 }
@@ -54,24 +55,24 @@ static void make_opaque(struct image *img)
 	img->channels = 1;
 }
 
-static bool is_of(const struct image_format *f, const struct image_input *in)
+static bool format_matches(const struct image_format *f, const struct image_input *in)
 {
-	for (const char *const *b = f->begins; *b; b++)
+	for (const char *const *b = f->signatures; *b; b++)
 		if (in->size >= strlen(*b) && memcmp(in->bytes, *b, strlen(*b)) == 0)
 			return true;
-	return f->is && f->is(in);
+	return f->matches && f->matches(in);
 }
 
 static int decode(const struct image_input *in, struct image *out)
 {
 	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
 		const struct image_format *f = formats[i];
-		if (!is_of(f, in))
+		if (!format_matches(f, in))
 			continue;
-		if (in->alpha && f->alpha == IMAGE_ALPHA_NOT_READ)
+		if (in->alpha_only && f->alpha_support == IMAGE_ALPHA_NOT_READ)
 			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
 		int r = f->decode(in, out);
-		if (!r && in->alpha && f->alpha == IMAGE_ALPHA_NONE)
+		if (!r && in->alpha_only && f->alpha_support == IMAGE_ALPHA_NONE)
 			make_opaque(out);
 		return r;
 	}
@@ -91,28 +92,28 @@ int image_decode(const unsigned char *bytes, size_t size, const char *name, bool
 		return error_prefix(e, r, "%s", name);
 	}
 	if (channel != IMAGE_ALL && channel != IMAGE_ALPHA)
-		keep_channel(out, channel);
+		extract_channel(out, channel);
 	return 0;
 }
 
 enum image_channel image_channel_named(const char *name)
 {
 	static const char letters[] = "rgba";
-	const char *at = name[0] && !name[1] ? strchr(letters, *name) : NULL;
-	return at ? (enum image_channel)(IMAGE_RED + (at - letters)) : IMAGE_ALL;
+	const char *match = name[0] && !name[1] ? strchr(letters, *name) : NULL;
+	return match ? (enum image_channel)(IMAGE_RED + (match - letters)) : IMAGE_ALL;
 }
 
-int image_power(struct image *i, double power, struct error *e)
+int image_apply_power(struct image *i, double power, struct error *e)
 {
 	size_t count = (size_t)i->width * i->height * i->channels;
 	if (power == 1)
 		return 0;
 	for (size_t k = 0; k < count; k++) {
-		double x = (double)i->pixels[k], size = fabs(x);
-		if (size > 1 && power * log2(size) >= FLT_MAX_EXP - 1)
+		double x = (double)i->pixels[k], magnitude = fabs(x);
+		if (magnitude > 1 && power * log2(magnitude) >= FLT_MAX_EXP - 1)
 			return error_set(e, ERANGE, "gamma = %g makes a number that is too large: %g to that power",
-					 power, size);
-		i->pixels[k] = (float)copysign(pow(size, power), x);
+					 power, magnitude);
+		i->pixels[k] = (float)copysign(pow(magnitude, power), x);
 	}
 	return 0;
 }

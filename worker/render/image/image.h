@@ -21,7 +21,7 @@ enum image_channel {
 	IMAGE_GREEN,
 	IMAGE_BLUE,
 	IMAGE_ALPHA, /* from PNG, WebP and TGA; 1 if the image has none; -ENOTSUP for formats whose alpha is not read */
-	IMAGE_LUMINANCE, /* computed by image_grey(), as is IMAGE_MEAN */
+	IMAGE_LUMINANCE, /* computed by image_convert_to_grey(), as is IMAGE_MEAN */
 	IMAGE_MEAN,
 };
 
@@ -33,10 +33,10 @@ enum image_channel image_channel_named(const char *name);
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
 /* Replaces each pixel by one number: its luminance or the mean of red, green and blue. */
-void image_grey(struct image *i, enum image_channel as);
+void image_convert_to_grey(struct image *i, enum image_channel channel);
 
 /* Replaces each number x by sign(x) |x|^power, for power > 0; a power of 1 changes nothing. Returns -ERANGE if a
  * result is too large for a float. */
-int image_power(struct image *i, double power, struct error *e);
+int image_apply_power(struct image *i, double power, struct error *e);
 
 #endif

@@ -19,25 +19,29 @@ struct image_input {
 	const char *name;
 	const unsigned char *bytes;
 	size_t size;
-	bool raw, alpha; /* alpha: decode the alpha channel only, with its stored values */
+	bool raw, alpha_only; /* alpha: decode the alpha channel only, with its stored values */
 	struct arena *arena;
 	struct error *error;
 };
 
 /* A file format; image_formats.h lists all formats. */
 struct image_format {
-	const char *begins[5];			  /* possible first bytes of such a file; ends with NULL */
-	bool (*is)(const struct image_input *in); /* another way to recognise such a file, or NULL */
+	const char *signatures[5];		       /* possible first bytes of such a file; ends with NULL */
+	bool (*matches)(const struct image_input *in); /* another way to recognise such a file, or NULL */
 	int (*decode)(const struct image_input *in, struct image *out);
-	enum { IMAGE_ALPHA_NOT_READ, IMAGE_ALPHA_READ, IMAGE_ALPHA_NONE } alpha; /* _NONE: the format has no alpha */
+	enum {
+		IMAGE_ALPHA_NOT_READ,
+		IMAGE_ALPHA_READ,
+		IMAGE_ALPHA_NONE
+	} alpha_support; /* _NONE: the format has no alpha */
 };
 
-/* Checks the size of the image and then allocates its pixels. bytes_least is the smallest file that can hold such an
+/* Checks the size of the image and then allocates its pixels. min_file_bytes is the smallest file that can hold such an
  * image with the format's best compression: a shorter file is refused before anything is allocated. */
 int image_allocate(const struct image_input *in, struct image *out, uint64_t width, uint64_t height, uint32_t channels,
-		   uint64_t bytes_least);
+		   uint64_t min_file_bytes);
 
-/* Tabulates the values of integer samples: value[i] for i in 0..max. */
-void image_table(float *value, uint32_t max, bool raw);
+/* Tabulates the values of integer samples: table[i] for i in 0..max. */
+void image_fill_sample_table(float *table, uint32_t max, bool raw);
 
 #endif

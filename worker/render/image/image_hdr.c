@@ -11,18 +11,18 @@
 #include <math.h>
 #include <string.h>
 
-enum { LINE_MAX_BYTES = 1024, RLE_WIDTH_MIN = 8, RLE_WIDTH_MAX = 32767 };
+enum { LINE_BYTES_MAX = 1024, RLE_WIDTH_MIN = 8, RLE_WIDTH_MAX = 32767 };
 
 struct cursor {
 	const struct image_input *in;
 	const unsigned char *p, *end;
 };
 
-static bool read_line(struct cursor *c, char line[LINE_MAX_BYTES])
+static bool read_line(struct cursor *c, char line[LINE_BYTES_MAX])
 {
 	const unsigned char *newline = memchr(c->p, '\n', (size_t)(c->end - c->p));
 	size_t n = newline ? (size_t)(newline - c->p) : 0;
-	if (!newline || n >= LINE_MAX_BYTES)
+	if (!newline || n >= LINE_BYTES_MAX)
 		return false;
 	memcpy(line, c->p, n);
 	line[n] = 0;
@@ -42,7 +42,7 @@ static const char *read_extent(const char *text, const char *axis, int64_t *out)
 
 static int read_header(struct cursor *c, int64_t *width, int64_t *height)
 {
-	char line[LINE_MAX_BYTES];
+	char line[LINE_BYTES_MAX];
 	do {
 		if (!read_line(c, line))
 			return error_set(c->in->error, EBADMSG, "Radiance HDR: the header does not end");
@@ -83,7 +83,7 @@ static bool read_runs(struct cursor *c, unsigned char *out, size_t n)
 	return true;
 }
 
-static void put_pixel(float out[3], unsigned r, unsigned g, unsigned b, unsigned exponent)
+static void store_pixel(float out[3], unsigned r, unsigned g, unsigned b, unsigned exponent)
 {
 	float scale = exponent ? ldexpf(1, (int)exponent - (128 + 8)) : 0;
 	out[0] = (float)r * scale;
@@ -91,7 +91,7 @@ static void put_pixel(float out[3], unsigned r, unsigned g, unsigned b, unsigned
 	out[2] = (float)b * scale;
 }
 
-static int read_flat(struct cursor *c, float *out, size_t width)
+static int read_uncompressed(struct cursor *c, float *out, size_t width)
 {
 	if ((size_t)(c->end - c->p) / 4 < width)
 		return error_set(c->in->error, EBADMSG, "Radiance HDR: the file ends too early");
@@ -99,17 +99,17 @@ static int read_flat(struct cursor *c, float *out, size_t width)
 		if (c->p[0] == 1 && c->p[1] == 1 && c->p[2] == 1)
 			return error_set(c->in->error, EBADMSG,
 					 "Radiance HDR: the old run-length encoding is not supported");
-		put_pixel(out + 3 * x, c->p[0], c->p[1], c->p[2], c->p[3]);
+		store_pixel(out + 3 * x, c->p[0], c->p[1], c->p[2], c->p[3]);
 	}
 	return 0;
 }
 
 static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t width)
 {
-	bool runs = width >= RLE_WIDTH_MIN && width <= RLE_WIDTH_MAX && c->end - c->p >= 4 && c->p[0] == 2 &&
-		    c->p[1] == 2 && c->p[2] < 128;
-	if (!runs)
-		return read_flat(c, out, width);
+	bool is_run_length_encoded = width >= RLE_WIDTH_MIN && width <= RLE_WIDTH_MAX && c->end - c->p >= 4 &&
+				     c->p[0] == 2 && c->p[1] == 2 && c->p[2] < 128;
+	if (!is_run_length_encoded)
+		return read_uncompressed(c, out, width);
 	if (((size_t)c->p[2] << 8 | c->p[3]) != width)
 		return error_set(c->in->error, EBADMSG, "Radiance HDR: a scan line whose width is not the image's");
 	c->p += 4;
@@ -118,7 +118,7 @@ static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t 
 			return error_set(c->in->error, EBADMSG,
 					 "Radiance HDR: run lengths that do not fill a scan line");
 	for (size_t x = 0; x < width; x++)
-		put_pixel(out + 3 * x, planes[x], planes[width + x], planes[2 * width + x], planes[3 * width + x]);
+		store_pixel(out + 3 * x, planes[x], planes[width + x], planes[2 * width + x], planes[3 * width + x]);
 	return 0;
 }
 
@@ -144,6 +144,6 @@ static int decode(const struct image_input *in, struct image *out)
 }
 
 const struct image_format image_format_hdr = {
-	.begins = {"#?RADIANCE", "#?RGBE"},
+	.signatures = {"#?RADIANCE", "#?RGBE"},
 	.decode = decode,
 };

@@ -17,26 +17,26 @@ struct state {
 	struct jpeg_error_mgr errors;
 	struct jpeg_progress_mgr progress;
 	struct jpeg_decompress_struct jpeg;
-	jmp_buf back;
+	jmp_buf jump_target;
 	const struct image_input *in;
 	struct image *out;
 	unsigned char *row;
-	float value[256];
-	int failed;
+	float sample_table[256];
+	int error_code;
 };
 
-static struct state *state_of(j_common_ptr jpeg)
+static struct state *jpeg_state(j_common_ptr jpeg)
 {
 	return jpeg->client_data;
 }
 
 static void on_error(j_common_ptr jpeg)
 {
-	struct state *s = state_of(jpeg);
+	struct state *s = jpeg_state(jpeg);
 	char text[JMSG_LENGTH_MAX];
 	jpeg->err->format_message(jpeg, text);
-	s->failed = error_set(s->in->error, EBADMSG, "JPEG: %s", text);
-	longjmp(s->back, 1);
+	s->error_code = error_set(s->in->error, EBADMSG, "JPEG: %s", text);
+	longjmp(s->jump_target, 1);
 }
 
 /* libjpeg replaces missing data with grey and only warns; here that is an error. Surplus bytes and unusual versions
@@ -44,17 +44,17 @@ static void on_error(j_common_ptr jpeg)
 static void on_message(j_common_ptr jpeg, int level)
 {
 	int code = jpeg->err->msg_code;
-	bool harmless = code == JWRN_EXTRANEOUS_DATA || code == JWRN_JFIF_MAJOR || code == JWRN_ADOBE_XFORM;
-	if (level < 0 && !harmless)
+	bool is_harmless = code == JWRN_EXTRANEOUS_DATA || code == JWRN_JFIF_MAJOR || code == JWRN_ADOBE_XFORM;
+	if (level < 0 && !is_harmless)
 		on_error(jpeg);
 }
 
 static void on_progress(j_common_ptr jpeg)
 {
-	struct state *s = state_of(jpeg);
+	struct state *s = jpeg_state(jpeg);
 	if (s->jpeg.input_scan_number > SCANS_MAX) {
-		s->failed = error_set(s->in->error, E2BIG, "JPEG with more than %d scans", SCANS_MAX);
-		longjmp(s->back, 1);
+		s->error_code = error_set(s->in->error, E2BIG, "JPEG with more than %d scans", SCANS_MAX);
+		longjmp(s->jump_target, 1);
 	}
 }
 
@@ -91,7 +91,7 @@ static int read_pixels(struct state *s)
 		if (jpeg_read_scanlines(j, rows, 1) != 1)
 			return error_set(s->in->error, EBADMSG, "JPEG ends too early");
 		for (size_t i = 0; i < n; i++)
-			out[i] = s->value[s->row[i]];
+			out[i] = s->sample_table[s->row[i]];
 	}
 	jpeg_finish_decompress(j);
 	return 0;
@@ -99,13 +99,13 @@ static int read_pixels(struct state *s)
 
 static void read_guarded(struct state *s)
 {
-	if (setjmp(s->back))
+	if (setjmp(s->jump_target))
 		return;
 	jpeg_create_decompress(&s->jpeg);
 	s->jpeg.progress = &s->progress;
-	s->failed = read_header(s);
-	if (!s->failed)
-		s->failed = read_pixels(s);
+	s->error_code = read_header(s);
+	if (!s->error_code)
+		s->error_code = read_pixels(s);
 }
 
 static int decode(const struct image_input *in, struct image *out)
@@ -120,9 +120,9 @@ static int decode(const struct image_input *in, struct image *out)
 	s->errors.emit_message = on_message;
 	s->progress.progress_monitor = on_progress;
 	s->jpeg.client_data = s;
-	image_table(s->value, 255, in->raw);
+	image_fill_sample_table(s->sample_table, 255, in->raw);
 	read_guarded(s);
-	int r = s->failed;
+	int r = s->error_code;
 	jpeg_destroy_decompress(&s->jpeg);
 	mem_free(s->row);
 	mem_free(s);
@@ -130,7 +130,7 @@ static int decode(const struct image_input *in, struct image *out)
 }
 
 const struct image_format image_format_jpeg = {
-	.begins = {"\xff\xd8\xff"},
+	.signatures = {"\xff\xd8\xff"},
 	.decode = decode,
-	.alpha = IMAGE_ALPHA_NONE,
+	.alpha_support = IMAGE_ALPHA_NONE,
 };

@@ -14,11 +14,11 @@ struct state {
 	struct image *out;
 	png_structp png;
 	png_infop info;
-	size_t at; /* bytes consumed */
+	size_t offset; /* bytes consumed */
 	png_bytep pixels;
 	png_bytep *rows;
 	uint32_t channels, depth;
-	int failed;
+	int error_code;
 };
 
 static png_voidp png_allocate(png_structp png, png_alloc_size_t size)
@@ -36,7 +36,7 @@ static void png_release(png_structp png, png_voidp p)
 static void on_error(png_structp png, png_const_charp text)
 {
 	struct state *s = png_get_error_ptr(png);
-	s->failed = error_set(s->in->error, EBADMSG, "PNG: %s", text);
+	s->error_code = error_set(s->in->error, EBADMSG, "PNG: %s", text);
 	png_longjmp(png, 1);
 }
 
@@ -48,10 +48,10 @@ static void on_warning(png_structp png, png_const_charp text)
 static void on_read(png_structp png, png_bytep out, size_t n)
 {
 	struct state *s = png_get_io_ptr(png);
-	if (n > s->in->size - s->at)
+	if (n > s->in->size - s->offset)
 		png_error(png, "the file ends too early");
-	memcpy(out, s->in->bytes + s->at, n);
-	s->at += n;
+	memcpy(out, s->in->bytes + s->offset, n);
+	s->offset += n;
 }
 
 /* Sets libpng up to deliver grey or RGB of 8 or 16 bits, with alpha if requested: palettes and lower depths are
@@ -65,7 +65,7 @@ static int read_header(struct state *s)
 	png_read_info(s->png, s->info);
 	uint32_t width = png_get_image_width(s->png, s->info), height = png_get_image_height(s->png, s->info);
 	png_set_expand(s->png);
-	if (s->in->alpha)
+	if (s->in->alpha_only)
 		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* where the file has no alpha */
 	else
 		png_set_strip_alpha(s->png);
@@ -73,11 +73,11 @@ static int read_header(struct state *s)
 	png_read_update_info(s->png, s->info);
 	s->channels = png_get_channels(s->png, s->info);
 	s->depth = png_get_bit_depth(s->png, s->info);
-	if ((s->in->alpha ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
+	if ((s->in->alpha_only ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
 	    (s->depth != 8 && s->depth != 16))
 		return error_set(s->in->error, EINVAL, "PNG with %u channels of %u bits", s->channels, s->depth);
 	/* deflate expands a byte to at most 1032; a pixel takes at least one bit. */
-	return image_allocate(s->in, s->out, width, height, s->in->alpha ? 1 : s->channels,
+	return image_allocate(s->in, s->out, width, height, s->in->alpha_only ? 1 : s->channels,
 			      (uint64_t)width * height / (8 * 1032));
 }
 
@@ -99,9 +99,9 @@ static void read_guarded(struct state *s)
 {
 	if (setjmp(png_jmpbuf(s->png)))
 		return;
-	s->failed = read_header(s);
-	if (!s->failed)
-		s->failed = read_pixels(s);
+	s->error_code = read_header(s);
+	if (!s->error_code)
+		s->error_code = read_pixels(s);
 }
 
 static int convert(struct state *s)
@@ -110,8 +110,8 @@ static int convert(struct state *s)
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
 		return error_set(s->in->error, ENOMEM, "out of memory");
-	image_table(value, max, s->in->raw || s->in->alpha);
-	uint32_t step = s->in->alpha ? s->channels : 1, first = step - 1; /* alpha is the last sample of a pixel */
+	image_fill_sample_table(value, max, s->in->raw || s->in->alpha_only);
+	uint32_t step = s->in->alpha_only ? s->channels : 1, first = step - 1; /* alpha is the last sample of a pixel */
 	size_t n = (size_t)s->out->width * s->out->channels;
 	for (uint32_t y = 0; y < s->out->height; y++) {
 		const png_byte *p = s->rows[y];
@@ -134,17 +134,17 @@ static int decode(const struct image_input *in, struct image *out)
 	if (s.info)
 		read_guarded(&s);
 	else
-		s.failed = error_set(in->error, ENOMEM, "out of memory");
-	if (!s.failed)
-		s.failed = convert(&s);
+		s.error_code = error_set(in->error, ENOMEM, "out of memory");
+	if (!s.error_code)
+		s.error_code = convert(&s);
 	png_destroy_read_struct(&s.png, &s.info, NULL);
 	mem_free(s.pixels);
 	mem_free(s.rows);
-	return s.failed;
+	return s.error_code;
 }
 
 const struct image_format image_format_png = {
-	.begins = {"\x89PNG\r\n\x1a\n"},
+	.signatures = {"\x89PNG\r\n\x1a\n"},
 	.decode = decode,
-	.alpha = IMAGE_ALPHA_READ,
+	.alpha_support = IMAGE_ALPHA_READ,
 };

@@ -18,19 +18,19 @@ enum { WORD_MAX = 32 };
 
 struct pnm {
 	const struct image_input *in;
-	const unsigned char *at;
+	const unsigned char *cursor;
 	int64_t width, height;
-	double scale;		  /* of a PFM file; for PGM and PPM, the largest sample */
-	uint32_t channels, bytes; /* bytes: per sample */
-	bool floats, big_endian;
+	double scale;			 /* of a PFM file; for PGM and PPM, the largest sample */
+	uint32_t channels, sample_bytes; /* sample_bytes: per sample */
+	bool is_float, is_big_endian;
 };
 
 static int peek(const struct pnm *m)
 {
-	return m->at < m->in->bytes + m->in->size ? *m->at : -1;
+	return m->cursor < m->in->bytes + m->in->size ? *m->cursor : -1;
 }
 
-static bool at_blank(const struct pnm *m)
+static bool is_at_blank(const struct pnm *m)
 {
 	int c = peek(m);
 	return c > 0 && number_is_blank((char)c);
@@ -40,20 +40,20 @@ static bool at_blank(const struct pnm *m)
 static bool next_word(struct pnm *m, char word[WORD_MAX])
 {
 	size_t n = 0;
-	for (bool comment = false; comment || at_blank(m) || peek(m) == '#'; m->at++) {
+	for (bool in_comment = false; in_comment || is_at_blank(m) || peek(m) == '#'; m->cursor++) {
 		if (peek(m) < 0)
 			return false;
-		comment = peek(m) == '#' || (comment && peek(m) != '\n');
+		in_comment = peek(m) == '#' || (in_comment && peek(m) != '\n');
 	}
-	for (; peek(m) >= 0 && !at_blank(m); m->at++) {
+	for (; peek(m) >= 0 && !is_at_blank(m); m->cursor++) {
 		if (n == WORD_MAX - 1)
 			return false;
-		word[n++] = (char)*m->at;
+		word[n++] = (char)*m->cursor;
 	}
 	word[n] = 0;
-	if (n == 0 || !at_blank(m))
+	if (n == 0 || !is_at_blank(m))
 		return false;
-	m->at++;
+	m->cursor++;
 	return true;
 }
 
@@ -61,29 +61,29 @@ static int read_header(struct pnm *m)
 {
 	char width[WORD_MAX], height[WORD_MAX], scale[WORD_MAX];
 	char kind = (char)m->in->bytes[1];
-	m->at = m->in->bytes + 2;
-	m->floats = kind == 'F' || kind == 'f';
+	m->cursor = m->in->bytes + 2;
+	m->is_float = kind == 'F' || kind == 'f';
 	m->channels = kind == '6' || kind == 'F' ? 3 : 1;
 	if (!next_word(m, width) || !next_word(m, height) || !next_word(m, scale) ||
 	    !number_parse_int(width, &m->width) || !number_parse_int(height, &m->height) ||
 	    !number_parse(scale, &m->scale) || m->width < 1 || m->height < 1)
 		return error_set(m->in->error, EBADMSG, "portable map: needs a width, a height and a scale");
-	bool whole = m->scale >= 1 && m->scale <= 65535 && m->scale == floor(m->scale);
-	if (m->floats ? m->scale == 0 : !whole)
+	bool is_valid_maximum = m->scale >= 1 && m->scale <= 65535 && m->scale == floor(m->scale);
+	if (m->is_float ? m->scale == 0 : !is_valid_maximum)
 		return error_set(m->in->error, EBADMSG,
-				 m->floats ? "portable map: a scale of 0"
-					   : "portable map: the largest sample must be within [1, 65535]");
-	m->big_endian = !m->floats || m->scale > 0;
-	m->bytes = m->floats ? 4 : m->scale < 256 ? 1 : 2;
+				 m->is_float ? "portable map: a scale of 0"
+					     : "portable map: the largest sample must be within [1, 65535]");
+	m->is_big_endian = !m->is_float || m->scale > 0;
+	m->sample_bytes = m->is_float ? 4 : m->scale < 256 ? 1 : 2;
 	return 0;
 }
 
 static uint32_t next_sample(struct pnm *m)
 {
 	uint32_t x = 0;
-	for (uint32_t i = 0; i < m->bytes; i++)
-		x |= (uint32_t)m->at[i] << 8 * (m->big_endian ? m->bytes - 1 - i : i);
-	m->at += m->bytes;
+	for (uint32_t i = 0; i < m->sample_bytes; i++)
+		x |= (uint32_t)m->cursor[i] << 8 * (m->is_big_endian ? m->sample_bytes - 1 - i : i);
+	m->cursor += m->sample_bytes;
 	return x;
 }
 
@@ -109,7 +109,7 @@ static int read_integers(struct pnm *m, struct image *out)
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
 		return error_set(m->in->error, ENOMEM, "out of memory");
-	image_table(value, max, m->in->raw);
+	image_fill_sample_table(value, max, m->in->raw);
 	int r = 0;
 	for (size_t i = 0; i < (size_t)out->width * out->height * out->channels && !r; i++) {
 		uint32_t x = next_sample(m);
@@ -127,18 +127,18 @@ static int decode(const struct image_input *in, struct image *out)
 	struct pnm m = {.in = in};
 	int r = read_header(&m);
 	uint64_t w = r ? 0 : (uint64_t)m.width, h = r ? 0 : (uint64_t)m.height;
-	bool bounded = w <= IMAGE_PIXELS_MAX && h <= IMAGE_PIXELS_MAX;
-	uint64_t samples = bounded ? w * h * m.channels * m.bytes : 0;
+	bool is_bounded = w <= IMAGE_PIXELS_MAX && h <= IMAGE_PIXELS_MAX;
+	uint64_t samples = is_bounded ? w * h * m.channels * m.sample_bytes : 0;
 	if (!r)
 		r = image_allocate(in, out, w, h, m.channels, samples);
-	if (!r && (size_t)(in->bytes + in->size - m.at) < samples)
+	if (!r && (size_t)(in->bytes + in->size - m.cursor) < samples)
 		r = error_set(in->error, EBADMSG, "portable map: the file ends too early");
 	if (r)
 		return r;
-	return m.floats ? read_floats(&m, out) : read_integers(&m, out);
+	return m.is_float ? read_floats(&m, out) : read_integers(&m, out);
 }
 
 const struct image_format image_format_pnm = {
-	.begins = {"P5", "P6", "PF", "Pf"},
+	.signatures = {"P5", "P6", "PF", "Pf"},
 	.decode = decode,
 };

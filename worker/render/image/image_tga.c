@@ -13,18 +13,18 @@
 #include "common/base/bytes.h"
 #include "common/base/picture_name.h"
 
-enum { HEADER = 18, KIND_MAPPED = 1, KIND_COLOUR = 2, KIND_GREY = 3, KIND_PACKED = 8 };
+enum { HEADER_SIZE = 18, KIND_PALETTE = 1, KIND_COLOUR = 2, KIND_GREY = 3, KIND_RLE_FLAG = 8 };
 
 struct tga {
 	const struct image_input *in;
-	uint32_t width, height, kind, bytes; /* bytes: per pixel, or per palette index */
-	bool packed, down, leftwards;
-	const unsigned char *map; /* the palette; NULL: the pixels are colours */
-	uint32_t map_first, map_count, map_bytes;
-	const unsigned char *at; /* next unread byte */
+	uint32_t width, height, kind, pixel_bytes; /* pixel_bytes: per pixel, or per palette index */
+	bool is_rle, is_top_down, is_right_to_left;
+	const unsigned char *palette; /* the palette; NULL: the pixels are colours */
+	uint32_t palette_first, palette_count, palette_entry_bytes;
+	const unsigned char *cursor; /* next unread byte */
 	/* The current run-length packet: */
-	uint32_t left;
-	const unsigned char *repeated; /* the pixel that the packet repeats; NULL: each pixel is stored */
+	uint32_t packet_remaining;
+	const unsigned char *repeated_pixel; /* the pixel that the packet repeats; NULL: each pixel is stored */
 };
 
 static bool is_tga(const struct image_input *in)
@@ -32,65 +32,65 @@ static bool is_tga(const struct image_input *in)
 	static const char signature[] = "TRUEVISION-XFILE."; /* followed by its terminating 0 */
 	const char *format = picture_name_format(in->name);
 	return (format && strcmp(format, ".tga") == 0) ||
-	       (in->size >= HEADER + sizeof signature &&
+	       (in->size >= HEADER_SIZE + sizeof signature &&
 		memcmp(in->bytes + in->size - sizeof signature, signature, sizeof signature) == 0);
 }
 
-static size_t bytes_left(const struct tga *t)
+static size_t remaining_bytes(const struct tga *t)
 {
-	return t->in->size - (size_t)(t->at - t->in->bytes);
+	return t->in->size - (size_t)(t->cursor - t->in->bytes);
 }
 
-static int read_map(struct tga *t, const unsigned char *header)
+static int read_palette(struct tga *t, const unsigned char *header)
 {
 	uint32_t bits = header[7];
 	uint64_t size = (uint64_t)get16(header + 5) * ((bits + 7) / 8);
-	if (header[1] > 1 || (t->kind == KIND_MAPPED && header[1] == 0))
+	if (header[1] > 1 || (t->kind == KIND_PALETTE && header[1] == 0))
 		return error_set(t->in->error, EBADMSG, "TGA: the palette is missing or of an unknown kind");
 	if (header[1] == 0)
 		return 0;
-	if (size > bytes_left(t))
+	if (size > remaining_bytes(t))
 		return error_set(t->in->error, EBADMSG, "TGA: the palette ends too early");
-	if (t->kind == KIND_MAPPED) {
+	if (t->kind == KIND_PALETTE) {
 		if (bits != 24 && bits != 32)
 			return error_set(t->in->error, ENOTSUP, "TGA: a palette of %u bits", bits);
-		t->map = t->at;
-		t->map_bytes = bits / 8;
-		t->map_first = get16(header + 3);
-		t->map_count = get16(header + 5);
+		t->palette = t->cursor;
+		t->palette_entry_bytes = bits / 8;
+		t->palette_first = get16(header + 3);
+		t->palette_count = get16(header + 5);
 	}
-	t->at += size;
+	t->cursor += size;
 	return 0;
 }
 
 static int read_header(struct tga *t)
 {
 	const unsigned char *p = t->in->bytes;
-	if (t->in->size < HEADER || (size_t)HEADER + p[0] > t->in->size)
+	if (t->in->size < HEADER_SIZE || (size_t)HEADER_SIZE + p[0] > t->in->size)
 		return error_set(t->in->error, EBADMSG, "TGA: the header ends too early");
-	t->kind = p[2] & ~(uint32_t)KIND_PACKED;
-	t->packed = p[2] & KIND_PACKED;
+	t->kind = p[2] & ~(uint32_t)KIND_RLE_FLAG;
+	t->is_rle = p[2] & KIND_RLE_FLAG;
 	t->width = get16(p + 12);
 	t->height = get16(p + 14);
-	t->bytes = p[16] / 8;
-	t->leftwards = p[17] & 0x10;
-	t->down = p[17] & 0x20;
-	t->at = p + HEADER + p[0];
-	bool deep = t->kind == KIND_COLOUR && (p[16] == 24 || p[16] == 32);
-	bool flat = (t->kind == KIND_GREY || t->kind == KIND_MAPPED) && p[16] == 8;
-	if (!deep && !flat)
+	t->pixel_bytes = p[16] / 8;
+	t->is_right_to_left = p[17] & 0x10;
+	t->is_top_down = p[17] & 0x20;
+	t->cursor = p + HEADER_SIZE + p[0];
+	bool is_true_colour = t->kind == KIND_COLOUR && (p[16] == 24 || p[16] == 32);
+	bool is_one_byte = (t->kind == KIND_GREY || t->kind == KIND_PALETTE) && p[16] == 8;
+	if (!is_true_colour && !is_one_byte)
 		return error_set(t->in->error, ENOTSUP, "TGA: pixels of kind %u with %u bits", p[2], p[16]);
 	if (p[17] & 0xc0)
 		return error_set(t->in->error, ENOTSUP, "TGA: interleaved rows");
-	return read_map(t, p);
+	return read_palette(t, p);
 }
 
-static const unsigned char *take_bytes(struct tga *t, size_t bytes)
+static const unsigned char *read_bytes(struct tga *t, size_t bytes)
 {
-	const unsigned char *p = t->at;
-	if (bytes_left(t) < bytes)
+	const unsigned char *p = t->cursor;
+	if (remaining_bytes(t) < bytes)
 		return NULL;
-	t->at += bytes;
+	t->cursor += bytes;
 	return p;
 }
 
@@ -98,22 +98,22 @@ static const unsigned char *take_bytes(struct tga *t, size_t bytes)
  * or the index is beyond the palette. */
 static const unsigned char *next_pixel(struct tga *t)
 {
-	if (t->packed && t->left == 0) {
-		const unsigned char *packet = take_bytes(t, 1);
+	if (t->is_rle && t->packet_remaining == 0) {
+		const unsigned char *packet = read_bytes(t, 1);
 		if (!packet)
 			return NULL;
-		t->left = (*packet & 0x7fu) + 1;
-		t->repeated = NULL;
-		if ((*packet & 0x80) && !(t->repeated = take_bytes(t, t->bytes)))
+		t->packet_remaining = (*packet & 0x7fu) + 1;
+		t->repeated_pixel = NULL;
+		if ((*packet & 0x80) && !(t->repeated_pixel = read_bytes(t, t->pixel_bytes)))
 			return NULL;
 	}
-	if (t->packed)
-		t->left--;
-	const unsigned char *p = t->packed && t->repeated ? t->repeated : take_bytes(t, t->bytes);
-	if (!p || !t->map)
+	if (t->is_rle)
+		t->packet_remaining--;
+	const unsigned char *p = t->is_rle && t->repeated_pixel ? t->repeated_pixel : read_bytes(t, t->pixel_bytes);
+	if (!p || !t->palette)
 		return p;
-	uint32_t i = *p - t->map_first;
-	return *p >= t->map_first && i < t->map_count ? t->map + (size_t)i * t->map_bytes : NULL;
+	uint32_t i = *p - t->palette_first;
+	return *p >= t->palette_first && i < t->palette_count ? t->palette + (size_t)i * t->palette_entry_bytes : NULL;
 }
 
 static int decode(const struct image_input *in, struct image *out)
@@ -123,34 +123,34 @@ static int decode(const struct image_input *in, struct image *out)
 	int r = read_header(&t);
 	if (r)
 		return r;
-	bool grey = t.kind == KIND_GREY, has_alpha = (t.map ? t.map_bytes : t.bytes) == 4;
-	uint32_t channels = grey || in->alpha ? 1 : 3;
-	uint64_t count = (uint64_t)t.width * t.height, least = (count + 127) / 128 * (1 + t.bytes);
-	r = image_allocate(in, out, t.width, t.height, channels, t.packed ? least : count * t.bytes);
+	bool is_grey = t.kind == KIND_GREY, has_alpha = (t.palette ? t.palette_entry_bytes : t.pixel_bytes) == 4;
+	uint32_t channels = is_grey || in->alpha_only ? 1 : 3;
+	uint64_t count = (uint64_t)t.width * t.height, min_rle_bytes = (count + 127) / 128 * (1 + t.pixel_bytes);
+	r = image_allocate(in, out, t.width, t.height, channels, t.is_rle ? min_rle_bytes : count * t.pixel_bytes);
 	if (r)
 		return r;
-	image_table(value, 255, in->raw || in->alpha);
+	image_fill_sample_table(value, 255, in->raw || in->alpha_only);
 	for (uint32_t j = 0; j < t.height; j++)
 		for (uint32_t i = 0; i < t.width; i++) {
-			uint32_t x = t.leftwards ? t.width - 1 - i : i, y = t.down ? j : t.height - 1 - j;
-			float *to = out->pixels + ((size_t)y * t.width + x) * channels;
+			uint32_t x = t.is_right_to_left ? t.width - 1 - i : i, y = t.is_top_down ? j : t.height - 1 - j;
+			float *pixel = out->pixels + ((size_t)y * t.width + x) * channels;
 			const unsigned char *c = next_pixel(&t);
 			if (!c)
 				return error_set(in->error, EBADMSG,
 						 "TGA: the file ends too early, or a pixel is beyond the palette");
-			if (in->alpha)
-				*to = has_alpha ? value[c[3]] : 1;
-			else if (grey)
-				*to = value[c[0]];
+			if (in->alpha_only)
+				*pixel = has_alpha ? value[c[3]] : 1;
+			else if (is_grey)
+				*pixel = value[c[0]];
 			else
 				for (int k = 0; k < 3; k++)
-					to[k] = value[c[2 - k]];
+					pixel[k] = value[c[2 - k]];
 		}
 	return 0;
 }
 
 const struct image_format image_format_tga = {
-	.is = is_tga,
+	.matches = is_tga,
 	.decode = decode,
-	.alpha = IMAGE_ALPHA_READ,
+	.alpha_support = IMAGE_ALPHA_READ,
 };

@@ -5,27 +5,27 @@
 #include <string.h>
 #include <webp/decode.h>
 
-static void store(const struct image_input *in, const uint8_t *rgba, struct image *out)
+static void store_pixels(const struct image_input *in, const uint8_t *rgba, struct image *out)
 {
 	float value[256];
 	size_t count = (size_t)out->width * out->height;
-	image_table(value, 255, in->raw || in->alpha);
+	image_fill_sample_table(value, 255, in->raw || in->alpha_only);
 	for (size_t i = 0; i < count; i++)
 		for (uint32_t k = 0; k < out->channels; k++)
-			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->alpha ? 3 : k)]];
+			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->alpha_only ? 3 : k)]];
 }
 
 static int decode(const struct image_input *in, struct image *out)
 {
-	WebPBitstreamFeatures about;
+	WebPBitstreamFeatures features;
 	if (in->size < 12 || memcmp(in->bytes + 8, "WEBP", 4) != 0)
 		return error_set(in->error, EINVAL, "a RIFF file that is not a WebP image");
-	if (WebPGetFeatures(in->bytes, in->size, &about) != VP8_STATUS_OK)
+	if (WebPGetFeatures(in->bytes, in->size, &features) != VP8_STATUS_OK)
 		return error_set(in->error, EBADMSG, "WebP: damaged, or cut off in its header");
-	if (about.has_animation)
+	if (features.has_animation)
 		return error_set(in->error, ENOTSUP, "WebP: an animation; supported: single images");
 	/* No lower limit on the file's size: a lossless image of a single colour takes next to nothing. */
-	int r = image_allocate(in, out, (uint64_t)about.width, (uint64_t)about.height, in->alpha ? 1 : 3, 0);
+	int r = image_allocate(in, out, (uint64_t)features.width, (uint64_t)features.height, in->alpha_only ? 1 : 3, 0);
 	if (r)
 		return r;
 	int width, height;
@@ -33,7 +33,7 @@ static int decode(const struct image_input *in, struct image *out)
 	if (!rgba)
 		return error_set(in->error, EBADMSG, "WebP: damaged or cut off");
 	if ((uint32_t)width == out->width && (uint32_t)height == out->height)
-		store(in, rgba, out);
+		store_pixels(in, rgba, out);
 	else
 		r = error_set(in->error, EBADMSG, "WebP: its header and its image differ in size");
 	WebPFree(rgba);
@@ -41,7 +41,7 @@ static int decode(const struct image_input *in, struct image *out)
 }
 
 const struct image_format image_format_webp = {
-	.begins = {"RIFF"},
+	.signatures = {"RIFF"},
 	.decode = decode,
-	.alpha = IMAGE_ALPHA_READ,
+	.alpha_support = IMAGE_ALPHA_READ,
 };

@@ -10,9 +10,9 @@ enum { ATTRIBUTE_CHANNELS_MAX = 4, ATTRIBUTE_NAME_MAX = 96 };
 
 struct attribute {
 	char name[ATTRIBUTE_NAME_MAX]; /* "vertex_color", "face_heat" */
-	bool per_face;
-	bool encoded; /* colours that are sRGB in Mitsuba 0.6 and linear in 3.x */
-	bool damaged; /* a value was not finite or exceeded 1e12 */
+	bool is_per_face;
+	bool is_srgb;		/* colours that are sRGB in Mitsuba 0.6 and linear in 3.x */
+	bool has_invalid_value; /* a value was not finite or exceeded 1e12 */
 	uint32_t channels;
 	float *value; /* `channels` per vertex or triangle; finite */
 };

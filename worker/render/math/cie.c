@@ -9,7 +9,7 @@ const struct wavelength_cell wavelength_cells[CIE_COUNT - 1] = {
 #include "wavelength_cells.inc"
 };
 
-const unsigned short wavelength_guide[WAVELENGTH_GUIDE] = {
+const unsigned short wavelength_guide[WAVELENGTH_GUIDE_COUNT] = {
 #include "wavelength_guide.inc"
 };
 

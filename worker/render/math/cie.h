@@ -15,11 +15,11 @@ extern const double cie_d65[CIE_COUNT];
 /* For the nanometre that starts at CIE_FIRST_NM + i: the fraction of all drawn wavelengths that are below it, and the
  * fraction within it (which is also the density per nm). */
 struct wavelength_cell {
-	double below, share;
+	double cumulative, probability;
 };
 extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
-/* Entry k is the cell that contains the fraction k / WAVELENGTH_GUIDE. */
-enum { WAVELENGTH_GUIDE = 512 };
-extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE];
+/* Entry k is the cell that contains the fraction k / WAVELENGTH_GUIDE_COUNT. */
+enum { WAVELENGTH_GUIDE_COUNT = 512 };
+extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE_COUNT];
 
 #endif

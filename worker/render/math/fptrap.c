@@ -5,21 +5,21 @@
 #include <stddef.h>
 #include <stdlib.h>
 
-static _Thread_local jmp_buf *catcher;
+static _Thread_local jmp_buf *catch_point;
 
 jmp_buf *fptrap_catch(jmp_buf *back)
 {
-	jmp_buf *before = catcher;
-	catcher = back;
-	return before;
+	jmp_buf *previous = catch_point;
+	catch_point = back;
+	return previous;
 }
 
 #if defined(__x86_64__)
-_Thread_local bool fptrap_watching;
+_Thread_local bool fptrap_is_watching;
 
 static void clear_exceptions(void)
 {
-	fptrap_watching = false;
+	fptrap_is_watching = false;
 	_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
 }
 #else
@@ -30,9 +30,9 @@ static void clear_exceptions(void)
 
 void fptrap_fault(void)
 {
-	jmp_buf *back = catcher;
+	jmp_buf *back = catch_point;
 	if (back) {
-		catcher = NULL;
+		catch_point = NULL;
 		clear_exceptions();
 		longjmp(*back, 1);
 	}

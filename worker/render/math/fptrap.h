@@ -26,37 +26,37 @@ void fptrap_fault(void) __attribute__((noreturn));
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 
-extern _Thread_local bool fptrap_watching;
+extern _Thread_local bool fptrap_is_watching;
 
 /* From now on, INVALID is a fault. Returns the previous state, for fptrap_unwatch. */
 static inline bool fptrap_watch(void)
 {
-	bool before = fptrap_watching;
+	bool previous = fptrap_is_watching;
 	_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
-	fptrap_watching = true;
-	return before;
+	fptrap_is_watching = true;
+	return previous;
 }
 
-/* Call when our code ends and a library's begins. Returns the flags, for fptrap_return. */
-static inline unsigned fptrap_leave(void)
+/* Call when our code ends and a library's begins. Returns the flags, for fptrap_leave_library. */
+static inline unsigned fptrap_enter_library(void)
 {
 	unsigned flags = _mm_getcsr();
-	if ((flags & _MM_EXCEPT_INVALID) && fptrap_watching)
+	if ((flags & _MM_EXCEPT_INVALID) && fptrap_is_watching)
 		fptrap_fault();
 	return flags;
 }
 
-static inline void fptrap_return(unsigned left)
+static inline void fptrap_leave_library(unsigned flags_before)
 {
 	unsigned flags = _mm_getcsr();
-	if ((flags & ~left) & _MM_EXCEPT_INVALID)
+	if ((flags & ~flags_before) & _MM_EXCEPT_INVALID)
 		_mm_setcsr(flags & ~(unsigned)_MM_EXCEPT_INVALID);
 }
 
-static inline void fptrap_unwatch(bool before)
+static inline void fptrap_unwatch(bool previous)
 {
-	fptrap_leave();
-	fptrap_watching = before;
+	fptrap_enter_library();
+	fptrap_is_watching = previous;
 }
 #else
 static inline bool fptrap_watch(void)

@@ -20,7 +20,7 @@ static inline vec3 frame_to_world(const struct frame *f, vec3 v)
 }
 
 /* Returns a frame expressed in the coordinates of another one. */
-static inline struct frame frame_within(const struct frame *outer, const struct frame *f)
+static inline struct frame frame_relative_to(const struct frame *outer, const struct frame *f)
 {
 	return (struct frame){frame_to_local(outer, f->s), frame_to_local(outer, f->t), frame_to_local(outer, f->n)};
 }

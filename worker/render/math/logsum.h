@@ -8,14 +8,14 @@
 /* Returns the logarithm of the sum of exp(v[i]); -INFINITY if there are no terms or all are zero. */
 static inline double log_sum_exp(const double *v, unsigned n)
 {
-	double most = -INFINITY, sum = 0;
+	double max = -INFINITY, sum = 0;
 	for (unsigned i = 0; i < n; i++)
-		most = fmax(most, v[i]);
-	if (!(most > -INFINITY))
+		max = fmax(max, v[i]);
+	if (!(max > -INFINITY))
 		return -INFINITY;
 	for (unsigned i = 0; i < n; i++)
-		sum += exp(v[i] - most);
-	return most + log(sum);
+		sum += exp(v[i] - max);
+	return max + log(sum);
 }
 
 #endif

@@ -158,7 +158,7 @@ vec3 mat4_normal(const mat4 *inverse, vec3 n)
 		      a->m[0][2] * n.x + a->m[1][2] * n.y + a->m[2][2] * n.z};
 }
 
-bool mat4_keeps_angles(const mat4 *a)
+bool mat4_is_conformal(const mat4 *a)
 {
 	const double tolerance = 1e-4;
 	vec3 axis[3];

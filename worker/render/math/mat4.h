@@ -22,7 +22,7 @@ mat4 mat4_look_at(vec3 origin, vec3 target,
 		  vec3 up);
 double mat4_det3(mat4 a); /* determinant of the upper left 3x3 block */
 /* Whether a only rotates, mirrors, translates and scales evenly, to the four digits that files give. */
-bool mat4_keeps_angles(const mat4 *a);
+bool mat4_is_conformal(const mat4 *a);
 
 /* Returns the image of the unit vector of axis k, or of the origin for k = 3. */
 static inline vec3 mat4_column(const mat4 *a, int k)

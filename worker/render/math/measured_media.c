@@ -60,13 +60,13 @@ static const struct measured_medium media[] = {
 	 {0.902, 0.825, 0.914}},
 };
 
-const struct measured_medium *measured_find(const char *name, char *list, size_t size)
+const struct measured_medium *measured_medium_find(const char *name, char *list, size_t size)
 {
 	*list = 0;
 	for (size_t i = 0; i < sizeof media / sizeof *media; i++) {
 		if (strcasecmp(media[i].name, name) == 0)
 			return &media[i];
-		spelling_list(list, size, media[i].name);
+		spelling_append_to_list(list, size, media[i].name);
 	}
 	return NULL;
 }

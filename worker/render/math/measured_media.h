@@ -16,12 +16,12 @@ struct measured_medium {
 	double sigma_s[3], sigma_a[3], g[3];
 };
 
-#define MEASURED_DEFAULT "skin1" /* 0.6's medium for a file that names none */
+#define MEASURED_MEDIUM_DEFAULT "skin1" /* 0.6's medium for a file that names none */
 
 /* The factor by which 0.6 multiplies the coefficients, although its manual equates a scene unit with a millimetre. */
-#define MEASURED_SCALE 100.0
+#define MEASURED_MEDIUM_SCALE 100.0
 
 /* Finds a medium by its name, ignoring case. Returns NULL if there is none; then `list` has the names. */
-const struct measured_medium *measured_find(const char *name, char *list, size_t size);
+const struct measured_medium *measured_medium_find(const char *name, char *list, size_t size);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Motion between keyframes. motion_make selects the keyframes that matter and decomposes each: the orthogonal factor,
- * by Newton's iteration, becomes a quaternion; the remaining factor is symmetric. motion_at finds the two keys around a
- * time, interpolates and multiplies the factors. motion_bounds divides the motion between two keys into parts and
- * bounds how far a point moves within each.
+ * by Newton's iteration, becomes a quaternion; the remaining factor is symmetric. motion_transform_at finds the two
+ * keys around a time, interpolates and multiplies the factors. motion_bounds divides the motion between two keys into
+ * parts and bounds how far a point moves within each.
  *
  * Nothing fails: keyframes without an inverse, or with one that exceeds the range of doubles, are refused where they
  * are read (worker/render/scene/animation.c), and the iteration ends after at most POLAR_STEPS steps.
@@ -46,13 +46,13 @@ static void orthogonal_factor(const double a[3][3], double q[3][3])
 		for (int k = 0; k < 3; k++)
 			q[i][k] = scale * a[i][k];
 	for (int step = 0; step < POLAR_STEPS && change > 0x1p-50; step++) {
-		double back[3][3];
-		invert_transpose((const double(*)[3])q, back);
-		double g = change > 0.01 ? sqrt(norm3((const double(*)[3])back) / norm3((const double(*)[3])q)) : 1;
+		double inverse[3][3];
+		invert_transpose((const double(*)[3])q, inverse);
+		double g = change > 0.01 ? sqrt(norm3((const double(*)[3])inverse) / norm3((const double(*)[3])q)) : 1;
 		change = 0;
 		for (int i = 0; i < 3; i++)
 			for (int k = 0; k < 3; k++) {
-				double next = 0.5 * (g * q[i][k] + back[i][k] / g);
+				double next = 0.5 * (g * q[i][k] + inverse[i][k] / g);
 				change = fmax(change, fabs(next - q[i][k]));
 				q[i][k] = next;
 			}
@@ -61,7 +61,7 @@ static void orthogonal_factor(const double a[3][3], double q[3][3])
 
 /* Converts a rotation to a quaternion. The largest component is computed first, so that the others are not
  * divided by a small number. */
-static void quaternion_of(const double r[3][3], double q[4])
+static void quaternion_from_rotation(const double r[3][3], double q[4])
 {
 	double trace = r[0][0] + r[1][1] + r[2][2];
 	int i = 0;
@@ -84,14 +84,14 @@ static void quaternion_of(const double r[3][3], double q[4])
 		q[k] /= length;
 }
 
-static void decompose(const struct keyframe *from, struct motion_key *k)
+static void decompose_keyframe(const struct keyframe *keyframe, struct motion_key *k)
 {
 	double a[3][3], q[3][3];
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j < 3; j++)
-			a[i][j] = from->place.m[i][j];
+			a[i][j] = keyframe->transform.m[i][j];
 	orthogonal_factor((const double(*)[3])a, q);
-	double sign = mat4_det3(from->place) < 0 ? -1 : 1;
+	double sign = mat4_det3(keyframe->transform) < 0 ? -1 : 1;
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j < 3; j++)
 			q[i][j] *= sign;
@@ -102,61 +102,62 @@ static void decompose(const struct keyframe *from, struct motion_key *k)
 				s += 0.5 * (q[l][i] * a[l][j] + q[l][j] * a[l][i]);
 			k->stretch[i][j] = k->stretch[j][i] = s;
 		}
-	quaternion_of((const double(*)[3])q, k->turn);
-	k->at = (vec3){from->place.m[0][3], from->place.m[1][3], from->place.m[2][3]};
-	k->angle = 0;
+	quaternion_from_rotation((const double(*)[3])q, k->rotation);
+	k->translation = (vec3){keyframe->transform.m[0][3], keyframe->transform.m[1][3], keyframe->transform.m[2][3]};
+	k->half_angle = 0;
 }
 
-/* Replaces next->turn by its negative, which is the same rotation, if that is nearer to k's, and
+/* Replaces next->rotation by its negative, which is the same rotation, if that is nearer to k's, and
  * sets the angle between them. */
-static void set_angle(struct motion_key *k, struct motion_key *next)
+static void set_half_angle(struct motion_key *k, struct motion_key *next)
 {
-	double apart = 0, together = 0;
+	double difference_squared = 0, sum_squared = 0;
 	for (int i = 0; i < 4; i++) {
-		apart += (next->turn[i] - k->turn[i]) * (next->turn[i] - k->turn[i]);
-		together += (next->turn[i] + k->turn[i]) * (next->turn[i] + k->turn[i]);
+		difference_squared += (next->rotation[i] - k->rotation[i]) * (next->rotation[i] - k->rotation[i]);
+		sum_squared += (next->rotation[i] + k->rotation[i]) * (next->rotation[i] + k->rotation[i]);
 	}
-	if (apart > together)
+	if (difference_squared > sum_squared)
 		for (int i = 0; i < 4; i++)
-			next->turn[i] = -next->turn[i];
-	k->angle = 2 * atan2(sqrt(fmin(apart, together)), sqrt(fmax(apart, together)));
+			next->rotation[i] = -next->rotation[i];
+	k->half_angle =
+		2 * atan2(sqrt(fmin(difference_squared, sum_squared)), sqrt(fmax(difference_squared, sum_squared)));
 }
 
-static bool same_place(const struct keyframe *a, const struct keyframe *b)
+static bool has_same_transform(const struct keyframe *a, const struct keyframe *b)
 {
-	return memcmp(&a->place, &b->place, sizeof a->place) == 0;
+	return memcmp(&a->transform, &b->transform, sizeof a->transform) == 0;
 }
 
 /* Shorter exposures count as closed, because times in units of the exposure would not be finite. */
-#define LEAST_OPEN 1e-30
+#define EXPOSURE_MIN 1e-30
 
-bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room)
+bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *keys)
 {
 	uint32_t first = 0, last = a->count - 1;
 	while (first < last && a->key[first + 1].time <= open)
 		first++;
 	while (last > first && a->key[last - 1].time >= close)
 		last--;
-	bool is_open = close - open > LEAST_OPEN, moves = false;
+	bool is_open = close - open > EXPOSURE_MIN, has_motion = false;
 	double unit = is_open ? close - open : 1;
-	*m = (struct motion){.count = last - first + 1, .key = room, .before = mat4_identity()};
+	*m = (struct motion){.count = last - first + 1, .key = keys, .pre_transform = mat4_identity()};
 	for (uint32_t i = 0; i < m->count; i++) {
-		const struct keyframe *from = &a->key[first + i];
-		decompose(from, &m->key[i]);
-		m->key[i].time = (from->time - open) / unit;
+		const struct keyframe *keyframe = &a->key[first + i];
+		decompose_keyframe(keyframe, &m->key[i]);
+		m->key[i].time = (keyframe->time - open) / unit;
 		if (i > 0)
-			set_angle(&m->key[i - 1], &m->key[i]);
-		moves |=
-			i > 0 && !same_place(from - 1, from) && a->key[first + i - 1].time < close && from->time > open;
+			set_half_angle(&m->key[i - 1], &m->key[i]);
+		has_motion |= i > 0 && !has_same_transform(keyframe - 1, keyframe) &&
+			      a->key[first + i - 1].time < close && keyframe->time > open;
 	}
-	return moves && is_open;
+	return has_motion && is_open;
 }
 
 void motion_rescale(struct motion *m, vec3 center, double scale)
 {
 	for (uint32_t i = 0; i < m->count; i++) {
 		struct motion_key *k = &m->key[i];
-		k->at = vec3_scale(scale, vec3_sub(k->at, center));
+		k->translation = vec3_scale(scale, vec3_sub(k->translation, center));
 		for (int j = 0; j < 3; j++)
 			for (int l = 0; l < 3; l++)
 				k->stretch[j][l] *= scale;
@@ -164,7 +165,7 @@ void motion_rescale(struct motion *m, vec3 center, double scale)
 }
 
 /* Returns the index of the last key that is not after that time; 0 if there is none. */
-static uint32_t key_before(const struct motion *m, double time)
+static uint32_t find_key(const struct motion *m, double time)
 {
 	uint32_t low = 0, high = m->count;
 	while (high - low > 1) {
@@ -177,7 +178,7 @@ static uint32_t key_before(const struct motion *m, double time)
 	return low;
 }
 
-static void rotation_of(const double q[4], double r[3][3])
+static void rotation_from_quaternion(const double q[4], double r[3][3])
 {
 	double w = q[0], x = q[1], y = q[2], z = q[3];
 	const double m[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
@@ -186,23 +187,23 @@ static void rotation_of(const double q[4], double r[3][3])
 	memcpy(r, m, sizeof m);
 }
 
-static void turn_at(const struct motion_key *a, const struct motion_key *b, double s, double q[4])
+static void interpolate_rotation(const struct motion_key *a, const struct motion_key *b, double s, double q[4])
 {
-	double sine = sin(a->angle), from = 1, to = 0;
+	double sine = sin(a->half_angle), weight_a = 1, weight_b = 0;
 	if (sine > 0) {
-		from = sin((1 - s) * a->angle) / sine;
-		to = sin(s * a->angle) / sine;
+		weight_a = sin((1 - s) * a->half_angle) / sine;
+		weight_b = sin(s * a->half_angle) / sine;
 	}
 	for (int i = 0; i < 4; i++)
-		q[i] = from * a->turn[i] + to * b->turn[i];
+		q[i] = weight_a * a->rotation[i] + weight_b * b->rotation[i];
 }
 
-/* Returns the transform between two keys, without `before`. */
-static mat4 place_at(const struct motion_key *a, const struct motion_key *b, double s)
+/* Returns the transform between two keys, without `pre_transform`. */
+static mat4 interpolate_transform(const struct motion_key *a, const struct motion_key *b, double s)
 {
 	double q[4], r[3][3];
-	turn_at(a, b, s, q);
-	rotation_of(q, r);
+	interpolate_rotation(a, b, s, q);
+	rotation_from_quaternion(q, r);
 	mat4 m = mat4_identity();
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 3; k++) {
@@ -211,41 +212,41 @@ static mat4 place_at(const struct motion_key *a, const struct motion_key *b, dou
 				sum += r[i][l] * ((1 - s) * a->stretch[l][k] + s * b->stretch[l][k]);
 			m.m[i][k] = sum;
 		}
-	m.m[0][3] = (1 - s) * a->at.x + s * b->at.x;
-	m.m[1][3] = (1 - s) * a->at.y + s * b->at.y;
-	m.m[2][3] = (1 - s) * a->at.z + s * b->at.z;
+	m.m[0][3] = (1 - s) * a->translation.x + s * b->translation.x;
+	m.m[1][3] = (1 - s) * a->translation.y + s * b->translation.y;
+	m.m[2][3] = (1 - s) * a->translation.z + s * b->translation.z;
 	return m;
 }
 
-mat4 motion_at(const struct motion *m, double time)
+mat4 motion_transform_at(const struct motion *m, double time)
 {
-	uint32_t i = key_before(m, time);
+	uint32_t i = find_key(m, time);
 	const struct motion_key *a = &m->key[i], *b = i + 1 < m->count ? a + 1 : a;
 	double s = b > a && time > a->time ? fmin((time - a->time) / (b->time - a->time), 1) : 0;
-	return mat4_mul(place_at(a, b, s), m->before);
+	return mat4_mul(interpolate_transform(a, b, s), m->pre_transform);
 }
 
 /* The motion is bounded in parts that turn by at most this angle. */
-#define PART (M_PI / 32)
+#define PART_ANGLE_MAX (M_PI / 32)
 
 struct sweep {
-	const mat4 *before;
-	vec3 middle, half; /* the box */
-	double far;	   /* largest distance of its points from the origin, after `before` */
+	const mat4 *pre_transform;
+	vec3 middle, half;   /* the box */
+	double max_distance; /* largest distance of its points from the origin, after `pre_transform` */
 	vec3 low, high;
 };
 
-static void grow_sweep(struct sweep *w, const mat4 *m, double off)
+static void grow_sweep(struct sweep *w, const mat4 *m, double margin)
 {
 	vec3 c = mat4_point(m, w->middle);
-	const double at[3] = {c.x, c.y, c.z}, half[3] = {w->half.x, w->half.y, w->half.z};
+	const double center[3] = {c.x, c.y, c.z}, half[3] = {w->half.x, w->half.y, w->half.z};
 	double *low[3] = {&w->low.x, &w->low.y, &w->low.z}, *high[3] = {&w->high.x, &w->high.y, &w->high.z};
 	for (int i = 0; i < 3; i++) {
-		double r = off;
+		double r = margin;
 		for (int k = 0; k < 3; k++)
 			r += fabs(m->m[i][k]) * half[k];
-		*low[i] = fmin(*low[i], at[i] - r);
-		*high[i] = fmax(*high[i], at[i] + r);
+		*low[i] = fmin(*low[i], center[i] - r);
+		*high[i] = fmax(*high[i], center[i] + r);
 	}
 }
 
@@ -256,30 +257,30 @@ static void grow_sweep(struct sweep *w, const mat4 *m, double off)
 static void sweep_between(struct sweep *w, const struct motion_key *a, const struct motion_key *b, double begin,
 			  double end)
 {
-	double turned = 2 * a->angle * (end - begin), parts = fmax(ceil(turned / PART), 1);
+	double turned = 2 * a->half_angle * (end - begin), parts = fmax(ceil(turned / PART_ANGLE_MAX), 1);
 	double change[3][3], f = turned / parts;
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 3; k++)
 			change[i][k] = b->stretch[i][k] - a->stretch[i][k];
-	double q = w->far * fmax(norm3((const double(*)[3])a->stretch), norm3((const double(*)[3])b->stretch)),
-	       dq = w->far * norm3((const double(*)[3])change) * (end - begin) / parts;
-	double off = (f * f * q + 2 * f * dq) / 8;
+	double q = w->max_distance * fmax(norm3((const double(*)[3])a->stretch), norm3((const double(*)[3])b->stretch)),
+	       dq = w->max_distance * norm3((const double(*)[3])change) * (end - begin) / parts;
+	double margin = (f * f * q + 2 * f * dq) / 8;
 	for (int i = 0; i <= (int)parts; i++) {
-		mat4 m = mat4_mul(place_at(a, b, begin + (end - begin) * i / parts), *w->before);
-		grow_sweep(w, &m, off);
+		mat4 m = mat4_mul(interpolate_transform(a, b, begin + (end - begin) * i / parts), *w->pre_transform);
+		grow_sweep(w, &m, margin);
 	}
 }
 
 void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, vec3 *all_high)
 {
-	struct sweep w = {.before = &m->before,
+	struct sweep w = {.pre_transform = &m->pre_transform,
 			  .half = vec3_scale(0.5, vec3_sub(high, low)),
 			  .low = {INFINITY, INFINITY, INFINITY},
 			  .high = {-INFINITY, -INFINITY, -INFINITY}};
 	w.middle = vec3_add(low, w.half);
 	for (int k = 0; k < 8; k++) {
 		vec3 corner = {k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z};
-		w.far = fmax(w.far, vec3_length(mat4_point(&m->before, corner)));
+		w.max_distance = fmax(w.max_distance, vec3_length(mat4_point(&m->pre_transform, corner)));
 	}
 	if (m->count == 1)
 		sweep_between(&w, m->key, m->key, 0, 0);

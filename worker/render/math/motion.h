@@ -16,7 +16,7 @@
 /* An animation as in a scene: times ascend, all transforms have an inverse, and either all or none of them mirror. */
 struct keyframe {
 	double time;
-	mat4 place;
+	mat4 transform;
 };
 struct animation {
 	uint32_t count; /* at least 1 */
@@ -25,16 +25,16 @@ struct animation {
 
 struct motion_key {
 	double time;
-	double turn[4];	      /* R, a unit quaternion: w, x, y, z */
-	double angle;	      /* half the angle of the rotation to the next key, in [0, pi/2] */
+	double rotation[4];   /* R, a unit quaternion: w, x, y, z */
+	double half_angle;    /* half the angle of the rotation to the next key, in [0, pi/2] */
 	double stretch[3][3]; /* S */
-	vec3 at;
+	vec3 translation;
 };
 
 struct motion {
 	uint32_t count;
 	struct motion_key *key; /* times: 0 when the shutter opens, 1 when it closes */
-	mat4 before;		/* applied before the keys' transforms */
+	mat4 pre_transform;	/* applied before the keys' transforms */
 };
 
 /* Makes the motion from `open` to `close` from the keyframes that matter in this interval (if both are equal, those
@@ -43,7 +43,7 @@ bool motion_make(struct motion *m, const struct animation *a, double open, doubl
 /* Subtracts `center` from all positions, then multiplies lengths by `scale`. */
 void motion_rescale(struct motion *m, vec3 center, double scale);
 
-mat4 motion_at(const struct motion *m, double time);
+mat4 motion_transform_at(const struct motion *m, double time);
 /* Computes bounds of a moving box for all times from 0 to 1: not the tightest, but nothing leaves them. */
 void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, vec3 *all_high);
 

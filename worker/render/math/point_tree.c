@@ -3,7 +3,7 @@
 
 typedef struct point_tree_node node;
 
-static void exchange(node *a, node *b)
+static void swap_nodes(node *a, node *b)
 {
 	node t = *a;
 	*a = *b;
@@ -15,16 +15,16 @@ void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axi
 {
 	size_t low = 0, high = count - 1;
 	while (low < high) {
-		double pivot = vec3_along(nodes[low + (high - low) / 2].p, axis);
+		double pivot = vec3_component(nodes[low + (high - low) / 2].p, axis);
 		size_t i = low, j = high;
 		for (;;) {
-			while (vec3_along(nodes[i].p, axis) < pivot)
+			while (vec3_component(nodes[i].p, axis) < pivot)
 				i++;
-			while (vec3_along(nodes[j].p, axis) > pivot)
+			while (vec3_component(nodes[j].p, axis) > pivot)
 				j--;
 			if (i >= j)
 				break;
-			exchange(&nodes[i++], &nodes[j--]);
+			swap_nodes(&nodes[i++], &nodes[j--]);
 		}
 		if (middle <= j)
 			high = j;
@@ -34,13 +34,13 @@ void point_tree_partition(node *nodes, size_t count, size_t middle, unsigned axi
 }
 
 /* Builds a subtree. The axis changes from level to level; the middle node of a range divides it. */
-static void build(node *nodes, size_t count, unsigned axis)
+static void build_subtree(node *nodes, size_t count, unsigned axis)
 {
 	while (count > 1) {
 		size_t middle = count / 2;
 		point_tree_partition(nodes, count, middle, axis);
 		axis = (axis + 1) % 3;
-		build(nodes, middle, axis);
+		build_subtree(nodes, middle, axis);
 		nodes += middle + 1;
 		count -= middle + 1;
 	}
@@ -48,28 +48,28 @@ static void build(node *nodes, size_t count, unsigned axis)
 
 void point_tree_build(struct point_tree *t)
 {
-	build(t->nodes, t->count, 0);
+	build_subtree(t->nodes, t->count, 0);
 }
 
-struct search {
-	vec3 at;
+struct range_search {
+	vec3 center;
 	double radius;
-	void (*found)(void *user, uint32_t id);
+	void (*visit)(void *user, uint32_t id);
 	void *user;
 };
 
-static void search(const struct search *s, const node *nodes, size_t count, unsigned axis)
+static void search_subtree(const struct range_search *s, const node *nodes, size_t count, unsigned axis)
 {
 	while (count > 0) {
 		size_t middle = count / 2;
 		const node *m = &nodes[middle];
-		vec3 d = vec3_sub(m->p, s->at);
-		double across = vec3_along(d, axis);
+		vec3 d = vec3_sub(m->p, s->center);
+		double across = vec3_component(d, axis);
 		if (vec3_dot(d, d) <= s->radius * s->radius)
-			s->found(s->user, m->id);
+			s->visit(s->user, m->id);
 		axis = (axis + 1) % 3;
 		if (across >= -s->radius)
-			search(s, nodes, middle, axis);
+			search_subtree(s, nodes, middle, axis);
 		if (across > s->radius)
 			return;
 		nodes += middle + 1;
@@ -77,9 +77,9 @@ static void search(const struct search *s, const node *nodes, size_t count, unsi
 	}
 }
 
-void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
-		       void *user)
+void point_tree_visit_within(const struct point_tree *t, vec3 center, double radius,
+			     void (*visit)(void *user, uint32_t id), void *user)
 {
-	const struct search s = {at, radius, found, user};
-	search(&s, t->nodes, t->count, 0);
+	const struct range_search s = {center, radius, visit, user};
+	search_subtree(&s, t->nodes, t->count, 0);
 }

@@ -27,7 +27,7 @@ void point_tree_partition(struct point_tree_node *nodes, size_t count, size_t mi
  * nodes with finite positions. */
 void point_tree_build(struct point_tree *t);
 /* Calls `found` for each node at most `radius` away from `at`. */
-void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
-		       void *user);
+void point_tree_visit_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
+			     void *user);
 
 #endif

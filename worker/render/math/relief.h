@@ -22,20 +22,21 @@ struct relief_value {
 
 struct relief {
 	enum relief_kind kind;
-	void (*at)(const void *data, double u, double v, struct relief_value *out);
+	void (*eval)(const void *data, double u, double v, struct relief_value *out);
 	const void *data;
 	/* For RELIEF_NORMAL: y points against dp/dv instead of along n x dp/du, where the two differ. */
-	bool handed;
-	bool turns; /* normals that face away from the camera's side of a path are turned round, see path_facing() */
+	bool uses_handedness;
+	bool flips_invalid_normals; /* normals that face away from the camera's side of a path are turned round, see
+				       path_point_facing_camera() */
 };
 
 /*
  * Provides the shading frame that a point would have with the relief of one part of a material instead of the
  * surface's, in the coordinates of the point's present frame. r: NULL for no relief.
  */
-struct relief_place {
-	const void *point;						  /* argument of `frame` */
-	struct frame (*frame)(const void *point, const struct relief *r); /* NULL: the point is on no surface */
+struct relief_frames {
+	const void *context;						      /* argument of `get_frame` */
+	struct frame (*get_frame)(const void *point, const struct relief *r); /* NULL: the point is on no surface */
 };
 
 #endif

@@ -31,26 +31,26 @@ typedef struct {
 
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
-	bool grey; /* the scene has no colour: nm is undefined */
-	bool rgb;  /* the lanes are not wavelengths: nm is undefined */
-	double u;  /* the number from which nm was computed; 0 if grey or rgb */
+	bool is_grey; /* the scene has no colour: nm is undefined */
+	bool is_rgb;  /* the lanes are not wavelengths: nm is undefined */
+	double u;     /* the number from which nm was computed; 0 if grey or rgb */
 	/* 0: all wavelengths differ; 1 or 2: nm repeats after this many, for the same mean from fewer wavelengths. */
-	unsigned few;
+	unsigned period;
 };
 
 /* See EFFECT_IS_ON in worker/render/world/world.h. */
 #ifdef HSLT_PLAIN
 #define WAVELENGTHS_GREY(w) ((void)(w), true)
 #else
-#define WAVELENGTHS_GREY(w) ((w)->grey)
+#define WAVELENGTHS_GREY(w) ((w)->is_grey)
 #endif
 
-static inline spectrum spectrum_of(double x)
+static inline spectrum spectrum_constant(double x)
 {
 	return (spectrum){{x, x, x, x}};
 }
 
-static inline spectrum spectrum_of_rgb(const double rgb[3])
+static inline spectrum spectrum_from_rgb(const double rgb[3])
 {
 	return (spectrum){{rgb[0], rgb[1], rgb[2], rgb[1]}};
 }
@@ -70,7 +70,7 @@ static inline spectrum spectrum_mul(spectrum a, spectrum b)
 }
 
 /* Returns the transmittance of an optical depth. */
-static inline spectrum spectrum_attenuation(spectrum depth)
+static inline spectrum spectrum_transmittance(spectrum depth)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		depth.v[i] = exp(-depth.v[i]);
@@ -122,7 +122,7 @@ double wavelength_pdf(double nm);
 /* Returns the four wavelengths described above for u in [0,1). */
 struct wavelengths wavelengths_sample(double u);
 /* Returns 1, 2 or 4 wavelengths, spaced evenly in the cumulative distribution. */
-struct wavelengths wavelengths_sample_few(double u, unsigned count);
+struct wavelengths wavelengths_sample_distinct(double u, unsigned count);
 
 /* Fills all lanes by repeating the first `lanes`. */
 static inline spectrum spectrum_repeat(spectrum s, int lanes)

@@ -61,7 +61,7 @@ static inline double vec3_angle(vec3 a, vec3 b)
 }
 
 /* Returns the coordinate along axis 0, 1 or 2. */
-static inline double vec3_along(vec3 v, unsigned axis)
+static inline double vec3_component(vec3 v, unsigned axis)
 {
 	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }

@@ -21,10 +21,10 @@ int emission_create(struct emission *g, const struct scene_node *n, const struct
 		    const struct volume_build *build, struct error *e);
 
 double emission_max(const struct emission *g); /* upper bound over positions and wavelengths; radiance / length */
-enum color_shape emission_shape(const struct emission *g);
+enum color_kind emission_color_kind(const struct emission *g);
 
 /* Returns the emission (radiance / length) of a radiance without a grid, which is the same everywhere. */
-spectrum emission_even(const struct emission *g, const struct wavelengths *w);
+spectrum emission_constant(const struct emission *g, const struct wavelengths *w);
 
 /* Samples a position *t on a segment of a ray for u in [0,1), in proportion to the emission. *l: the radiance per
  * length there over the density per length. Returns false if the segment emits nothing or is infinite. */

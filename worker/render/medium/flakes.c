@@ -8,13 +8,13 @@
 #include <string.h>
 
 /* The largest number of a matrix, which is a squared area; and the smallest trace of a matrix that is not 0. */
-#define LARGEST 1e12
-#define SMALLEST 1e-30
+#define NUMBER_MAX 1e12
+#define TRACE_MIN 1e-30
 /* An eigenvalue may be negative by this share of the trace, owing to rounding in matrices stored as bytes. */
-#define ROUNDED 0.01
+#define ROUNDING_TOLERANCE 0.01
 
 /* Returns the smallest eigenvalue, in closed form (Smith 1961, Eigenvalues of a Symmetric 3 x 3 Matrix). */
-static double least_eigenvalue(const double s[FLAKES_NUMBERS])
+static double min_eigenvalue(const double s[FLAKES_NUMBERS])
 {
 	double mean = (s[0] + s[1] + s[2]) / 3, x = s[0] - mean, y = s[1] - mean, z = s[2] - mean;
 	double p2 = (x * x + y * y + z * z + 2 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5])) / 6, p = sqrt(p2);
@@ -25,25 +25,25 @@ static double least_eigenvalue(const double s[FLAKES_NUMBERS])
 	return mean + 2 * p * cos(acos(cosine) / 3 + 2 * M_PI / 3);
 }
 
-/* Raises the eigenvalues of a matrix to at least FLAKES_LEAST times the trace. Returns false if the matrix is not
- * positive definite even within rounding. */
+/* Raises the eigenvalues of a matrix to at least FLAKES_EIGENVALUE_MIN times the trace. Returns false if the matrix is
+ * not positive definite even within rounding. */
 static bool make_definite(double s[FLAKES_NUMBERS])
 {
 	double trace = s[0] + s[1] + s[2];
 	if (trace == 0)
 		return s[0] == 0 && s[1] == 0 && s[3] == 0 && s[4] == 0 && s[5] == 0;
-	if (!(trace >= SMALLEST))
+	if (!(trace >= TRACE_MIN))
 		return false;
 	double scaled[FLAKES_NUMBERS];
 	for (int i = 0; i < FLAKES_NUMBERS; i++)
 		scaled[i] = s[i] / trace;
-	double least = least_eigenvalue(scaled);
-	for (int i = 0; i < 3 && least < FLAKES_LEAST; i++)
-		s[i] += (FLAKES_LEAST - least) * trace;
-	return least >= -ROUNDED;
+	double min_share = min_eigenvalue(scaled);
+	for (int i = 0; i < 3 && min_share < FLAKES_EIGENVALUE_MIN; i++)
+		s[i] += (FLAKES_EIGENVALUE_MIN - min_share) * trace;
+	return min_share >= -ROUNDING_TOLERANCE;
 }
 
-static int refuse(const struct scene_node *n, const double s[FLAKES_NUMBERS], struct error *e)
+static int refuse_matrix(const struct scene_node *n, const double s[FLAKES_NUMBERS], struct error *e)
 {
 	return node_error(n, e, EINVAL,
 			  "S: the matrix %g %g %g, %g %g %g (xx yy zz, xy xz yz) is not positive definite", s[0], s[1],
@@ -51,8 +51,8 @@ static int refuse(const struct scene_node *n, const double s[FLAKES_NUMBERS], st
 }
 
 /* Splits six channels into two grids of three. */
-static int split(struct flakes *f, const struct scene_node *n, const struct grid_file *file, struct arena *arena,
-		 struct error *e)
+static int split_channels(struct flakes *f, const struct scene_node *n, const struct grid_file *file,
+			  struct arena *arena, struct error *e)
 {
 	size_t count = (size_t)file->size[0] * file->size[1] * file->size[2];
 	float *part[2];
@@ -64,7 +64,7 @@ static int split(struct flakes *f, const struct scene_node *n, const struct grid
 		for (int k = 0; k < FLAKES_NUMBERS; k++)
 			s[k] = (double)file->value[FLAKES_NUMBERS * i + (size_t)k];
 		if (!make_definite(s))
-			return refuse(n, s, e);
+			return refuse_matrix(n, s, e);
 		for (int k = 0; k < FLAKES_NUMBERS; k++)
 			part[k / 3][3 * i + (size_t)k % 3] = (float)s[k];
 	}
@@ -74,53 +74,54 @@ static int split(struct flakes *f, const struct scene_node *n, const struct grid
 static int read_grid(struct flakes *f, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	struct grid_file file;
-	struct arena room = {.limit = build->arena->limit};
-	int rc = grid_file_read(n, build->assets, FLAKES_NUMBERS, &room, &file, e);
-	if (!rc && !(file.least >= -LARGEST && file.largest <= LARGEST))
-		rc = node_error(n, e, ERANGE, "S: its values go from %g to %g; [-%g, %g] is supported", file.least,
-				file.largest, LARGEST, LARGEST);
+	struct arena scratch = {.limit = build->arena->limit};
+	int rc = grid_file_read(n, build->assets, FLAKES_NUMBERS, &scratch, &file, e);
+	if (!rc && !(file.min_value >= -NUMBER_MAX && file.max_value <= NUMBER_MAX))
+		rc = node_error(n, e, ERANGE, "S: its values go from %g to %g; [-%g, %g] is supported", file.min_value,
+				file.max_value, NUMBER_MAX, NUMBER_MAX);
 	file.channels = 3;
-	file.full = NULL;
+	file.occupied_bricks = NULL;
 	if (!rc)
-		rc = volume_grid(&f->grid[0], n, &file, build, e);
+		rc = volume_make_grid(&f->grid[0], n, &file, build, e);
 	if (!rc) {
 		f->grid[1] = f->grid[0];
-		rc = split(f, n, &file, build->arena, e);
+		rc = split_channels(f, n, &file, build->arena, e);
 	}
-	f->uneven = !rc && (file.size[0] > 1 || file.size[1] > 1 || file.size[2] > 1);
+	f->has_grid = !rc && (file.size[0] > 1 || file.size[1] > 1 || file.size[2] > 1);
 	for (int k = 0; k < FLAKES_NUMBERS && !rc; k++)
-		f->even[k] = (double)f->grid[k / 3].value[k % 3];
-	arena_fini(&room);
+		f->constant[k] = (double)f->grid[k / 3].value[k % 3];
+	arena_fini(&scratch);
 	return rc;
 }
 
 int flakes_create(struct flakes *f, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
-	const struct property *p = node_find(n, "S");
+	const struct property *p = node_find_property(n, "S");
 	const struct scene_node *inner = p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
-	*f = (struct flakes){.uneven = false};
+	*f = (struct flakes){.has_grid = false};
 	if (!inner)
 		return node_error(n, e, EINVAL, "needs a volume `S`");
 	if (strcmp(inner->type, "gridvolume") == 0)
 		return read_grid(f, inner, build, e);
-	p = node_find(inner, "value");
+	p = node_find_property(inner, "value");
 	const char *text = p && p->value.type == VALUE_STRING ? p->value.as.string : "";
-	if (number_list(text, f->even, FLAKES_NUMBERS) != FLAKES_NUMBERS)
+	if (number_parse_list(text, f->constant, FLAKES_NUMBERS) != FLAKES_NUMBERS)
 		return node_error(inner, e, EINVAL,
 				  "S: needs six numbers (xx yy zz, xy xz yz), as a string `value` or the channels of a "
 				  "gridvolume");
 	for (int k = 0; k < FLAKES_NUMBERS; k++)
-		if (!(fabs(f->even[k]) <= LARGEST))
-			return node_error(inner, e, ERANGE, "S: %g is outside [-%g, %g]", f->even[k], LARGEST, LARGEST);
-	return make_definite(f->even) ? 0 : refuse(inner, f->even, e);
+		if (!(fabs(f->constant[k]) <= NUMBER_MAX))
+			return node_error(inner, e, ERANGE, "S: %g is outside [-%g, %g]", f->constant[k], NUMBER_MAX,
+					  NUMBER_MAX);
+	return make_definite(f->constant) ? 0 : refuse_matrix(inner, f->constant, e);
 }
 
-void flakes_at(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS])
+void flakes_eval(const struct flakes *f, vec3 position, double s[FLAKES_NUMBERS])
 {
-	if (!f->uneven) {
-		memcpy(s, f->even, sizeof f->even);
+	if (!f->has_grid) {
+		memcpy(s, f->constant, sizeof f->constant);
 		return;
 	}
-	grid_at(&f->grid[0], at, s);
-	grid_at(&f->grid[1], at, s + 3);
+	grid_eval(&f->grid[0], position, s);
+	grid_eval(&f->grid[1], position, s + 3);
 }

@@ -12,11 +12,11 @@ enum { FLAKES_NUMBERS = 6 };
 
 /* The smallest eigenvalue of a matrix is raised to this share of its trace, which gives flakes a roughness of at least
  * 0.001. */
-#define FLAKES_LEAST 1e-6
+#define FLAKES_EIGENVALUE_MIN 1e-6
 
 struct flakes {
-	double even[FLAKES_NUMBERS]; /* the matrix at all places, unless uneven */
-	bool uneven;
+	double constant[FLAKES_NUMBERS]; /* the matrix at all places, unless uneven */
+	bool has_grid;
 	struct grid grid[2]; /* if uneven, two grids of three channels: see struct grid.area */
 };
 
@@ -26,6 +26,6 @@ struct flakes {
 int flakes_create(struct flakes *f, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 /* Computes the matrix at a point of the world. */
-void flakes_at(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS]);
+void flakes_eval(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS]);
 
 #endif

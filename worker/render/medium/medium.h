@@ -14,13 +14,13 @@
 #include "worker/render/volume/volume.h"
 
 struct medium {
-	struct volume first, second; /* sigma_a and sigma_s; if by_albedo, sigma_t and albedo */
-	bool by_albedo;		     /* if not, neither volume varies in space */
+	struct volume first, second; /* sigma_a and sigma_s; if uses_albedo, sigma_t and albedo */
+	bool uses_albedo;	     /* if not, neither volume varies in space */
 	bool absorbs, scatters;	     /* false: sigma_a or sigma_s is 0; if `second` varies, both are equal */
-	double forward;	   /* `g` of 0.6: the share of sigma_s that is neglected, as light that goes straight on */
-	double per_length; /* factor of the coefficients; 1 / length */
+	double forward_share; /* `g` of 0.6: the share of sigma_s that is neglected, as light that goes straight on */
+	double per_length;    /* factor of the coefficients; 1 / length */
 	struct phase phase;
-	bool shines;
+	bool is_emissive;
 	struct emission emission;
 };
 
@@ -29,15 +29,16 @@ extern const struct plugin_decl medium_decls[]; /* ends with a NULL type */
 /* Looks up the coefficients of the measured material `name` (measured_media.h) with the scale of Mitsuba 0.6. reduced:
  * multiply sigma_s by one minus the mean cosine, for an isotropic phase function. -EINVAL if there is no such material;
  * the error names n. */
-int medium_measured(const struct scene_node *n, const char *name, bool reduced, double sigma_a[3], double sigma_s[3],
-		    struct error *e);
+int medium_look_up_measured(const struct scene_node *n, const char *name, bool reduced, double sigma_a[3],
+			    double sigma_s[3], struct error *e);
 /* Creates the medium of node n. Returns 0 or a negative error code. */
 int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 /* Gives m the emission of the emitter n. Returns 0 or a negative error code: see emission_create(). */
-int medium_light(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
+int medium_set_emission(struct medium *m, const struct scene_node *n, const struct volume_build *build,
+			struct error *e);
 
-bool medium_is_coloured(const struct medium *m); /* whether its coefficients vary with wavelength */
+bool medium_is_colored(const struct medium *m); /* whether its coefficients vary with wavelength */
 
 /* Returns sigma_s (1 / length) at p for light that travels along the unit vector d or -d, without the share that the
  * phase function absorbs. */
@@ -51,11 +52,12 @@ struct medium_lanes {
 	spectrum sigma_t[GRID_CHANNELS_MAX]; /* extinction where channel k of the grid is 1, and the others are 0 */
 };
 
-struct medium_lanes medium_at(const struct medium *m, vec3 d, const struct wavelengths *w);
+struct medium_lanes medium_lanes_along(const struct medium *m, vec3 d, const struct wavelengths *w);
 /* Returns the optical depth of a segment of a ray along d or -d. */
-spectrum medium_depth(const struct medium_lanes *m, const struct grid_ray *r);
+spectrum medium_optical_depth(const struct medium_lanes *m, const struct grid_ray *r);
 /* Returns the t at which the optical depth at one wavelength, `lane`, reaches `least`, and the depth up to t at all
  * wavelengths. If it does not reach `least` before t1, returns INFINITY and the depth of the whole segment. */
-double medium_reach(const struct medium_lanes *m, const struct grid_ray *r, int lane, double least, spectrum *depth);
+double medium_invert_depth(const struct medium_lanes *m, const struct grid_ray *r, int lane, double least,
+			   spectrum *depth);
 
 #endif

@@ -25,21 +25,22 @@ int phase_create(struct phase *p, const struct scene_node *n, const struct volum
 	return p->ops->create ? p->ops->create(p, n, build, e) : 0;
 }
 
-double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
+double phase_eval(const struct phase *p, vec3 position, vec3 wo, vec3 wi)
 {
-	return p->ops->eval_flakes ? p->ops->eval_flakes(p, at, wo, wi) : p->ops->eval(p, at, -vec3_dot(wo, wi));
+	return p->ops->eval_flakes ? p->ops->eval_flakes(p, position, wo, wi)
+				   : p->ops->eval(p, position, -vec3_dot(wo, wi));
 }
 
-vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf)
+vec3 phase_sample(const struct phase *p, vec3 position, vec3 wo, const double u[2], double *pdf)
 {
 	if (p->ops->sample_flakes) {
-		vec3 wi = p->ops->sample_flakes(p, at, wo, u);
-		*pdf = p->ops->eval_flakes(p, at, wo, wi);
+		vec3 wi = p->ops->sample_flakes(p, position, wo, u);
+		*pdf = p->ops->eval_flakes(p, position, wo, wi);
 		return wi;
 	}
 	struct frame straight = frame_around(vec3_neg(wo));
-	double cosine = fmin(fmax(p->ops->sample(p, at, u[0]), -1), 1), phi = 2 * M_PI * u[1];
+	double cosine = fmin(fmax(p->ops->sample(p, position, u[0]), -1), 1), phi = 2 * M_PI * u[1];
 	double sine = sqrt((1 - cosine) * (1 + cosine));
-	*pdf = p->ops->eval(p, at, cosine);
+	*pdf = p->ops->eval(p, position, cosine);
 	return frame_to_world(&straight, (vec3){sine * cos(phi), sine * sin(phi), cosine});
 }

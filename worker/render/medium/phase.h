@@ -18,8 +18,8 @@ struct phase_ops {
 	struct plugin_decl decl;
 	/* NULL: the plug-in has no parameters */
 	int (*create)(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e);
-	/* Returns the value (1/sr) at the point `at`; its integral over the sphere is 1. cosine: of the angle between
-	 * the directions before and after scattering, 1 if light goes straight on. */
+	/* Returns the value (1/sr) at the point `position`; its integral over the sphere is 1. cosine: of the angle
+	 * between the directions before and after scattering, 1 if light goes straight on. */
 	double (*eval)(const struct phase *p, vec3 at, double cosine);
 	/* Samples a cosine for u in [0,1); its density is exactly 2 pi times that value. */
 	double (*sample)(const struct phase *p, vec3 at, double u);
@@ -34,7 +34,7 @@ struct phase_ops {
 struct phase {
 	const struct phase_ops *ops;
 	double g;		     /* mean cosine of hg */
-	double absorbed;	     /* share of scattered light that is absorbed instead; eval does not include it */
+	double absorbed_share;	     /* share of scattered light that is absorbed instead; eval does not include it */
 	const void *data;	     /* data of the plug-in */
 	const struct flakes *flakes; /* microflakes (flakes.h); otherwise NULL */
 };
@@ -44,15 +44,15 @@ extern const struct phase_ops *const phase_registry[]; /* ends with NULL */
 /* Creates the phase function of node n, or the isotropic one if n is NULL. Returns 0 or a negative error code. */
 int phase_create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
-/* Evaluate and sample the phase function at the point `at`. wo and wi are unit vectors that both point away from it.
- * *pdf: density of wi (solid angle), which is the value of the function. */
+/* Evaluate and sample the phase function at the point `position`. wo and wi are unit vectors that both point away from
+ * it. *pdf: density of wi (solid angle), which is the value of the function. */
 double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi);
 vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf);
 
 /* Returns the factor of the extinction along w. */
-static inline double phase_area(const struct phase *p, vec3 at, vec3 w)
+static inline double phase_area(const struct phase *p, vec3 position, vec3 w)
 {
-	return p->ops->area ? p->ops->area(p, at, w) : 1;
+	return p->ops->area ? p->ops->area(p, position, w) : 1;
 }
 
 #endif

@@ -15,11 +15,11 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 	int rc = phase_parts_create(p, &m, n, build, e);
 	if (!rc)
 		rc = volume_from_node(&weight, n, "weight", 0.5, COLOR_REFLECTANCE, false, build, e);
-	if (!rc && volume_is_coloured(&weight))
+	if (!rc && volume_is_colored(&weight))
 		rc = node_error(n, e, ENOTSUP, "weight: is a colour; it must be the same at all wavelengths");
 	if (rc)
 		return rc;
-	m->second = weight.grid;
+	m->second_weight = weight.grid;
 	m->weight[1] = volume_max(&weight);
 	m->weight[0] = 1 - m->weight[1];
 	return 0;
@@ -27,7 +27,7 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 
 const struct phase_ops phase_ops_blendphase = {
 	.decl = {PLUGIN_PHASE, "blendphase",
-		 PARAMS({"weight", VALUE_VOLUME | VALUE_CLIPPED, PARAM_UNDERSTOOD, 0, 1, NULL}), 1u << PLUGIN_PHASE,
+		 PARAMS({"weight", VALUE_VOLUME | VALUE_CLAMPED, PARAM_UNDERSTOOD, 0, 1, NULL}), 1u << PLUGIN_PHASE,
 		 PARAM_UNDERSTOOD},
 	.create = create,
 	.eval = phase_parts_eval,

@@ -15,16 +15,16 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 	return 0;
 }
 
-static double eval(const struct phase *p, vec3 at, double cosine)
+static double eval(const struct phase *p, vec3 position, double cosine)
 {
-	(void)at;
+	(void)position;
 	double g = p->g, square = (1 - g) * (1 - g) + 2 * g * (1 - cosine); /* 1 + g^2 - 2 g c */
 	return (1 - g) * (1 + g) / (4 * M_PI * square * sqrt(square));
 }
 
-static double sample(const struct phase *p, vec3 at, double u)
+static double sample(const struct phase *p, vec3 position, double u)
 {
-	(void)at;
+	(void)position;
 	double g = p->g, s = 2 * u - 1, d = 1 + g * s;
 	return (2 * s + g * (s * s + 3) + 2 * g * g * s + g * g * g * (s * s - 1)) / (2 * d * d);
 }

@@ -4,15 +4,15 @@
 
 #include <math.h>
 
-static double eval(const struct phase *p, vec3 at, double cosine)
+static double eval(const struct phase *p, vec3 position, double cosine)
 {
-	(void)p, (void)at, (void)cosine;
+	(void)p, (void)position, (void)cosine;
 	return 1 / (4 * M_PI);
 }
 
-static double sample(const struct phase *p, vec3 at, double u)
+static double sample(const struct phase *p, vec3 position, double u)
 {
-	(void)p, (void)at;
+	(void)p, (void)position;
 	return 2 * u - 1;
 }
 

@@ -18,7 +18,7 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 		return rc;
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
-	if (number_weights(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
+	if (number_parse_weights(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
 		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weight%s, one for each phase function", text,
 				  m->count, m->count == 1 ? "" : "s");
 	for (uint32_t k = 0; k < m->count; k++) {
@@ -30,7 +30,8 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
 	for (uint32_t k = 0; k < m->count; k++)
 		m->weight[k] /= sum;
-	p->absorbed = 1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not if only rounding errors are missing */
+	p->absorbed_share =
+		1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not if only rounding errors are missing */
 	return 0;
 }
 

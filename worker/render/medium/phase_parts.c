@@ -17,7 +17,7 @@ int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct
 	for (uint32_t k = 0; k < count; k++) {
 		const struct scene_node *inner = node_child(n, PLUGIN_PHASE, k);
 		int rc = phase_create(&made->part[k], inner, build, e);
-		if (!rc && made->part[k].absorbed > 0)
+		if (!rc && made->part[k].absorbed_share > 0)
 			rc = node_error(inner, e, ENOTSUP,
 					"its weights must add up to 1 inside another phase function");
 		if (!rc && made->part[k].ops->area)
@@ -30,38 +30,38 @@ int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct
 	return 0;
 }
 
-/* Returns the weights of the parts at a point: the fixed ones, or those of the grid, stored in `room`. */
-static const double *weights_at(const struct phase_parts *m, vec3 at, double room[2])
+/* Returns the weights of the parts at a point: the fixed ones, or those of the grid, stored in `storage`. */
+static const double *weights_at(const struct phase_parts *m, vec3 position, double storage[2])
 {
 	double value[GRID_CHANNELS_MAX];
-	if (!m->second)
+	if (!m->second_weight)
 		return m->weight;
-	grid_at(m->second, at, value);
-	room[1] = fmin(fmax(value[0], 0), 1); /* interpolated values may exceed 1 by a rounding error */
-	room[0] = 1 - room[1];
-	return room;
+	grid_eval(m->second_weight, position, value);
+	storage[1] = fmin(fmax(value[0], 0), 1); /* interpolated values may exceed 1 by a rounding error */
+	storage[0] = 1 - storage[1];
+	return storage;
 }
 
-double phase_parts_eval(const struct phase *p, vec3 at, double cosine)
+double phase_parts_eval(const struct phase *p, vec3 position, double cosine)
 {
 	const struct phase_parts *m = p->data;
-	double room[2], sum = 0;
-	const double *weight = weights_at(m, at, room);
+	double storage[2], sum = 0;
+	const double *weight = weights_at(m, position, storage);
 	for (uint32_t k = 0; k < m->count; k++)
-		sum += weight[k] * m->part[k].ops->eval(&m->part[k], at, cosine);
+		sum += weight[k] * m->part[k].ops->eval(&m->part[k], position, cosine);
 	return sum;
 }
 
 /* u chooses the part; rescaled to [0,1), it then serves as the random number of that part. */
-double phase_parts_sample(const struct phase *p, vec3 at, double u)
+double phase_parts_sample(const struct phase *p, vec3 position, double u)
 {
 	const struct phase_parts *m = p->data;
-	double room[2];
-	const double *weight = weights_at(m, at, room);
+	double storage[2];
+	const double *weight = weights_at(m, position, storage);
 	uint32_t k = 0, last = m->count - 1;
 	while (last > 0 && !(weight[last] > 0)) /* rounding may leave u beyond all weights above 0 */
 		last--;
 	while (k < last && u >= weight[k])
 		u -= weight[k++];
-	return m->part[k].ops->sample(&m->part[k], at, fmin(u / weight[k], 1 - 0x1p-53));
+	return m->part[k].ops->sample(&m->part[k], position, fmin(u / weight[k], 1 - 0x1p-53));
 }

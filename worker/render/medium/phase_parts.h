@@ -15,7 +15,7 @@ struct phase_parts {
 	uint32_t count;
 	struct phase part[PHASE_PARTS_MAX];
 	double weight[PHASE_PARTS_MAX];
-	const struct grid *second; /* for two parts, the weight of the second; NULL: `weight` holds everywhere */
+	const struct grid *second_weight; /* for two parts, the weight of the second; NULL: `weight` holds everywhere */
 };
 
 /* Creates the parts from the phase functions nested in n, without weights, and sets p->data to them. Returns 0, or

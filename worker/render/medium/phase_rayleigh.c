@@ -7,15 +7,15 @@
 
 #include <math.h>
 
-static double eval(const struct phase *p, vec3 at, double cosine)
+static double eval(const struct phase *p, vec3 position, double cosine)
 {
-	(void)p, (void)at;
+	(void)p, (void)position;
 	return 3 / (16 * M_PI) * (1 + cosine * cosine);
 }
 
-static double sample(const struct phase *p, vec3 at, double u)
+static double sample(const struct phase *p, vec3 position, double u)
 {
-	(void)p, (void)at;
+	(void)p, (void)position;
 	return 2 * sinh(asinh(4 * u - 2) / 3);
 }
 

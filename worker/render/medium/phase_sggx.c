@@ -29,15 +29,15 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 }
 
 /* The lower triangular matrix L, from the Cholesky decomposition of S. */
-struct root {
+struct cholesky_factor {
 	double xx, yx, yy, zx, zy, zz;
 };
 
 /* Computes L at a point. Returns false if there are no flakes. */
-static bool root_at(const struct phase *p, vec3 at, struct root *l)
+static bool cholesky_factor_at(const struct phase *p, vec3 position, struct cholesky_factor *l)
 {
 	double s[FLAKES_NUMBERS];
-	flakes_at(p->flakes, at, s);
+	flakes_eval(p->flakes, position, s);
 	if (!(s[0] + s[1] + s[2] > 1e-60))
 		return false;
 	l->xx = sqrt(s[0]);
@@ -49,50 +49,50 @@ static bool root_at(const struct phase *p, vec3 at, struct root *l)
 	return true;
 }
 
-static vec3 times_transposed(const struct root *l, vec3 w)
+static vec3 multiply_transposed(const struct cholesky_factor *l, vec3 w)
 {
 	return (vec3){l->xx * w.x + l->yx * w.y + l->zx * w.z, l->yy * w.y + l->zy * w.z, l->zz * w.z};
 }
 
-static double distribution(const struct root *l, vec3 m)
+static double normal_density(const struct cholesky_factor *l, vec3 m)
 {
 	double x = m.x / l->xx, y = (m.y - l->yx * x) / l->yy, z = (m.z - l->zx * x - l->zy * y) / l->zz,
 	       square = x * x + y * y + z * z;
 	return 1 / (M_PI * l->xx * l->yy * l->zz * square * square);
 }
 
-static double eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
+static double eval(const struct phase *p, vec3 position, vec3 wo, vec3 wi)
 {
-	struct root l;
+	struct cholesky_factor l;
 	vec3 h = vec3_add(wo, wi);
 	double length = vec3_length(h);
-	if (!root_at(p, at, &l))
+	if (!cholesky_factor_at(p, position, &l))
 		return 0;
 	/* If light goes straight on, any flake parallel to the ray may have scattered it: choose one of these. */
 	h = length > 0 ? vec3_scale(1 / length, h) : frame_around(wo).s;
-	return distribution(&l, h) / (4 * vec3_length(times_transposed(&l, wo)));
+	return normal_density(&l, h) / (4 * vec3_length(multiply_transposed(&l, wo)));
 }
 
-static vec3 sample(const struct phase *p, vec3 at, vec3 wo, const double u[2])
+static vec3 sample(const struct phase *p, vec3 position, vec3 wo, const double u[2])
 {
-	struct root l;
-	if (!root_at(p, at, &l))
+	struct cholesky_factor l;
+	if (!cholesky_factor_at(p, position, &l))
 		return vec3_neg(wo);
-	struct frame around = frame_around(vec3_normalize(times_transposed(&l, wo)));
+	struct frame around = frame_around(vec3_normalize(multiply_transposed(&l, wo)));
 	double r = sqrt(u[0]), phi = 2 * M_PI * u[1];
 	vec3 n = frame_to_world(&around, (vec3){r * cos(phi), r * sin(phi), sqrt(1 - u[0])});
 	vec3 m = vec3_normalize((vec3){l.xx * n.x, l.yx * n.x + l.yy * n.y, l.zx * n.x + l.zy * n.y + l.zz * n.z});
 	return vec3_normalize(vec3_madd(vec3_neg(wo), 2 * vec3_dot(wo, m), m));
 }
 
-static double area(const struct phase *p, vec3 at, vec3 w)
+static double area(const struct phase *p, vec3 position, vec3 w)
 {
-	struct root l;
-	return root_at(p, at, &l) ? vec3_length(times_transposed(&l, w)) : 0;
+	struct cholesky_factor l;
+	return cholesky_factor_at(p, position, &l) ? vec3_length(multiply_transposed(&l, w)) : 0;
 }
 
 const struct phase_ops phase_ops_sggx = {
-	.decl = PLUGIN(PHASE, "sggx", {"S", UNDERSTOOD(VALUE_NODE | VALUE_IN_SPACE)}),
+	.decl = PLUGIN(PHASE, "sggx", {"S", UNDERSTOOD(VALUE_NODE | VALUE_IS_VOLUME)}),
 	.create = create,
 	.eval_flakes = eval,
 	.sample_flakes = sample,

@@ -14,11 +14,11 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				 struct move *move)
+static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				    const struct mutation_forced_choice *forced, struct full_path *x,
+				    struct full_path *y, struct move *move)
 {
-	(void)self, (void)how;
+	(void)self, (void)forced;
 	struct path_context *c = m->path;
 	struct ensemble candidates;
 	struct sampler_random s;
@@ -29,11 +29,11 @@ static enum proposal_end propose(const struct mutation_ops *self, struct mutatio
 	if (x->edges > 0) {
 		double v[4];
 		mutation_random(m, BLOCK_AROUND, v);
-		sampler_random_init(&s, m->seed, RNG_AROUND, m->chain, m->step);
-		ensemble_around(c, &s.base, x, v, &candidates);
+		sampler_random_init(&s, m->seed, RNG_BIDIRECTIONAL_MUTATION, m->chain, m->step);
+		ensemble_draw_containing(c, &s.base, x, v, &candidates);
 		move->log_density[Y_TO_X] = -log(candidates.total);
 	}
-	const struct ensemble_lengths n = ensemble_lengths_of(c, r, 1, 1);
+	const struct ensemble_lengths n = ensemble_draw_lengths(c, r, 1, 1);
 	sampler_random_init(&s, m->seed, RNG_CHAIN, m->chain, m->step);
 	ensemble_draw(c, &s.base, &n, &candidates);
 	if (!ensemble_choose(c, &candidates, u[0], y))
@@ -53,11 +53,11 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 /* The cost of this mutation grows with the length of sub-paths, whereas that of a walk hardly does; it pays if it gets
  * about a third of the time. Its cost relative to hslt's, and the weights with the least error at equal time: 2.8 and
  * 0.15 to 0.4 in displaced (at most 12 edges), 4 and 0.1 in the demo (16), 12.5 and 0.01 to 0.06 in veach-door (33). */
-static double useful(const struct render_summary *scene)
+static double default_weight(const struct render_summary *scene)
 {
-	const double pays = 2.4, least = 0.05, most = 0.3;
-	if (render_effect_on(scene, "half-vectors"))
-		return fmin(fmax(pays / scene->useful_depth, least), most);
+	const double weight_times_depth = 2.4, min_weight = 0.05, max_weight = 0.3;
+	if (render_effect_is_on(scene, "half-vectors"))
+		return fmin(fmax(weight_times_depth / scene->useful_depth, min_weight), max_weight);
 	/* It costs ten times as much as `rejoin`: with half the weight, cornell-box has 20 % less relMSE x time. */
 	return 0.05;
 }
@@ -66,7 +66,7 @@ const struct mutation_ops mutation_bidirectional = {
 	.name = "bidirectional",
 	.summary = "a new path, one of those formed by a pair of sub-paths",
 	.independent = true,
-	.useful = useful,
+	.default_weight = default_weight,
 	.propose = propose,
 	.log_weight = log_weight,
 };

@@ -32,7 +32,7 @@
  * scenes the number is drawn afresh, because all wavelengths are equally good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
-bool breakup_allows(const struct full_path *x, unsigned b, unsigned c)
+bool breakup_is_allowed(const struct full_path *x, unsigned b, unsigned c)
 {
 	unsigned k = x->edges;
 	if (b > k || (b > 0 && b < k && x->v[b].delta))
@@ -54,12 +54,12 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 }
 
 /* Whether a vertex that stays would have to move for another wavelength, so that the wavelength must be kept. */
-static bool holds_wavelength(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
+static bool must_keep_wavelength(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
 		return false;
 	for (unsigned j = 1; j < c_end; j++)
-		if (x->v[j].delta && x->v[j].bsdf->dispersive)
+		if (x->v[j].delta && x->v[j].bsdf->is_dispersive)
 			return true;
 	return false;
 }
@@ -68,15 +68,15 @@ static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, stru
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
+	struct emitter_storage storage;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &storage);
 	struct emitter_point p = world_emitter_point(&v->x);
 	double u[2], r[4], pdf;
-	p.infinite = v->kind == VERTEX_INFINITE;
+	p.is_infinite = v->kind == VERTEX_INFINITE;
 	move->log_density[Y_TO_X] += log(em->ops->pdf_point(em, &p));
 	em->ops->point_inverse(em, &p, u);
 	mutation_random(m, BLOCK_VERTEX, r);
-	if (!mutation_step_square(u, r, EMITTER_STEP))
+	if (!mutation_step_in_square(u, r, EMITTER_STEP))
 		return false;
 	if (!em->ops->sample_point(em, u, &p, &pdf) || !(pdf > 0))
 		return false;
@@ -85,9 +85,9 @@ static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, stru
 	return true;
 }
 
-static enum proposal_end reason_of(enum walk_end end)
+static enum proposal_result result_of_walk(enum walk_result result)
 {
-	switch (end) {
+	switch (result) {
 	case WALK_OK:
 		return PROPOSAL_MADE;
 	case WALK_MISSED:
@@ -106,7 +106,7 @@ static enum proposal_end reason_of(enum walk_end end)
 	return PROPOSAL_ITERATIONS;
 }
 
-static double tolerance_of(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
+static double halfvec_tolerance(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
 {
 	if (v->delta)
 		return WALK_SPECULAR_TOLERANCE;
@@ -114,29 +114,29 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 }
 
 /* Draws the steps of the half vectors and sets their targets. */
-static void set_targets(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x)
+static void set_targets(struct mutation_ctx *m, const struct breakup *breakup, const struct full_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
-	for (unsigned j = how->c + 1; j < how->b; j++) {
+	for (unsigned j = breakup->c + 1; j < breakup->b; j++) {
 		struct walk_target *t = &s->target[j];
 		s->dh[j] = (vec2){0, 0};
-		t->tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
-		t->h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
-		if (x->v[j].delta || !how->halfvecs)
+		t->tolerance = halfvec_tolerance(m, &x->v[j], &s->step[X_TO_Y][j]);
+		t->h = x->v[j].delta ? (vec2){0, 0} : s->constraints[j].h;
+		if (x->v[j].delta || !breakup->moves_halfvecs)
 			continue;
 		double r[4], g[2];
 		mutation_random(m, BLOCK_VERTEX + j, r);
-		mutation_normals(r, g);
-		s->dh[j] = halfvec_step_take(&s->step[X_TO_Y][j], g[0], g[1]);
+		mutation_normals_from_uniform(r, g);
+		s->dh[j] = halfvec_step_sample(&s->step[X_TO_Y][j], g[0], g[1]);
 		t->h = vec2_add(t->h, s->dh[j]);
 	}
 }
 
-static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
+static void add_step_densities(struct mutation_ctx *m, const struct breakup *breakup, const struct full_path *x,
 			       struct move *move)
 {
 	const struct mutation_scratch *s = &m->scratch;
-	for (unsigned j = how->c + 1; how->halfvecs && j < how->b; j++) {
+	for (unsigned j = breakup->c + 1; breakup->moves_halfvecs && j < breakup->b; j++) {
 		if (x->v[j].delta)
 			continue;
 		move->log_density[X_TO_Y] += halfvec_step_log_pdf(&s->step[X_TO_Y][j], s->dh[j]);
@@ -145,82 +145,84 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 }
 
 /* Returns which constraints of one path are stale when the walk to the other starts from it. */
-static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
-			 const struct full_path *y)
+static unsigned stale_constraints(const struct mutation_ctx *m, const struct breakup *breakup,
+				  const struct full_path *x, const struct full_path *y)
 {
-	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
-		return WALK_STALE;
-	bool aperture = how->aperture && EFFECT_IS_ON(m->path->w, aperture);
-	bool b_moved = how->b < x->edges || aperture, c_moved = how->c == 0 && how->emitter;
+	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength_u != y->wavelength_u)
+		return WALK_STALE_ALL;
+	bool aperture = breakup->moves_aperture && EFFECT_IS_ON(m->path->w, aperture);
+	bool b_moved = breakup->b < x->edges || aperture, c_moved = breakup->c == 0 && breakup->moves_emitter;
 	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
 }
 
 /* Whether the walk from y leads back to x. If it does not, the proposal cannot be reversed, and detailed
  * balance requires rejecting it. */
-static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
-		       const struct full_path *y)
+static bool is_reversible(struct mutation_ctx *m, const struct breakup *breakup, const struct full_path *x,
+			  const struct full_path *y)
 {
 	struct mutation_scratch *s = &m->scratch;
-	unsigned b = how->b, c = how->c;
-	struct full_path *back = &s->back;
-	full_path_copy(back, y, c, b);
-	back->v[b] = x->v[b];
-	back->v[c] = x->v[c];
-	back->wl = x->wl;
-	double farthest = 0;
+	unsigned b = breakup->b, c = breakup->c;
+	struct full_path *reverse = &s->reverse_path;
+	full_path_copy(reverse, y, c, b);
+	reverse->v[b] = x->v[b];
+	reverse->v[c] = x->v[c];
+	reverse->wl = x->wl;
+	double max_move2 = 0;
 	for (unsigned j = c + 1; j < b; j++) {
 		vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
-		farthest = fmax(farthest, vec3_dot(d, d));
-		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
-		s->target[j].tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
+		max_move2 = fmax(max_move2, vec3_dot(d, d));
+		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->constraints[j].h;
+		s->target[j].tolerance = halfvec_tolerance(m, &x->v[j], &s->step[X_TO_Y][j]);
 	}
-	m->count[STRATEGY_REVERSE_WALKS]++;
-	enum walk_end end =
-		halfvec_walk(m->path, back, b, c, s->target, true, &m->limits, stale_of(m, how, x, y), &s->walk);
-	m->count[STRATEGY_WALKS]++;
-	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
-	if (end != WALK_OK)
+	m->counters[STRATEGY_REVERSE_WALKS]++;
+	enum walk_result result = halfvec_walk(m->path, reverse, b, c, s->target, true, &m->limits,
+					       stale_constraints(m, breakup, x, y), &s->walk);
+	m->counters[STRATEGY_WALKS]++;
+	m->counters[STRATEGY_ITERATIONS] += s->walk.iterations;
+	if (result != WALK_OK)
 		return false;
-	double near = m->limits.back * m->limits.scale;
+	double tolerance = m->limits.reverse_tolerance * m->limits.tolerance_scale;
 	for (unsigned j = c + 1; j < b; j++) {
-		vec3 d = vec3_sub(back->v[j].x.p, x->v[j].x.p);
+		vec3 d = vec3_sub(reverse->v[j].x.p, x->v[j].x.p);
 		double rounding = ROUNDING * ROUNDING * (x->edge[j].distance2 + x->edge[j - 1].distance2);
-		if (vec3_dot(d, d) > fmax(near * near * farthest, rounding))
+		if (vec3_dot(d, d) > fmax(tolerance * tolerance * max_move2, rounding))
 			return false;
 	}
 	return true;
 }
 
 /* Moves the vertices between x_b and x_c by half vectors. */
-static enum proposal_end walk_between(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				      struct full_path *y, struct move *move)
+static enum proposal_result walk_between(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
+					 struct full_path *y, struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
-	constraints_of(c->w, x, how->b, how->c, s->k);
-	if (m->limits.solver->factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+	constraints_compute(c->w, x, breakup->b, breakup->c, s->constraints);
+	if (m->limits.solver->factor(s->constraints, breakup->b, breakup->c, &s->walk.system) != CONSTRAINT_OK)
 		return PROPOSAL_SINGULAR;
 	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
-	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
-	set_targets(m, how, x);
-	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
-	enum walk_end end =
-		halfvec_walk(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
-	m->count[STRATEGY_WALKS]++;
-	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
-	if (end != WALK_OK)
-		return reason_of(end);
-	if (m->limits.solver->factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+	halfvec_compute_steps(c, x, s->constraints, breakup->b, breakup->c, s->step[X_TO_Y]);
+	set_targets(m, breakup, x);
+	memcpy(&s->walk.k[breakup->c + 1], &s->constraints[breakup->c + 1],
+	       (breakup->b - breakup->c - 1) * sizeof s->constraints[0]);
+	enum walk_result result = halfvec_walk(c, y, breakup->b, breakup->c, s->target, false, &m->limits,
+					       stale_constraints(m, breakup, x, y), &s->walk);
+	m->counters[STRATEGY_WALKS]++;
+	m->counters[STRATEGY_ITERATIONS] += s->walk.iterations;
+	if (result != WALK_OK)
+		return result_of_walk(result);
+	if (m->limits.solver->factor(s->walk.k, breakup->b, breakup->c, &s->walk.system) != CONSTRAINT_OK)
 		return PROPOSAL_SINGULAR;
 	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
-	halfvec_steps(c, y, s->walk.k, how->b, how->c, s->step[Y_TO_X]);
-	add_step_densities(m, how, x, move);
-	return leads_back(m, how, x, y) ? PROPOSAL_MADE : PROPOSAL_REVERSE;
+	halfvec_compute_steps(c, y, s->walk.k, breakup->b, breakup->c, s->step[Y_TO_X]);
+	add_step_densities(m, breakup, x, move);
+	return is_reversible(m, breakup, x, y) ? PROPOSAL_MADE : PROPOSAL_REVERSE;
 }
 
-static enum proposal_end join(struct mutation_ctx *m, unsigned e, struct full_path *y)
+static enum proposal_result join_edge(struct mutation_ctx *m, unsigned e, struct full_path *y)
 {
-	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
+	return full_path_compute_edge(y, e) && full_path_edge_is_visible(m->path, y, e) ? PROPOSAL_MADE
+											: PROPOSAL_BLOCKED;
 }
 
 /* Sets the mode in which x_j scatters now that its neighbours have moved. Returns false if it cannot scatter. */
@@ -234,68 +236,68 @@ static bool set_mode(struct full_path *y, unsigned j)
 
 /* Whether x_c .. x_0 are still in the same media. They are, unless x_c states no medium and is now
  * reached through another one. */
-static bool media_hold(const struct path_context *c, const struct full_path *y, unsigned c_end)
+static bool media_are_unchanged(const struct path_context *c, const struct full_path *y, unsigned c_end)
 {
 	const struct path_vertex *v = &y->v[c_end];
 	if (!EFFECT_IS_ON(c->w, scattering) || c_end == 0)
 		return true;
 	vec3 to_light = vec3_neg(y->edge[c_end - 1].w);
-	return path_medium_after(c->w, v, v->edge.medium, to_light) == y->v[c_end - 1].edge.before;
+	return path_medium_after(c->w, v, v->edge.medium, to_light) == y->v[c_end - 1].edge.previous_medium;
 }
 
 /* Recomputes the transmittance of all edges if the wavelength changed. Returns false if an edge is occluded. */
-static bool see_wavelength(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
+static bool retrace_media(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
 {
-	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength == x->wavelength)
+	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength_u == x->wavelength_u)
 		return true;
 	move->first = 0;
-	return full_path_see_media(c, y);
+	return full_path_edges_are_visible(c, y);
 }
 
 /* Whether some vertex that would need a half vector scatters with a turned normal. Half vectors cannot describe such a
  * vertex, so the path has no weight and no move. */
-static bool turned_beyond(const struct full_path *x, unsigned b, unsigned c)
+static bool has_turned_normal(const struct full_path *x, unsigned b, unsigned c)
 {
 	for (unsigned j = c + 1; j < x->edges; j++)
-		if (j != b && full_path_turned(x, j))
+		if (j != b && full_path_is_turned(x, j))
 			return true;
 	return false;
 }
 
-enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				  struct full_path *y, struct move *move)
+enum proposal_result breakup_propose(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
-	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
-	*move = (struct move){.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {how->log_choice, 0}};
-	if (how->wavelength && EFFECT_IS_ON(c->w, colour) && !holds_wavelength(c, x, b, c_end)) {
+	unsigned k = x->edges, b = breakup->b, c_end = b > 0 ? breakup->c : 0;
+	*move = (struct move){.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {breakup->log_choice, 0}};
+	if (breakup->moves_wavelength && EFFECT_IS_ON(c->w, colour) && !must_keep_wavelength(c, x, b, c_end)) {
 		double r[4];
 		mutation_random(m, BLOCK_ENDS, r);
-		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
+		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength_u, r[0]));
 	}
-	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
-	enum proposal_end end = PROPOSAL_MADE;
-	if (turned_beyond(x, b, c_end))
+	bool aperture = breakup->moves_aperture && EFFECT_IS_ON(c->w, aperture);
+	enum proposal_result result = PROPOSAL_MADE;
+	if (has_turned_normal(x, b, c_end))
 		return PROPOSAL_MODE;
 	if (b == c_end && b > 0)
-		return see_wavelength(c, x, y, move) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
+		return retrace_media(c, x, y, move) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
 	if (b < k)
-		end = trace_chain(m, b, aperture, x, y, move);
+		result = trace_multichain(m, b, aperture, x, y, move);
 	else if (aperture && !trace_move_aperture(m, x, y))
-		end = PROPOSAL_OUTSIDE;
-	if (!end && how->emitter && !move_emitter(m, x, y, move))
-		end = PROPOSAL_OUTSIDE;
-	if (!end && b > 0)
-		end = b - c_end >= 2 ? walk_between(m, how, x, y, move) : join(m, c_end, y);
+		result = PROPOSAL_OUTSIDE;
+	if (!result && breakup->moves_emitter && !move_emitter(m, x, y, move))
+		result = PROPOSAL_OUTSIDE;
+	if (!result && b > 0)
+		result = b - c_end >= 2 ? walk_between(m, breakup, x, y, move) : join_edge(m, c_end, y);
 	move->first = c_end;
-	if (end)
-		return end;
-	full_path_forget(y, c_end + 1, k);
-	if (!set_mode(y, b) || !set_mode(y, c_end) || !media_hold(c, y, c_end))
+	if (result)
+		return result;
+	full_path_invalidate(y, c_end + 1, k);
+	if (!set_mode(y, b) || !set_mode(y, c_end) || !media_are_unchanged(c, y, c_end))
 		return PROPOSAL_MODE;
-	if (!see_wavelength(c, x, y, move))
+	if (!retrace_media(c, x, y, move))
 		return PROPOSAL_BLOCKED;
-	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, y))
+	if (EFFECT_IS_ON(c->w, scattering) && !full_path_can_be_made(c, y))
 		return PROPOSAL_DARK;
 	return b < k || full_path_project(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
@@ -309,18 +311,20 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
 	if (c_end > 0 &&
-	    full_path_turned(x, c_end)) /* x_c does not move, but may use its own normal in x and the turned one in y */
+	    full_path_is_turned(x,
+				c_end)) /* x_c does not move, but may use its own normal in x and the turned one in y */
 		log_g += log(full_path_cosine_to_light(x, c_end) /
 			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
-	struct camera room;
+	struct camera storage;
 	if (b == x->edges)
-		return log_g + log(camera_jac_film_from_solid(world_camera(c->w, &x->v[b].x, &room), vec3_neg(e->w)));
+		return log_g +
+		       log(camera_jac_film_from_solid(world_camera(c->w, &x->v[b].x, &storage), vec3_neg(e->w)));
 	return log_g + log(full_path_cosine_to_light(x, b));
 }
 
 /* Returns the logarithm of the Jacobians of the distances to events in the traced part, which take
  * steps in their logarithm. */
-static double log_distances(const struct full_path *x, unsigned b)
+static double log_distance_jacobian(const struct full_path *x, unsigned b)
 {
 	double sum = 0;
 	for (unsigned j = b; j < x->edges; j++)
@@ -338,6 +342,6 @@ double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const 
 		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
 	full_path_attenuate(c->w, into, &p);
 	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
-	       (EFFECT_IS_ON(c->w, scattering) ? log_distances(into, move->b) : 0) + move->log_transfer[direction] -
-	       move->log_density[direction];
+	       (EFFECT_IS_ON(c->w, scattering) ? log_distance_jacobian(into, move->b) : 0) +
+	       move->log_transfer[direction] - move->log_density[direction];
 }

@@ -15,20 +15,20 @@ struct breakup {
 	unsigned b, c;	   /* c is ignored if b = 0; b = c = k: nothing moves */
 	double log_choice; /* log P(b) P(c) given x */
 	/* The half vectors between x_b and x_c take steps; otherwise they are kept while the ends move. */
-	bool halfvecs;
+	bool moves_halfvecs;
 	/* These move, too, if the scene and the path have them. */
-	bool wavelength, aperture, emitter;
+	bool moves_wavelength, moves_aperture, moves_emitter;
 };
 
 /* See mutation_ops.propose. On success everything is set, except that move->log_density[Y_TO_X] does not yet include
  * the probability of choosing b and c. */
-enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				  struct full_path *y, struct move *move);
+enum proposal_result breakup_propose(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
+				     struct full_path *y, struct move *move);
 double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction);
 
 /* Whether a path can be broken up like this: x_b and x_c must not be exactly specular, c < b (unless b = 0), and no
  * event in a medium may lie between them. */
-bool breakup_allows(const struct full_path *x, unsigned b, unsigned c);
+bool breakup_is_allowed(const struct full_path *x, unsigned b, unsigned c);
 
 #endif

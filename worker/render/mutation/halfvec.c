@@ -3,8 +3,8 @@
  * this move where it helps. */
 #include "worker/render/mutation/strategy.h"
 
-static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .halfvecs = true,
-					 .wavelength = true};
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .moves_halfvecs = true,
+					 .moves_wavelength = true};
 
 const struct mutation_ops mutation_halfvec = {
 	.name = "halfvec",

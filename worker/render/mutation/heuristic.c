@@ -8,7 +8,7 @@ static double roughness(const struct path_vertex *v)
 {
 	if (v->kind == VERTEX_MEDIUM)
 		return 1;
-	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
+	return v->delta ? 0 : fmin(v->bsdf->mean_alpha, 1);
 }
 
 /* P(b = i) ~ a_i, with weight 0.1 for both ends. If all inner vertices are specular, or there are none, half vectors
@@ -16,13 +16,13 @@ static double roughness(const struct path_vertex *v)
 static void weigh_b(const struct path_context *c, const struct full_path *x, double *weight)
 {
 	unsigned k = x->edges;
-	bool any = false;
+	bool has_rough_vertex = false;
 	weight[0] = path_can_be_hit(c, &x->v[0]) ? END_WEIGHT : 0;
 	for (unsigned i = 1; i < k; i++) {
 		weight[i] = roughness(&x->v[i]);
-		any |= weight[i] > 0;
+		has_rough_vertex |= weight[i] > 0;
 	}
-	weight[k] = any ? END_WEIGHT : 0;
+	weight[k] = has_rough_vertex ? END_WEIGHT : 0;
 }
 
 /* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2, where a of the emitter is 1 and the scene's diameter
@@ -31,18 +31,18 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 {
 	/* For b = k, nothing moves unless some vertex with a half vector lies between: for a pinhole, c = k -
 	 * 1 would be the identity. */
-	bool moves = b < x->edges;
+	bool something_moves = b < x->edges;
 	for (unsigned i = b; i-- > 0;) {
 		double distance2 =
 			x->v[i].kind == VERTEX_INFINITE ? 4 * c->w->radius * c->w->radius : x->edge[i].distance2;
-		weight[i] = moves ? (i == 0 ? 1 : roughness(&x->v[i])) * distance2 : 0;
-		moves |= i > 0 && !x->v[i].delta;
+		weight[i] = something_moves ? (i == 0 ? 1 : roughness(&x->v[i])) * distance2 : 0;
+		something_moves |= i > 0 && !x->v[i].delta;
 	}
 }
 
 const struct heuristic heuristic_roughness = {weigh_b, weigh_c};
 
-static double sum_of(const double *weight, unsigned n)
+static double sum_weights(const double *weight, unsigned n)
 {
 	double sum = 0;
 	for (unsigned i = 0; i < n; i++)
@@ -52,20 +52,20 @@ static double sum_of(const double *weight, unsigned n)
 
 double heuristic_probability(const double *weight, unsigned n, unsigned i)
 {
-	return weight[i] > 0 ? weight[i] / sum_of(weight, n) : 0;
+	return weight[i] > 0 ? weight[i] / sum_weights(weight, n) : 0;
 }
 
 unsigned heuristic_choose(const double *weight, unsigned n, double u)
 {
-	double rest = u * sum_of(weight, n);
+	double remaining = u * sum_weights(weight, n);
 	unsigned chosen = n;
 	for (unsigned i = 0; i < n; i++) {
 		if (!(weight[i] > 0))
 			continue;
 		chosen = i;
-		if (rest < weight[i])
+		if (remaining < weight[i])
 			return i;
-		rest -= weight[i];
+		remaining -= weight[i];
 	}
 	return chosen;
 }

@@ -13,13 +13,13 @@
 #define EDGE_RATIO 0.7
 
 /* Returns the logarithm of the probability of a number of edges. */
-static double log_edges(const struct path_context *c, unsigned edges)
+static double log_edge_count_probability(const struct path_context *c, unsigned edges)
 {
 	unsigned n = c->max_depth - c->min_depth + 1, i = edges - c->min_depth;
 	return log((1 - EDGE_RATIO) / (1 - pow(EDGE_RATIO, n))) + i * log(EDGE_RATIO);
 }
 
-static unsigned choose_edges(const struct path_context *c, double u)
+static unsigned choose_edge_count(const struct path_context *c, double u)
 {
 	unsigned n = c->max_depth - c->min_depth + 1;
 	double i = floor(log1p(-u * (1 - pow(EDGE_RATIO, n))) / log(EDGE_RATIO));
@@ -32,20 +32,20 @@ static unsigned technique_count(unsigned edges)
 	return edges == 1 ? 1 : edges + 1;
 }
 
-static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				 struct move *move)
+static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				    const struct mutation_forced_choice *forced, struct full_path *x,
+				    struct full_path *y, struct move *move)
 {
-	(void)self, (void)how, (void)x;
+	(void)self, (void)forced, (void)x;
 	struct path_context *c = m->path;
 	double r[4], film[2];
 	mutation_random(m, BLOCK_BREAKUP, r);
-	unsigned k = choose_edges(c, r[0]), n = technique_count(k);
+	unsigned k = choose_edge_count(c, r[0]), n = technique_count(k);
 	unsigned s = (unsigned)fmin(floor(r[1] * n), n - 1), t = k + 1 - s;
 	*move = (struct move){.first = 0, .last = k};
 	struct sampler_random sampler;
 	sampler_random_init(&sampler, m->seed, RNG_CHAIN, m->chain, m->step);
-	c->one_way = true;
+	c->unidirectional = true;
 	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
 		return PROPOSAL_MISSED;
 	return full_path_from_subpaths(c, s, 0, k, y) ? PROPOSAL_MADE : PROPOSAL_DARK;
@@ -56,12 +56,13 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 {
 	(void)move, (void)direction;
 	unsigned k = into->edges;
-	double log_pdf[FULL_PATH_MAX_VERTICES];
-	const bool opaque = m->path->opaque;
-	m->path->opaque = true; /* propose() draws the length first; a joint that passes surfaces would change it */
-	full_path_log_techniques(m->path, into, log_pdf);
-	m->path->opaque = opaque;
-	double log_t = log_edges(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
+	double log_pdf[FULL_PATH_VERTICES_MAX];
+	const bool opaque = m->path->opaque_joints;
+	m->path->opaque_joints =
+		true; /* propose() draws the length first; a joint that passes surfaces would change it */
+	full_path_log_technique_pdfs(m->path, into, log_pdf);
+	m->path->opaque_joints = opaque;
+	double log_t = log_edge_count_probability(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
 	return full_path_log_f(m->path, into) - log_t;
 }
 

@@ -11,27 +11,27 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 		weight[i] = i > 0 && x->v[i].delta ? 0 : 1;
 }
 
-static const struct heuristic any_end = {NULL, weigh_c};
-static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
+static const struct heuristic uniform_c = {NULL, weigh_c};
+static const struct strategy strategy = {&uniform_c, STRATEGY_CAMERA, STRATEGY_DRAWN, .moves_aperture = true};
 
-static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				 struct move *move)
+static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				    const struct mutation_forced_choice *forced, struct full_path *x,
+				    struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return PROPOSAL_INAPPLICABLE;
-	return strategy_propose(self, m, how, x, y, move);
+	return strategy_propose(self, m, forced, x, y, move);
 }
 
-static double useful(const struct render_summary *scene)
+static double default_weight(const struct render_summary *scene)
 {
-	return render_effect_on(scene, "aperture") && render_effect_on(scene, "half-vectors") ? 0.1 : 0;
+	return render_effect_is_on(scene, "aperture") && render_effect_is_on(scene, "half-vectors") ? 0.1 : 0;
 }
 
 const struct mutation_ops mutation_lens = {
 	.name = "lens",
 	.summary = "moves the point on the aperture",
-	.useful = useful,
+	.default_weight = default_weight,
 	.strategy = &strategy,
 	.propose = propose,
 	.log_weight = breakup_log_weight,

@@ -3,17 +3,17 @@
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 
-static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN, 0, .emitter = true};
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN, 0, .moves_emitter = true};
 
-static double useful(const struct render_summary *scene)
+static double default_weight(const struct render_summary *scene)
 {
-	return render_effect_on(scene, "emitter-move") && render_effect_on(scene, "half-vectors") ? 0.1 : 0;
+	return render_effect_is_on(scene, "emitter-move") && render_effect_is_on(scene, "half-vectors") ? 0.1 : 0;
 }
 
 const struct mutation_ops mutation_light = {
 	.name = "light",
 	.summary = "moves the point on the emitter",
-	.useful = useful,
+	.default_weight = default_weight,
 	.strategy = &strategy,
 	.propose = strategy_propose,
 	.log_weight = breakup_log_weight,

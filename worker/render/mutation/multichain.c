@@ -3,7 +3,7 @@
  * this move where it helps. */
 #include "worker/render/mutation/strategy.h"
 
-static const struct strategy strategy = {&heuristic_roughness, 0, 0, .wavelength = true, .aperture = true};
+static const struct strategy strategy = {&heuristic_roughness, 0, 0, .moves_wavelength = true, .moves_aperture = true};
 
 const struct mutation_ops mutation_multichain = {
 	.name = "multichain",

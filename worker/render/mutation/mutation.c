@@ -23,7 +23,7 @@ const struct mutation_ops *mutation_find(const char *name, size_t length)
 	return NULL;
 }
 
-enum strategy_counter proposal_counter(enum proposal_end reason)
+enum strategy_counter proposal_counter(enum proposal_result reason)
 {
 	static const enum strategy_counter counters[] = {
 		[PROPOSAL_MADE] = STRATEGY_PROPOSED,	      [PROPOSAL_OUTSIDE] = STRATEGY_FAIL_OUTSIDE,
@@ -41,14 +41,14 @@ void mutation_random(const struct mutation_ctx *m, unsigned block, double out[4]
 	rng_uniform4(m->seed, RNG_MUTATION, m->chain, m->step, block, out);
 }
 
-void mutation_normals(const double u[2], double out[2])
+void mutation_normals_from_uniform(const double u[2], double out[2])
 {
 	double r = sqrt(-2 * log1p(-u[0])), phi = 2 * M_PI * u[1];
 	out[0] = r * cos(phi);
 	out[1] = r * sin(phi);
 }
 
-bool mutation_step_square(double u[2], const double r[2], double size)
+bool mutation_step_in_square(double u[2], const double r[2], double size)
 {
 	for (int i = 0; i < 2; i++) {
 		u[i] += size * (2 * r[i] - 1);

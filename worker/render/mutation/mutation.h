@@ -20,7 +20,7 @@
 #include "worker/render/world/summary.h"
 
 /* Forced choices for tests: "hslt@b3c1". */
-struct mutation_setting {
+struct mutation_forced_choice {
 	int b, c; /* -1: chosen at random */
 };
 
@@ -43,23 +43,23 @@ struct move {
 
 struct mutation_scratch {
 	struct walk_scratch walk;
-	struct constraint k[FULL_PATH_MAX_VERTICES];	     /* constraints of x */
-	struct halfvec_step step[2][FULL_PATH_MAX_VERTICES]; /* steps at x, at y */
-	struct walk_target target[FULL_PATH_MAX_VERTICES];
-	double weight[FULL_PATH_MAX_VERTICES];
-	vec2 dh[FULL_PATH_MAX_VERTICES];
-	struct full_path back;
+	struct constraint constraints[FULL_PATH_VERTICES_MAX]; /* constraints of x */
+	struct halfvec_step step[2][FULL_PATH_VERTICES_MAX];   /* steps at x, at y */
+	struct walk_target target[FULL_PATH_VERTICES_MAX];
+	double weight[FULL_PATH_VERTICES_MAX];
+	vec2 dh[FULL_PATH_VERTICES_MAX];
+	struct full_path reverse_path;
 };
 
 struct mutation_ctx {
 	struct path_context *path;
 	uint64_t seed, chain, step; /* index of this mutation's random numbers */
-	uint64_t *count;	    /* the strategy's counters, indexed by enum strategy_counter */
+	uint64_t *counters;	    /* the strategy's counters, indexed by enum strategy_counter */
 	struct walk_limits limits;
 	struct mutation_scratch scratch;
 };
 
-enum proposal_end {
+enum proposal_result {
 	PROPOSAL_MADE,
 	/* Reasons for having no proposal; the counters of common/film/batch.h describe each. */
 	PROPOSAL_OUTSIDE,
@@ -75,7 +75,7 @@ enum proposal_end {
 	PROPOSAL_INAPPLICABLE,
 };
 /* Returns the counter of a reason. */
-enum strategy_counter proposal_counter(enum proposal_end reason);
+enum strategy_counter proposal_counter(enum proposal_result reason);
 
 struct mutation_ops {
 	const char *name, *summary;
@@ -83,12 +83,12 @@ struct mutation_ops {
 	const struct strategy *strategy; /* for breakups (strategy.h) */
 	/* Returns the weight in the default mixture of a scene with these effects; 0: not part of it.
 	 * NULL: in no default mixture. */
-	double (*useful)(const struct render_summary *scene);
+	double (*default_weight)(const struct render_summary *scene);
 	/* Proposes y. PROPOSAL_MADE: y is complete, and all its rays have been traced. Otherwise returns the reason,
 	 * and y's vertices first..last are undefined. */
-	enum proposal_end (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
-				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				     struct move *move);
+	enum proposal_result (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
+					const struct mutation_forced_choice *how, struct full_path *x,
+					struct full_path *y, struct move *move);
 	/* Returns the logarithm of the weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
@@ -108,8 +108,8 @@ enum mutation_block {
 void mutation_random(const struct mutation_ctx *m, unsigned block, double out[4]);
 /* Makes a symmetric step of two numbers in [0,1), from the random numbers r in [0,1). Returns false if
  * it leaves the unit square. */
-bool mutation_step_square(double u[2], const double r[2], double size);
+bool mutation_step_in_square(double u[2], const double r[2], double size);
 /* Computes two standard normals from two numbers in [0,1) (Box and Muller 1958). */
-void mutation_normals(const double u[2], double out[2]);
+void mutation_normals_from_uniform(const double u[2], double out[2]);
 
 #endif

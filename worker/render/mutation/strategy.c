@@ -12,12 +12,12 @@ static unsigned fixed_b(int b, unsigned k)
 }
 
 /* Sets the weights of b: those of the heuristic, except for values that the strategy cannot use. */
-static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
+static void weigh_b(const struct strategy *s, const struct choice *choice, const struct mutation_ctx *m,
 		    const struct full_path *x, double *weight)
 {
 	s->heuristic->weigh_b(m->path, x, weight);
-	if (forced->c >= 0)
-		for (unsigned i = 0; i <= x->edges && i <= (unsigned)forced->c; i++)
+	if (choice->c >= 0)
+		for (unsigned i = 0; i <= x->edges && i <= (unsigned)choice->c; i++)
 			weight[i] = 0;
 }
 
@@ -26,76 +26,78 @@ static void weigh_c(const struct strategy *s, const struct mutation_ctx *m, cons
 		    double *weight)
 {
 	s->heuristic->weigh_c(m->path, x, b, weight);
-	bool past = false;
+	bool past_medium = false;
 	for (unsigned i = b; i-- > 0;) {
-		weight[i] = past ? 0 : weight[i];
-		past = past || x->v[i].kind == VERTEX_MEDIUM;
+		weight[i] = past_medium ? 0 : weight[i];
+		past_medium = past_medium || x->v[i].kind == VERTEX_MEDIUM;
 	}
 }
 
 /* Returns log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
-static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+static double log_choice(const struct strategy *s, const struct choice *choice, struct mutation_ctx *m,
 			 const struct full_path *x, unsigned b, unsigned c)
 {
 	double *weight = m->scratch.weight, p = 1;
-	if (forced->b == STRATEGY_DRAWN) {
-		weigh_b(s, forced, m, x, weight);
+	if (choice->b == STRATEGY_DRAWN) {
+		weigh_b(s, choice, m, x, weight);
 		p *= heuristic_probability(weight, x->edges + 1, b);
 	}
-	if (forced->c == STRATEGY_DRAWN && b > 0) {
+	if (choice->c == STRATEGY_DRAWN && b > 0) {
 		weigh_c(s, m, x, b, weight);
 		p *= heuristic_probability(weight, b, c);
 	}
 	return log(p);
 }
 
-static bool choose_breakup(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+static bool choose_breakup(const struct strategy *s, const struct choice *choice, struct mutation_ctx *m,
 			   const struct full_path *x, struct breakup *out)
 {
 	double *weight = m->scratch.weight, r[4];
 	unsigned k = x->edges;
 	mutation_random(m, BLOCK_BREAKUP, r);
-	if (forced->b == STRATEGY_DRAWN) {
-		weigh_b(s, forced, m, x, weight);
+	if (choice->b == STRATEGY_DRAWN) {
+		weigh_b(s, choice, m, x, weight);
 		out->b = heuristic_choose(weight, k + 1, r[0]);
 	} else {
-		out->b = fixed_b(forced->b, k);
+		out->b = fixed_b(choice->b, k);
 	}
 	if (out->b > k)
 		return false;
 	out->c = 0;
-	if (out->b > 0 && forced->c == STRATEGY_DRAWN) {
+	if (out->b > 0 && choice->c == STRATEGY_DRAWN) {
 		weigh_c(s, m, x, out->b, weight);
 		out->c = heuristic_choose(weight, out->b, r[1]);
 	} else if (out->b > 0) {
-		out->c = (unsigned)forced->c;
+		out->c = (unsigned)choice->c;
 	}
-	if (!breakup_allows(x, out->b, out->c))
+	if (!breakup_is_allowed(x, out->b, out->c))
 		return false;
 	if (out->b == 0 && !path_can_be_hit(m->path, &x->v[0]))
 		return false;
-	out->log_choice = log_choice(s, forced, m, x, out->b, out->c);
+	out->log_choice = log_choice(s, choice, m, x, out->b, out->c);
 	return out->log_choice > -INFINITY;
 }
 
-enum proposal_end strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				   struct move *move)
+enum proposal_result strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				      const struct mutation_forced_choice *forced, struct full_path *x,
+				      struct full_path *y, struct move *move)
 {
 	const struct strategy *s = self->strategy;
-	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
-	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
+	struct choice choice = {forced->b >= 0 ? forced->b : s->b, forced->c >= 0 ? forced->c : s->c};
+	struct breakup breakup = {.moves_halfvecs = s->moves_halfvecs,
+				  .moves_wavelength = s->moves_wavelength,
+				  .moves_aperture = s->moves_aperture};
 	if (EFFECT_IS_ON(m->path->w, scattering))
-		br.wavelength = s->wavelength_in_media;
-	if (!choose_breakup(s, &forced, m, x, &br))
+		breakup.moves_wavelength = s->moves_wavelength_in_media;
+	if (!choose_breakup(s, &choice, m, x, &breakup))
 		return PROPOSAL_INAPPLICABLE;
 	const struct world *w = m->path->w;
-	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 &&
-		     w->emitters[x->v[0].emitter].ops->point_inverse;
-	enum proposal_end end = breakup_propose(m, &br, x, y, move);
-	if (end)
-		return end;
-	double back = log_choice(s, &forced, m, y, br.b, br.c);
-	move->log_density[Y_TO_X] += back;
-	return back > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE;
+	breakup.moves_emitter = s->moves_emitter && w->effects.emitter_move && breakup.b > 0 && breakup.c == 0 &&
+				w->emitters[x->v[0].emitter].ops->point_inverse;
+	enum proposal_result result = breakup_propose(m, &breakup, x, y, move);
+	if (result)
+		return result;
+	double log_reverse_choice = log_choice(s, &choice, m, y, breakup.b, breakup.c);
+	move->log_density[Y_TO_X] += log_reverse_choice;
+	return log_reverse_choice > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE;
 }

@@ -9,15 +9,15 @@ enum { STRATEGY_DRAWN = -1, STRATEGY_CAMERA = -2 }; /* DRAWN: b or c is chosen b
 
 struct strategy {
 	const struct heuristic *heuristic;
-	int b, c;				      /* a vertex number, or one of the values above */
-	bool halfvecs, wavelength, aperture, emitter; /* see struct breakup */
+	int b, c; /* a vertex number, or one of the values above */
+	bool moves_halfvecs, moves_wavelength, moves_aperture, moves_emitter; /* see struct breakup */
 	/* The wavelength also moves where media scatter, although the transmittance of each edge changes with it. */
-	bool wavelength_in_media;
+	bool moves_wavelength_in_media;
 };
 
-/* Proposes a breakup by self's strategy; `how` takes precedence. */
-enum proposal_end strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				   struct move *move);
+/* Proposes a breakup by self's strategy; `forced` takes precedence. */
+enum proposal_result strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				      const struct mutation_forced_choice *forced, struct full_path *x,
+				      struct full_path *y, struct move *move);
 
 #endif

@@ -13,27 +13,27 @@
 
 #include "worker/render/path/path.h"
 
-enum { BRIGHTNESS_A_CELL = 8 }; /* samples of path or bdpt per cell */
+enum { BRIGHTNESS_SAMPLES_PER_CELL = 8 }; /* samples of path or bdpt per cell */
 
 struct brightness {
 	/* Adds splats whose weight is relative to the number of pixels of the window, as films get them. */
 	struct splat_target target;
 	struct film_window window;
-	uint32_t across; /* cells along each side; a power of two */
-	double *sum, *square, *scale;
-	double *now;	   /* contributions of the current sample to each cell */
-	uint32_t *touched; /* the cells where `now` is not 0 */
+	uint32_t resolution; /* cells along each side; a power of two */
+	double *sum, *square_sum, *scale;
+	double *current;   /* contributions of the current sample to each cell */
+	uint32_t *touched; /* the cells where `current` is not 0 */
 	size_t touched_count;
 };
 
 /* Makes the map from `samples` samples of the whole window, evaluated by `trace` with the numbers of the given stream
  * and step; brightness_fini frees it. Calls liveness_tick(). Returns -ENOMEM if out of memory. */
-int brightness_of_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
-			  enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e);
+int brightness_init_from_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
+				 enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e);
 
-/* To make a map step by step: brightness_init prepares a map for that many samples, at least `a_cell` per cell, and
- * returns -ENOMEM if out of memory. brightness_fini frees it. */
-int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, unsigned a_cell,
+/* To make a map step by step: brightness_init prepares a map for that many samples, at least `samples_per_cell` per
+ * cell, and returns -ENOMEM if out of memory. brightness_fini frees it. */
+int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, unsigned samples_per_cell,
 		    struct error *e);
 void brightness_fini(struct brightness *b);
 /* Adds a splat of the current sample, times a weight. All splats of a sample in one cell count as one. */
@@ -41,11 +41,11 @@ void brightness_add(struct brightness *b, const struct splat *s, double weight);
 void brightness_end_sample(struct brightness *b);
 /* Adds all splats of a sample and ends it. */
 void brightness_add_sample(struct brightness *b, const struct path_sample *sample);
-/* Computes the scales; call either this or brightness_settle_near when all samples have been added. */
-void brightness_settle(struct brightness *b, uint64_t samples);
+/* Computes the scales; call either this or brightness_compute_neighbourhood_scales when all samples have been added. */
+void brightness_compute_scales(struct brightness *b, uint64_t samples);
 /* For samples whose fireflies are spread by chains: a cell gets the mean of its neighbourhood, which is wider where
  * less is known. Unlike squares of the whole film, this keeps dark places next to bright ones apart. */
-void brightness_settle_near(struct brightness *b, uint64_t samples);
+void brightness_compute_neighbourhood_scales(struct brightness *b, uint64_t samples);
 /* Returns 1 / (pixels of the window x X+Y+Z of a pixel at this place), which makes a contribution relative to the
  * brightness of its place. 0 if everything is black. */
 double brightness_scale(const struct brightness *b, double x, double y);

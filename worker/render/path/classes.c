@@ -5,10 +5,10 @@ _Static_assert(PATH_CLASSES <= 32, "a bit a class");
 
 static bool is_smooth(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
+	return v->kind == VERTEX_SURFACE && v->bsdf->mean_alpha < PATH_CLASS_ALPHA;
 }
 
-unsigned path_class_whole(const struct full_path *x)
+unsigned full_path_class(const struct full_path *x)
 {
 	enum path_class_kind kind = PATH_NO_VERTEX;
 	for (unsigned j = x->edges - 1; j > 0; j--)
@@ -16,32 +16,32 @@ unsigned path_class_whole(const struct full_path *x)
 	return path_class(x->edges, kind);
 }
 
-void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
-		   struct path_sample *out)
+void path_classes_begin(struct path_classes *k, const struct path_context *c, unsigned camera, unsigned light,
+			struct path_sample *out)
 {
 	k->out = out;
-	classes_clear(out);
-	if (c->wl.grey)
+	path_classes_clear(out);
+	if (c->wl.is_grey)
 		k->weights = (spectrum){{c->w->grey_xyz[0] + c->w->grey_xyz[1] + c->w->grey_xyz[2]}};
 	else
 		k->weights = spectrum_intensity_weights(&c->wl);
 	enum path_class_kind kind = PATH_NO_VERTEX;
-	k->camera[1] = k->emitter[1] = k->light[0] = k->light[1] = PATH_NO_VERTEX;
+	k->camera_kind[1] = k->emitter_kind[1] = k->light_kind[0] = k->light_kind[1] = PATH_NO_VERTEX;
 	for (unsigned i = 1; i < camera; i++) {
 		const struct path_vertex *v = &c->camera[i];
-		k->emitter[i + 1] = (unsigned char)kind;
+		k->emitter_kind[i + 1] = (unsigned char)kind;
 		if (v->kind == VERTEX_INFINITE)
 			break;
 		bool smooth = is_smooth(v);
-		k->camera[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);
+		k->camera_kind[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);
 		kind = path_class_kind_next(kind, v->delta || smooth);
 	}
-	k->emitter[camera + 1] = (unsigned char)kind;
+	k->emitter_kind[camera + 1] = (unsigned char)kind;
 	kind = PATH_NO_VERTEX;
 	for (unsigned i = 1; i < light; i++) {
 		const struct path_vertex *v = &c->light[i];
 		bool smooth = is_smooth(v);
-		k->light[i + 1] = (unsigned char)path_class_kind_join(smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
+		k->light_kind[i + 1] = (unsigned char)path_class_kind_join(smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
 		kind = path_class_kind_join(v->delta || smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
 	}
 }

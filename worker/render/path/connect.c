@@ -19,10 +19,10 @@
 #include "worker/render/path/media.h"
 #include "worker/render/path/visible.h"
 
-/* The code that runs for every joint is compiled twice: with `plain` set for worlds without any effect that
+/* The code that runs for every joint is compiled twice: with `without_effects` set for worlds without any effect that
  * joints depend on (effects.joints), and once for all others. The code is so short that testing for the effects
  * would cost several percent. */
-#define IN_BOTH static inline __attribute__((always_inline))
+#define FORCE_INLINE static inline __attribute__((always_inline))
 
 /* Beyond this ratio a weight is zero in double anyway, and infinities would lead to NaN. */
 #define RATIO_LIMIT 1e200
@@ -31,7 +31,7 @@
  * of their sub-path does not apply there. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
-	if (i + 1 == p->s || i == p->s + p->passed || i == 0 || i == p->edges)
+	if (i + 1 == p->s || i == p->s + p->passed_count || i == 0 || i == p->edges)
 		return false;
 	return p->v[i]->delta;
 }
@@ -39,78 +39,83 @@ static bool is_delta(const struct joined_path *p, unsigned i)
 /* Whether the joint that made the path is refracted. */
 static bool is_refracted(const struct joined_path *p)
 {
-	return p->passed > 0 && path_is_refracted(p->v[p->s]);
+	return p->passed_count > 0 && path_vertex_is_refracting(p->v[p->s]);
 }
 
 /* Whether points of emitters are joined straight to the lens for this pair. Where they are hardly denser than the
  * film's own samples, whose estimate of directly visible light has no variance, the joints would only add variance. */
-static bool lens_joins(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *emitter)
+static bool can_join_lens(const struct path_context *c, const struct path_vertex *eye,
+			  const struct path_vertex *emitter)
 {
-	if (!c->joins_lens || emitter->kind == VERTEX_INFINITE)
+	if (!c->joins_emitters_to_lens || emitter->kind == VERTEX_INFINITE)
 		return false;
 	double film = path_pdf(c, NULL, eye, emitter, TRANSPORT_RADIANCE) * (c->light_every > 1 ? c->light_every : 1);
-	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSER * film;
+	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSITY_RATIO * film;
 }
 
 /* Returns the index of the first vertex from x_i on that is not passed: the vertex to which x_{i-1} is joined. */
-IN_BOTH unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
+FORCE_INLINE unsigned first_not_passed(const struct path_context *c, const struct joined_path *p, unsigned i,
+				       const bool without_effects)
 {
-	while (!plain && path_sees_through(c) && path_joint_passes(p, i))
+	while (!without_effects && path_allows_see_through(c) && path_joint_passes(p, i))
 		i++;
 	return i;
 }
 
 /* For j > 0 and a specular vertex x_j: whether technique j can join x_{j-1} to the first vertex behind those that light
  * passes straight through, starting at x_j. */
-static bool joins_through(const struct path_context *c, const struct joined_path *p, unsigned j)
+static bool can_join_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
-	unsigned end = behind_passed(c, p, j, false);
-	if (end - j > PATH_PASSED_MOST)
+	unsigned end = first_not_passed(c, p, j, false);
+	if (end - j > PATH_PASSED_MAX)
 		return false;
-	return j == 1 && end == p->edges ? lens_joins(c, p->v[end], p->v[0]) : !is_delta(p, end);
+	return j == 1 && end == p->edges ? can_join_lens(c, p->v[end], p->v[0]) : !is_delta(p, end);
 }
 
-IN_BOTH bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j, const bool plain)
+FORCE_INLINE bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j,
+				   const bool without_effects)
 {
 	if (j == 0)
 		return true;
-	if (!plain && p->other_medium && j > p->other_medium)
+	if (!without_effects && p->mismatched_edge && j > p->mismatched_edge)
 		return false;
 	if (p->edges == 1)
-		return j == 1 && lens_joins(c, p->v[1], p->v[0]);
+		return j == 1 && can_join_lens(c, p->v[1], p->v[0]);
 	if (j > p->edges || is_delta(p, j - 1))
 		return false;
-	return !is_delta(p, j) || (!plain && path_sees_through(c) && joins_through(c, p, j));
+	return !is_delta(p, j) || (!without_effects && path_allows_see_through(c) && can_join_through(c, p, j));
 }
 
 /* Edge i and its media at x_{i-1} (light) and at x_i (camera). Only where media scatter. */
 struct joined_edge {
 	const struct path_edge *edge;
-	uint32_t light, camera;
+	uint32_t light_medium, camera_medium;
 };
 
-static struct joined_edge edge_of(const struct joined_path *p, unsigned i)
+static struct joined_edge joined_edge_at(const struct joined_path *p, unsigned i)
 {
 	const struct path_edge *e = i == p->s ? p->joint : i < p->s ? &p->v[i]->edge : &p->v[i - 1]->edge;
 	bool from_light = i < p->s;
-	return (struct joined_edge){e, from_light ? e->before : e->medium, from_light ? e->medium : e->before};
+	return (struct joined_edge){e, from_light ? e->previous_medium : e->medium,
+				    from_light ? e->medium : e->previous_medium};
 }
 
 /* Returns the factor that edge i contributes to the density of x_i (or, if back, of x_{i-1}) as
  * generated from its other end. */
-IN_BOTH double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool back,
-			const bool plain)
+FORCE_INLINE double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool from_camera,
+			     const bool without_effects)
 {
-	if (plain || !EFFECT_IS_ON(c->w, scattering))
+	if (without_effects || !EFFECT_IS_ON(c->w, scattering))
 		return 1;
-	struct joined_edge e = edge_of(p, i);
-	return path_edge_pdf(c, e.edge, back ? e.light : e.camera, p->v[back ? i - 1 : i]);
+	struct joined_edge e = joined_edge_at(p, i);
+	return path_edge_pdf(c, e.edge, from_camera ? e.light_medium : e.camera_medium, p->v[from_camera ? i - 1 : i]);
 }
 
 /* Returns the density of x_i as generated from the light's side, for i >= s. */
-IN_BOTH double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
+FORCE_INLINE double pdf_from_light(const struct path_context *c, const struct joined_path *p, unsigned i,
+				   const bool without_effects)
 {
-	unsigned s = p->s, passed = plain ? 0 : p->passed;
+	unsigned s = p->s, passed = without_effects ? 0 : p->passed_count;
 	if (i == 0)
 		return path_pdf_emitter(c, p->v[0]);
 	if (i >= s + passed + 2)
@@ -119,29 +124,32 @@ IN_BOTH double light_pdf(const struct path_context *c, const struct joined_path 
 		return is_refracted(p) ? path_pdf_refracted(c, p->v[i - 2], p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE)
 				       : path_pdf_passed(c, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
-	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false, plain);
+	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) *
+	       edge_pdf(c, p, i, false, without_effects);
 }
 
 /* Returns the density of x_i as generated from the camera's side, for i < s. */
-IN_BOTH double camera_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, const bool plain)
+FORCE_INLINE double pdf_from_camera(const struct path_context *c, const struct joined_path *p, unsigned i,
+				    const bool without_effects)
 {
 	unsigned s = p->s, k = p->edges;
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
-	if (!plain && i + 1 == s && p->passed)
+	if (!without_effects && i + 1 == s && p->passed_count)
 		return is_refracted(p) ? path_pdf_refracted(c, p->v[s + 1], p->v[s], p->v[i], TRANSPORT_RADIANCE)
 				       : path_pdf_passed(c, p->v[s], p->v[i], TRANSPORT_RADIANCE);
 	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
-	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true, plain);
+	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) *
+	       edge_pdf(c, p, i + 1, true, without_effects);
 }
 
 /* Returns the density of joining x_{first-1} to x_end, which passes x_first .. x_{end-1}, divided by that of drawing
  * the passed vertices as their sub-path did; 1 if there are none. */
-IN_BOTH double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end,
-			  const bool plain)
+FORCE_INLINE double joint_over_drawn_ratio(const struct path_context *c, const struct joined_path *p, unsigned first,
+					   unsigned end, const bool without_effects)
 {
-	double pdf[PATH_PASSED_MOST];
-	if (plain || !path_sees_through(c) || first == end)
+	double pdf[PATH_PASSED_MAX];
+	if (without_effects || !path_allows_see_through(c) || first == end)
 		return 1;
 	for (unsigned i = first; i < end; i++)
 		pdf[i - first] = p->v[i]->pdf;
@@ -150,16 +158,16 @@ IN_BOTH double over_drawn(const struct path_context *c, const struct joined_path
 
 /* For the technique that made the path: returns the density of drawing the vertices that its joint passes, from the
  * light's or the camera's side, divided by that of joining; 1 if the joint passes nothing. */
-IN_BOTH double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light,
-			     const bool plain)
+FORCE_INLINE double drawn_over_joint_ratio(const struct path_context *c, const struct joined_path *p, bool from_light,
+					   const bool without_effects)
 {
-	double pdf[PATH_PASSED_MOST];
-	if (plain || !p->passed)
+	double pdf[PATH_PASSED_MAX];
+	if (without_effects || !p->passed_count)
 		return 1;
-	for (unsigned i = 0; i < p->passed; i++)
-		pdf[i] = from_light ? light_pdf(c, p, p->s + i, false) : p->v[p->s + i]->pdf;
-	return 1 / (is_refracted(p) ? path_refracted_ratio(p->v, p->passed, p->log_transfer, pdf)
-				    : path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf));
+	for (unsigned i = 0; i < p->passed_count; i++)
+		pdf[i] = from_light ? pdf_from_light(c, p, p->s + i, false) : p->v[p->s + i]->pdf;
+	return 1 / (is_refracted(p) ? path_refracted_ratio(p->v, p->passed_count, p->log_transfer, pdf)
+				    : path_passed_ratio(p->v, p->s, p->s + p->passed_count - 1, pdf));
 }
 
 /* How technique 1 makes the path if its joint is refracted. */
@@ -168,60 +176,67 @@ struct refracted_joint {
 	double ratio; /* its density divided by that of drawing x_1 .. x_{end-1} as their sub-path did */
 };
 
-IN_BOTH struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p, const bool plain)
+FORCE_INLINE struct refracted_joint find_refracted_joint(struct path_context *c, const struct joined_path *p,
+							 const bool without_effects)
 {
 	struct refracted_joint r = {0, 0};
-	if (plain)
+	if (without_effects)
 		return r;
-	if (path_refracts(c) && is_refracted(p))
-		r.end = p->passed + 1;
-	if (r.end || !path_refracts(c))
+	if (path_allows_refraction(c) && is_refracted(p))
+		r.end = p->passed_count + 1;
+	if (r.end || !path_allows_refraction(c))
 		return r;
 	unsigned end = path_refracted_end(p->v, p->edges);
 	if (end && !is_delta(p, end))
-		r.ratio = path_refracted_over_drawn(c, p->v, end);
+		r.ratio = path_refracted_over_drawn_ratio(c, p->v, end);
 	if (r.ratio > 0)
 		r.end = end;
 	return r;
 }
 
 /* Computes path_technique_ratios. r is the density of technique j divided by that of technique s, computed as if j drew
- * every vertex, although joints pass vertices without drawing them. drawn_instead corrects r for the joint of s, once
- * for each direction; over_drawn corrects each stored ratio for the joint of j. */
-IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio,
-			      const bool plain)
+ * every vertex, although joints pass vertices without drawing them. drawn_over_joint_ratio corrects r for the joint of
+ * s, once for each direction; joint_over_drawn_ratio corrects each stored ratio for the joint of j. */
+FORCE_INLINE void technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio,
+				   const bool without_effects)
 {
-	const bool sees_through = !plain && path_sees_through(c);
-	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = plain ? s : s + p->passed;
+	const bool sees_through = !without_effects && path_allows_see_through(c);
+	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k,
+		 joint_end = without_effects ? s : s + p->passed_count;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from the vertex to which it is joined; longer light
 	 * sub-paths draw it independently. */
-	double toward = 1, point = 1;
-	const struct refracted_joint refracted = refracted_joint_of(c, p, plain);
-	const bool first_exists = refracted.end || technique_exists(c, p, 1, plain);
+	double pdf_toward = 1, pdf_point = 1;
+	const struct refracted_joint refracted = find_refracted_joint(c, p, without_effects);
+	const bool first_exists = refracted.end || technique_exists(c, p, 1, without_effects);
 	if ((k >= 2 && s <= 1) || first_exists) {
-		toward = path_pdf_toward(c, p->v[0],
-					 p->v[refracted.end ? refracted.end : behind_passed(c, p, 1, plain)]->x.p);
-		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
+		pdf_toward = path_pdf_toward(
+			c, p->v[0],
+			p->v[refracted.end ? refracted.end : first_not_passed(c, p, 1, without_effects)]->x.p);
+		pdf_point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
-	double first = s == 1 ? point / toward : 1;
-	double r = joint_end < last ? first * drawn_instead(c, p, true, plain) : first;
+	double first = s == 1 ? pdf_point / pdf_toward : 1;
+	double r = joint_end < last ? first * drawn_over_joint_ratio(c, p, true, without_effects) : first;
 	for (unsigned j = joint_end; j < last && r > 0 && r < RATIO_LIMIT; j++) {
 		if (j == 0 && first_exists)
-			ratio[1] = r * toward / p->v[0]->pdf *
+			ratio[1] = r * pdf_toward / p->v[0]->pdf *
 				   (refracted.end ? refracted.ratio
-						  : over_drawn(c, p, 1, behind_passed(c, p, 1, plain), plain));
-		r *= (j == 0 ? point : light_pdf(c, p, j, plain)) / p->v[j]->pdf;
-		if (j > 0 && technique_exists(c, p, j + 1, plain))
-			ratio[j + 1] = r * over_drawn(c, p, j + 1, behind_passed(c, p, j + 1, plain), plain);
+						  : joint_over_drawn_ratio(c, p, 1,
+									   first_not_passed(c, p, 1, without_effects),
+									   without_effects));
+		r *= (j == 0 ? pdf_point : pdf_from_light(c, p, j, without_effects)) / p->v[j]->pdf;
+		if (j > 0 && technique_exists(c, p, j + 1, without_effects))
+			ratio[j + 1] =
+				r * joint_over_drawn_ratio(c, p, j + 1, first_not_passed(c, p, j + 1, without_effects),
+							   without_effects);
 	}
-	bool beyond = r >= RATIO_LIMIT;
-	r = first * drawn_instead(c, p, false, plain);
+	bool exceeds_limit = r >= RATIO_LIMIT;
+	r = first * drawn_over_joint_ratio(c, p, false, without_effects);
 	double r_end = r; /* r at x_end, the nearest vertex on the camera's side of x_j that is not passed */
 	double r_refracted = 0;
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
-		r *= camera_pdf(c, p, j - 1, plain) / p->v[j - 1]->pdf;
+		r *= pdf_from_camera(c, p, j - 1, without_effects) / p->v[j - 1]->pdf;
 		bool passed = sees_through && path_joint_passes(p, j - 1);
 		if (!passed) {
 			r_end = r;
@@ -230,18 +245,19 @@ IN_BOTH void technique_ratios(struct path_context *c, const struct joined_path *
 		if (j - 1 == refracted.end)
 			r_refracted = r;
 		if (j - 1 == 1 && refracted.end) {
-			ratio[1] = r_refracted * refracted.ratio * toward / point;
-		} else if (technique_exists(c, p, j - 1, plain)) {
-			double here = passed ? r_end * over_drawn(c, p, j - 1, end, plain) : r;
-			ratio[j - 1] = j - 1 == 1 ? here * toward / point : here;
+			ratio[1] = r_refracted * refracted.ratio * pdf_toward / pdf_point;
+		} else if (technique_exists(c, p, j - 1, without_effects)) {
+			double ratio_here =
+				passed ? r_end * joint_over_drawn_ratio(c, p, j - 1, end, without_effects) : r;
+			ratio[j - 1] = j - 1 == 1 ? ratio_here * pdf_toward / pdf_point : ratio_here;
 		}
 	}
 	ratio[s] = 1;
-	if (beyond || r >= RATIO_LIMIT)
+	if (exceeds_limit || r >= RATIO_LIMIT)
 		ratio[s == 0 ? k : 0] = RATIO_LIMIT;
 }
 
-static void plain_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+static void ratios_without_effects(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
 	technique_ratios(c, p, max_s, ratio, true);
 }
@@ -257,20 +273,21 @@ void path_technique_ratios(struct path_context *c, const struct joined_path *p, 
 	if (EFFECT_IS_ON(c->w, joints))
 		ratios_with_effects(c, p, max_s, ratio);
 	else
-		plain_ratios(c, p, max_s, ratio);
+		ratios_without_effects(c, p, max_s, ratio);
 }
 
-IN_BOTH double balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s, const bool plain)
+FORCE_INLINE double balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s,
+				   const bool without_effects)
 {
-	double ratio[PATH_MAX_EDGES + 2], sum = 0;
+	double ratio[PATH_EDGES_MAX + 2], sum = 0;
 	/* The first technique that needs a light sub-path. */
-	unsigned with_light = behind_passed(c, p, 1, plain) == p->edges ? 1 : 2;
-	if (plain)
-		plain_ratios(c, p, max_s, ratio);
+	unsigned first_with_light = first_not_passed(c, p, 1, without_effects) == p->edges ? 1 : 2;
+	if (without_effects)
+		ratios_without_effects(c, p, max_s, ratio);
 	else
 		ratios_with_effects(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
-		sum += j >= with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
+		sum += j >= first_with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
 	return 1 / sum;
 }
 
@@ -279,94 +296,94 @@ double path_balance_weight(struct path_context *c, const struct joined_path *p, 
 	return balance_weight(c, p, max_s, !EFFECT_IS_ON(c->w, joints));
 }
 
-static void join(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
-		 struct joined_path *p)
+static void assemble_path(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+			  struct joined_path *p)
 {
 	p->s = s;
-	p->passed = c->passed_count;
+	p->passed_count = c->passed_count;
 	p->log_transfer = c->log_transfer;
-	p->edges = s + t - 1 + p->passed;
+	p->edges = s + t - 1 + p->passed_count;
 	for (unsigned i = 0; i < s; i++)
 		p->v[i] = &light[i];
-	for (unsigned i = 0; i < p->passed; i++)
-		p->v[s + i] = &c->passed[p->passed - 1 - i];
+	for (unsigned i = 0; i < p->passed_count; i++)
+		p->v[s + i] = &c->passed[p->passed_count - 1 - i];
 	for (unsigned i = 0; i < t; i++)
 		p->v[p->edges - i] = &c->camera[i];
 }
 
-spectrum path_collapse(spectrum l, bool dispersive)
+spectrum path_collapse_to_hero(spectrum l, bool dispersive)
 {
 	if (!dispersive)
 		return l;
 	return (spectrum){{SPECTRUM_LANES * l.v[0]}};
 }
 
-static bool disperses(const struct path_context *c, const struct joined_path *p)
+static bool is_dispersed(const struct path_context *c, const struct joined_path *p)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
-	bool any = c->dispersed;
-	for (unsigned i = 1; i < p->edges && !any; i++)
-		any = path_disperses(p->v[i]);
-	return any;
+	bool dispersed = c->dispersed;
+	for (unsigned i = 1; i < p->edges && !dispersed; i++)
+		dispersed = path_vertex_disperses(p->v[i]);
+	return dispersed;
 }
 
 /* Whether the edge lies in the medium that a sub-path from the light (or the camera) expects at its start. */
 static bool edge_is_in(const struct joined_edge *e, uint32_t medium, bool from_light)
 {
-	return e->edge->fits && medium == (from_light ? e->light : e->camera);
+	return e->edge->media_match && medium == (from_light ? e->light_medium : e->camera_medium);
 }
 
 /* Whether a sub-path from the camera would be in the same media along the edges that the light's sub-path made. */
-static bool camera_agrees(const struct path_context *c, const struct joined_path *p)
+static bool camera_media_agree(const struct path_context *c, const struct joined_path *p)
 {
 	double unused;
 	for (unsigned i = p->s; i-- > 1;) {
-		struct joined_edge e = edge_of(p, i), before = edge_of(p, i + 1);
+		struct joined_edge e = joined_edge_at(p, i), before = joined_edge_at(p, i + 1);
 		vec3 d = path_direction(p->v[i], p->v[i - 1], &unused);
-		if (!edge_is_in(&e, path_medium_after(c->w, p->v[i], before.light, d), false))
+		if (!edge_is_in(&e, path_medium_after(c->w, p->v[i], before.light_medium, d), false))
 			return false;
 	}
 	return true;
 }
 
-unsigned path_other_medium(const struct path_context *c, const struct joined_path *p)
+unsigned path_find_mismatched_edge(const struct path_context *c, const struct joined_path *p)
 {
 	double unused;
 	uint32_t medium = path_medium_of_emitter(c->w, p->v[0], path_direction(p->v[0], p->v[1], &unused));
 	for (unsigned i = 1; i <= p->edges; i++) {
-		struct joined_edge e = edge_of(p, i);
+		struct joined_edge e = joined_edge_at(p, i);
 		if (i > 1)
 			medium = path_medium_after(c->w, p->v[i - 1], medium,
 						   path_direction(p->v[i - 1], p->v[i], &unused));
 		if (!edge_is_in(&e, medium, true))
 			return i;
-		medium = e.camera;
+		medium = e.camera_medium;
 	}
 	return 0;
 }
 
-static __attribute__((noinline)) spectrum weighted_with_effects(struct path_context *c, struct joined_path *p,
-								unsigned max_s, spectrum l)
+static __attribute__((noinline)) spectrum weight_with_effects(struct path_context *c, struct joined_path *p,
+							      unsigned max_s, spectrum l)
 {
 	if (EFFECT_IS_ON(c->w, scattering)) {
-		p->other_medium = path_other_medium(c, p);
-		if (!technique_exists(c, p, p->s, false) || !camera_agrees(c, p))
-			return spectrum_of(0);
+		p->mismatched_edge = path_find_mismatched_edge(c, p);
+		if (!technique_exists(c, p, p->s, false) || !camera_media_agree(c, p))
+			return spectrum_constant(0);
 	}
-	return path_collapse(spectrum_scale(balance_weight(c, p, max_s, false), l), disperses(c, p));
+	return path_collapse_to_hero(spectrum_scale(balance_weight(c, p, max_s, false), l), is_dispersed(c, p));
 }
 
 /* Weights the contribution l of technique s. joint: edge s, where media scatter and s > 0. */
-static spectrum weighted(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
-			 unsigned max_s, const struct path_edge *joint, spectrum l)
+static spectrum weight_contribution(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+				    unsigned max_s, const struct path_edge *joint, spectrum l)
 {
 	struct joined_path p;
-	join(c, light, s, t, &p);
+	assemble_path(c, light, s, t, &p);
 	p.joint = joint;
-	p.other_medium = 0;
+	p.mismatched_edge = 0;
 	if (EFFECT_IS_ON(c->w, joints))
-		return weighted_with_effects(c, &p, max_s, l);
+		return weight_with_effects(c, &p, max_s, l);
 	return spectrum_scale(balance_weight(c, &p, max_s, true), l);
 }
 
@@ -374,16 +391,16 @@ static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	if (z->emitter < 0)
-		return spectrum_of(0);
-	spectrum l = spectrum_mul(z->beta, path_emitted(c, z, z->to_prev, &c->wl));
-	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, NULL, l);
+		return spectrum_constant(0);
+	spectrum l = spectrum_mul(z->beta, path_emitted_radiance(c, z, z->to_prev, &c->wl));
+	return spectrum_is_zero(l) ? l : weight_contribution(c, NULL, 0, t, max_s, NULL, l);
 }
 
 /* Returns the transmittance of the light sub-path's edges before its vertex s - 1, which the camera's side
  * reached through `medium`. */
-static spectrum absorption_of_light(const struct path_context *c, unsigned s, uint32_t medium)
+static spectrum transmittance_along_light(const struct path_context *c, unsigned s, uint32_t medium)
 {
-	spectrum t = spectrum_of(1);
+	spectrum t = spectrum_constant(1);
 	for (unsigned i = s - 1; i > 0; i--) {
 		const struct path_vertex *v = &c->light[i];
 		medium = path_medium_after(c->w, v, medium, v->to_prev);
@@ -394,89 +411,89 @@ static spectrum absorption_of_light(const struct path_context *c, unsigned s, ui
 
 /* Returns the transmittance of absorbing media along the way to z from the emitter, through y, vertex s - 1
  * of the light's sub-path. */
-static spectrum absorption_towards(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
-				   const struct path_vertex *y, unsigned s)
+static spectrum transmittance_to_light(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+				       const struct path_vertex *y, unsigned s)
 {
 	uint32_t medium = path_medium_after(c->w, z, z->edge.medium, to_light);
-	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), absorption_of_light(c, s, medium));
+	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), transmittance_along_light(c, s, medium));
 }
 
-static bool only_absorbs(const struct path_context *c)
+static bool media_only_absorb(const struct path_context *c)
 {
 	return EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering);
 }
 
-static inline spectrum after_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
-					const struct path_vertex *y, unsigned s, spectrum l)
+static inline spectrum attenuate_by_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+					       const struct path_vertex *y, unsigned s, spectrum l)
 {
-	return only_absorbs(c) ? spectrum_mul(l, absorption_towards(c, z, to_light, y, s)) : l;
+	return media_only_absorb(c) ? spectrum_mul(l, transmittance_to_light(c, z, to_light, y, s)) : l;
 }
 
 /* Whether z and y see each other. Where media scatter, also fills in the edge between them and multiplies
  * *l by its transmittance. */
-static bool is_seen(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
-		    struct path_edge *joint, spectrum *l)
+static bool is_visible_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+				struct path_edge *joint, spectrum *l)
 {
-	spectrum left;
+	spectrum transmittance;
 	if (!EFFECT_IS_ON(c->w, scattering))
-		return path_visible(c, z, y);
-	if (!path_see_in_media(c, z, y, joint, &left))
+		return path_is_visible(c, z, y);
+	if (!path_is_visible_in_media(c, z, y, joint, &transmittance))
 		return false;
-	*l = spectrum_mul(*l, left);
+	*l = spectrum_mul(*l, transmittance);
 	return !spectrum_is_zero(*l);
 }
 
-static __attribute__((noinline)) spectrum seen_with_effects(struct path_context *c, const struct path_vertex *y,
-							    unsigned s, unsigned t, vec3 to_light, spectrum l,
-							    spectrum direct, struct path_edge *joint)
+static __attribute__((noinline)) spectrum visible_part_with_effects(struct path_context *c, const struct path_vertex *y,
+								    unsigned s, unsigned t, vec3 to_light, spectrum l,
+								    spectrum direct, struct path_edge *joint)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
-	spectrum left;
-	const bool through = path_sees_through(c);
-	if (s + t > c->min_depth && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
+	spectrum transmittance;
+	const bool can_pass = path_allows_see_through(c);
+	if (s + t > c->min_depth && !spectrum_is_zero(direct) && is_visible_in_media(c, z, y, joint, &direct))
 		return direct;
-	if (!through || spectrum_is_zero(l))
-		return spectrum_of(0);
-	bool open = path_see_through(c, t > 1 ? z - 1 : NULL, z, y, &left);
+	if (!can_pass || spectrum_is_zero(l))
+		return spectrum_constant(0);
+	bool is_open = path_trace_passed(c, t > 1 ? z - 1 : NULL, z, y, &transmittance);
 	unsigned edges = s + t - 1 + c->passed_count;
-	if (!open || edges < c->min_depth || edges > c->max_depth) {
+	if (!is_open || edges < c->min_depth || edges > c->max_depth) {
 		c->passed_count = 0;
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	}
-	l = spectrum_mul(l, left);
-	return after_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
+	l = spectrum_mul(l, transmittance);
+	return attenuate_by_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
 }
 
 /* Returns the part of l that reaches the camera's vertex t - 1 from y, vertex s - 1 of the light's sub-path,
  * directly or through surfaces; zero if they do not see each other. direct: l after absorption by media for a
  * joint that passes nothing. */
-static inline spectrum if_visible(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t,
-				  vec3 to_light, spectrum l, spectrum direct, struct path_edge *joint)
+static inline spectrum visible_part(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t,
+				    vec3 to_light, spectrum l, spectrum direct, struct path_edge *joint)
 {
 	if (EFFECT_IS_ON(c->w, joints))
-		return seen_with_effects(c, y, s, t, to_light, l, direct, joint);
-	bool is_open = s + t > c->min_depth && !spectrum_is_zero(l) && path_visible(c, &c->camera[t - 1], y);
-	return is_open ? l : spectrum_of(0);
+		return visible_part_with_effects(c, y, s, t, to_light, l, direct, joint);
+	bool is_open = s + t > c->min_depth && !spectrum_is_zero(l) && path_is_visible(c, &c->camera[t - 1], y);
+	return is_open ? l : spectrum_constant(0);
 }
 
 /* Returns the contribution of the refracted path from y, drawn with density pdf, to the camera's vertex t - 1; zero
  * if there is no such path. */
-static spectrum refracted(struct path_context *c, const struct path_vertex *y, unsigned t, double pdf)
+static spectrum join_refracted(struct path_context *c, const struct path_vertex *y, unsigned t, double pdf)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
-	spectrum left;
+	spectrum transmittance;
 	double distance2, unused;
-	if (!path_refract_to(c, z - 1, z, y, &left) || t + c->passed_count < c->min_depth ||
+	if (!path_trace_refracted(c, z - 1, z, y, &transmittance) || t + c->passed_count < c->min_depth ||
 	    t + c->passed_count > c->max_depth) {
 		c->passed_count = 0;
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	}
 	const struct path_vertex *first = &c->passed[0], *last = &c->passed[c->passed_count - 1];
 	vec3 d = path_direction(z, first, &distance2), to_light = path_direction(last, y, &unused);
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, d)),
-				  path_emitted(c, y, vec3_neg(to_light), &c->wl));
+				  path_emitted_radiance(c, y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_geometry_term(z, first, d, distance2) * exp(c->log_transfer) / pdf, l);
-	return after_absorption(c, last, to_light, y, 1, spectrum_mul(l, left));
+	return attenuate_by_absorption(c, last, to_light, y, 1, spectrum_mul(l, transmittance));
 }
 
 static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
@@ -484,46 +501,47 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex y;
 	double pdf, distance2;
-	if (!path_scatters_smoothly(z) || !path_next_event(c, z, &y, &pdf))
-		return spectrum_of(0);
+	if (!path_scatters_smoothly(z) || !path_draw_next_event(c, z, &y, &pdf))
+		return spectrum_constant(0);
 	vec3 to_light = path_direction(z, &y, &distance2);
 	if (!(distance2 > 0))
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
-	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
+	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted_radiance(c, &y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
 	struct path_edge joint;
-	l = if_visible(c, &y, 1, t, to_light, l, after_absorption(c, z, to_light, &y, 1, l), &joint);
-	if (spectrum_is_zero(l) && path_refracts(c) && path_tries_to_refract(c, z - 1, z, &y, pdf, f))
-		l = refracted(c, &y, t, pdf);
-	return spectrum_is_zero(l) ? l : weighted(c, &y, 1, t, max_s, &joint, l);
+	l = visible_part(c, &y, 1, t, to_light, l, attenuate_by_absorption(c, z, to_light, &y, 1, l), &joint);
+	if (spectrum_is_zero(l) && path_allows_refraction(c) && path_should_refract(c, z - 1, z, &y, pdf, f))
+		l = join_refracted(c, &y, t, pdf);
+	return spectrum_is_zero(l) ? l : weight_contribution(c, &y, 1, t, max_s, &joint, l);
 }
 
 /* Projects y on the film as seen from the lens. Sets the film point, the unit direction d to y, and *jac, the film's
  * density per area at y. Returns false if the film does not see y. */
-static bool project(const struct path_context *c, const struct path_vertex *y, double film[2], vec3 *d, double *jac)
+static bool project_on_film(const struct path_context *c, const struct path_vertex *y, double film[2], vec3 *d,
+			    double *jac)
 {
 	const struct path_vertex *eye = &c->camera[0];
 	double distance2;
-	struct camera room;
-	const struct camera *camera = world_camera(c->w, &eye->x, &room);
+	struct camera storage;
+	const struct camera *camera = world_camera(c->w, &eye->x, &storage);
 	*d = path_direction(eye, y, &distance2);
 	if (!(distance2 > 0) || !camera_project(camera, eye->x.p, *d, sqrt(distance2), &film[0], &film[1]))
 		return false;
-	if (!film_window_holds(&c->window, film))
+	if (!film_window_contains(&c->window, film))
 		return false;
 	*jac = camera_jac_film_from_solid(camera, *d) * path_jac_solid_from_vertex(y, *d, distance2);
 	return true;
 }
 
-/* Joins the s vertices from `light` on to the lens. l is the contribution without visibility and absorption. */
+/* Joins the s vertices from `light_medium` on to the lens. l is the contribution without visibility and absorption. */
 static spectrum join_lens(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned max_s, vec3 d,
 			  spectrum l)
 {
 	const struct path_vertex *y = &light[s - 1];
 	struct path_edge joint;
-	l = if_visible(c, y, s, 1, d, l, after_absorption(c, &c->camera[0], d, y, s, l), &joint);
-	return spectrum_is_zero(l) ? l : weighted(c, light, s, 1, max_s, &joint, l);
+	l = visible_part(c, y, s, 1, d, l, attenuate_by_absorption(c, &c->camera[0], d, y, s, l), &joint);
+	return spectrum_is_zero(l) ? l : weight_contribution(c, light, s, 1, max_s, &joint, l);
 }
 
 static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
@@ -531,8 +549,8 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	const struct path_vertex *y = &c->light[s - 1];
 	vec3 d;
 	double jac;
-	if (!project(c, y, film, &d, &jac))
-		return spectrum_of(0);
+	if (!project_on_film(c, y, film, &d, &jac))
+		return spectrum_constant(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
 	return join_lens(c, c->light, s, max_s, d, spectrum_scale(jac, l));
 }
@@ -543,27 +561,27 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	struct path_vertex y;
 	double pdf, jac;
 	vec3 d;
-	if (!path_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) ||
-	    !lens_joins(c, &c->camera[0], &y))
-		return spectrum_of(0);
-	if (!project(c, &y, film, &d, &jac))
-		return spectrum_of(0);
-	spectrum l = spectrum_scale(jac / pdf, path_emitted(c, &y, vec3_neg(d), &c->wl));
+	if (!path_draw_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) ||
+	    !can_join_lens(c, &c->camera[0], &y))
+		return spectrum_constant(0);
+	if (!project_on_film(c, &y, film, &d, &jac))
+		return spectrum_constant(0);
+	spectrum l = spectrum_scale(jac / pdf, path_emitted_radiance(c, &y, vec3_neg(d), &c->wl));
 	return join_lens(c, &y, 1, max_s, d, l);
 }
 
 /* Returns the factor by which a connection with contribution l counts: 1, or, if it is faint, 1 / q with probability q
  * and otherwise 0, which saves its rays. q should depend on the weight of the connection, but that is not known yet;
  * light_every / edges stands for it, as if all techniques had the same weight. So the contribution of a faint
- * connection that is made is at most `edges` times `faint`, whatever its weight turns out to be. */
-static double times_made(struct path_context *c, unsigned edges, spectrum l)
+ * connection that is made is at most `edges` times `faint_threshold`, whatever its weight turns out to be. */
+static double faint_connection_factor(struct path_context *c, unsigned edges, spectrum l)
 {
-	double brings = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
-	if (!isgreater(brings, 0) || !isless(brings, c->faint))
+	double estimate = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
+	if (!isgreater(estimate, 0) || !isless(estimate, c->faint_threshold))
 		return 1;
-	double q = brings / c->faint, from = c->faint_place;
-	c->faint_place += q;
-	return floor(c->faint_place) > floor(from) ? 1 / q : 0;
+	double q = estimate / c->faint_threshold, start = c->faint_position;
+	c->faint_position += q;
+	return floor(c->faint_position) > floor(start) ? 1 / q : 0;
 }
 
 static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, unsigned max_s)
@@ -572,21 +590,21 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	double distance2;
 	vec3 to_light = path_direction(z, y, &distance2);
 	if (!(distance2 > 0))
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
 	if (spectrum_is_zero(l)) /* usually because z lies behind an opaque surface at y */
 		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(path_geometry_term(z, y, to_light, distance2), l);
-	spectrum direct = after_absorption(c, z, to_light, y, s, l);
+	spectrum direct = attenuate_by_absorption(c, z, to_light, y, s, l);
 	if (spectrum_is_zero(l))
 		return l;
-	double times = times_made(c, s + t - 1, direct);
-	if (times == 0)
-		return spectrum_of(0);
+	double factor = faint_connection_factor(c, s + t - 1, direct);
+	if (factor == 0)
+		return spectrum_constant(0);
 	struct path_edge joint;
-	l = if_visible(c, y, s, t, to_light, spectrum_scale(times, l), spectrum_scale(times, direct), &joint);
-	return spectrum_is_zero(l) ? l : weighted(c, c->light, s, t, max_s, &joint, l);
+	l = visible_part(c, y, s, t, to_light, spectrum_scale(factor, l), spectrum_scale(factor, direct), &joint);
+	return spectrum_is_zero(l) ? l : weight_contribution(c, c->light, s, t, max_s, &joint, l);
 }
 
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2])
@@ -595,7 +613,7 @@ spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned m
 	if (s == 0)
 		return hit_emitter(c, t, max_s);
 	if (t > 1 && c->camera[t - 1].kind == VERTEX_INFINITE)
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	if (t == 1)
 		return s == 1 ? join_emitter_to_lens(c, max_s, film) : join_camera(c, s, max_s, film);
 	return s == 1 ? join_emitter(c, t, max_s) : join_surfaces(c, s, t, max_s);

@@ -20,19 +20,19 @@ struct joined_path {
 	unsigned edges, s;
 	/* x_s .. x_{s+passed-1} belong to neither sub-path: the joint passes them (transparent.h) or is refracted at
 	 * them (refracted.h), which needs s = 1. */
-	unsigned passed;
+	unsigned passed_count;
 	double log_transfer; /* log T of refracted.h, if the joint is refracted */
-	const struct path_vertex *v[PATH_MAX_EDGES + 2];
+	const struct path_vertex *v[PATH_EDGES_MAX + 2];
 	/* Set where media scatter; otherwise unused and 0. Edge i joins x_{i-1} and x_i. */
 	const struct path_edge *joint; /* edge s; its `before` is the medium at x_s */
 	/* The first edge whose media a light sub-path would see differently; 0: none. */
-	unsigned other_medium;
+	unsigned mismatched_edge;
 };
 
 /* Emitters are only joined to the lens where the density of their points, times the fraction of samples
  * that do so, is at least this many times the density of the film samples, that is, where they cover less
  * than a hundredth of the film. */
-#define PATH_LENS_DENSER 100.0
+#define PATH_LENS_DENSITY_RATIO 100.0
 
 /* Fills ratio[0..edges] with the density of technique j for this path divided by the density of the technique s that
  * made it; 0 where j cannot make the path or has more than max_s light vertices. */
@@ -41,19 +41,19 @@ void path_technique_ratios(struct path_context *c, const struct joined_path *p, 
  * ratios, where the ratios of techniques that need a light sub-path are divided by light_every. */
 double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s);
 
-/* Computes joined_path.other_medium. Only where media scatter. */
-unsigned path_other_medium(const struct path_context *c, const struct joined_path *p);
+/* Computes joined_path.mismatched_edge. Only where media scatter. */
+unsigned path_find_mismatched_edge(const struct path_context *c, const struct joined_path *p);
 
 /* Returns the contribution of a whole path whose contribution before dispersion is l. If the path scatters at a
  * dispersive BSDF, in whatever way, its directions and densities are those of nm[0], so only that wavelength
  * counts, four times. This is unbiased because nm[0] is uniform. Dispersion is a property of the path, so all
  * techniques that make it agree. */
-spectrum path_collapse(spectrum l, bool dispersive);
+spectrum path_collapse_to_hero(spectrum l, bool dispersive);
 
 /* Whether connections can pass surfaces or be refracted, and so have vertices of their own. */
 static inline bool path_joints_have_vertices(const struct path_context *c)
 {
-	return path_sees_through(c) || path_refracts(c);
+	return path_allows_see_through(c) || path_allows_refraction(c);
 }
 
 /* Whether joining s light vertices to t camera vertices can make a path of an admissible length. Passed surfaces add
@@ -67,7 +67,8 @@ static inline bool path_may_connect(const struct path_context *c, unsigned s, un
  * because the path scatters there. */
 static inline bool path_joint_passes(const struct joined_path *p, unsigned i)
 {
-	return i > 0 && i < p->edges && i + 1 != p->s && i != p->s + p->passed && path_is_passed(p->v[i]);
+	return i > 0 && i < p->edges && i + 1 != p->s && i != p->s + p->passed_count &&
+	       path_vertex_is_see_through(p->v[i]);
 }
 
 /* Returns the contribution f / p of joining the first s vertices of c->light to the first t of c->camera, weighted

@@ -5,10 +5,10 @@
  * ensemble_draw draws the two sub-paths and connects them by every technique (s, t), s vertices from the light and t
  * from the camera. The intensity of a candidate is that of its contribution, weighted by multiple importance sampling
  * (Veach 1997) and, where lengths are limited at random, divided by survival(s) survival(t), with survival(n) = min(1,
- * (5/n)^2). ensemble_choose takes candidate i with probability intensity_i / total. ensemble_around draws a technique
- * of the given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at random; x
- * itself contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are left out,
- * and ensemble_choose returns false where no candidate is left.
+ * (5/n)^2). ensemble_choose takes candidate i with probability intensity_i / total. ensemble_draw_containing draws a
+ * technique of the given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at
+ * random; x itself contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are
+ * left out, and ensemble_choose returns false where no candidate is left.
  */
 #include "worker/render/path/ensemble.h"
 
@@ -20,71 +20,71 @@
  * where nothing else ends it. With a fixed probability of continuing, the weights of long paths would grow as
  * fast as their light decays, or faster between mirrors and in fibres, where it hardly decays: rare samples
  * would hold most of the light. */
-enum { SURE_VERTICES = 5 };
+enum { GUARANTEED_VERTICES = 5 };
 
-/* Draws a number of vertices from max(least, SURE_VERTICES) to `most`: n or more with probability
+/* Draws a number of vertices from max(least, GUARANTEED_VERTICES) to `most`: n or more with probability
  * survival(n) / survival(least). */
-static unsigned draw_vertices(double u, unsigned least, unsigned most)
+static unsigned draw_vertex_count(double u, unsigned min, unsigned max)
 {
-	unsigned from = least > SURE_VERTICES ? least : SURE_VERTICES;
-	if (most <= from)
-		return from;
-	return (unsigned)fmin(floor(from / sqrt(1 - u)), most);
+	unsigned start = min > GUARANTEED_VERTICES ? min : GUARANTEED_VERTICES;
+	if (max <= start)
+		return start;
+	return (unsigned)fmin(floor(start / sqrt(1 - u)), max);
 }
 
-struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera,
-					    unsigned light)
+struct ensemble_lengths ensemble_draw_lengths(const struct path_context *c, const double u[2], unsigned camera,
+					      unsigned light)
 {
-	return (struct ensemble_lengths){draw_vertices(u[0], camera, c->max_depth + 1),
-					 draw_vertices(u[1], light, c->max_depth), true};
+	return (struct ensemble_lengths){draw_vertex_count(u[0], camera, c->max_depth + 1),
+					 draw_vertex_count(u[1], light, c->max_depth), true};
 }
 
-struct ensemble_lengths ensemble_all_lengths(const struct path_context *c)
+struct ensemble_lengths ensemble_max_lengths(const struct path_context *c)
 {
 	return (struct ensemble_lengths){c->max_depth + 1, c->max_depth, false};
 }
 
 /* The probability that a sub-path may have n vertices or more. */
-static double survival(unsigned n)
+static double survival_probability(unsigned n)
 {
-	return n > SURE_VERTICES ? (double)(SURE_VERTICES * SURE_VERTICES) / ((double)n * n) : 1;
+	return n > GUARANTEED_VERTICES ? (double)(GUARANTEED_VERTICES * GUARANTEED_VERTICES) / ((double)n * n) : 1;
 }
 
 /* Returns the contribution of joining s vertices of the light's sub-path to t of the camera's. */
-static double contribution(struct path_context *c, unsigned s, unsigned t)
+static double candidate_intensity(struct path_context *c, unsigned s, unsigned t)
 {
 	double film[2];
-	struct path_sample one; /* its large array of splats stays uninitialised */
-	one.count = 0;
-	one.intensity = 0;
-	spectrum l = path_connect(c, s, t, PATH_MAX_EDGES, film);
+	struct path_sample sample; /* its large array of splats stays uninitialised */
+	sample.splat_count = 0;
+	sample.intensity = 0;
+	spectrum l = path_connect(c, s, t, PATH_EDGES_MAX, film);
 	if (!spectrum_is_zero(l))
-		path_splat(c, &one, 0, 0, l);
-	return one.intensity;
+		path_add_splat(c, &sample, 0, 0, l);
+	return sample.intensity;
 }
 
-/* Computes the candidates of two sub-paths with these numbers of vertices. capped: lengths were limited at random.
+/* Computes the candidates of two sub-paths with these numbers of vertices. randomized: lengths were limited at random.
  * known: NULL, or a candidate whose contribution is already known. */
-static void gather_candidates(struct path_context *c, unsigned camera, unsigned light, bool capped,
+static void gather_candidates(struct path_context *c, unsigned camera, unsigned light, bool randomized,
 			      const struct candidate *known, struct ensemble *out)
 {
 	out->total = 0;
 	out->count = 0;
-	unsigned most_light = light > 1 ? light : 1, most = camera + most_light - 1;
-	for (unsigned n = path_joints_have_vertices(c) ? 2 : c->min_depth + 1; n <= c->max_depth + 1 && n <= most + 1;
-	     n++)
-		for (unsigned s = n > camera ? n - camera : 0; s < n && s <= most_light; s++) {
+	unsigned max_light = light > 1 ? light : 1, max_edges = camera + max_light - 1;
+	for (unsigned n = path_joints_have_vertices(c) ? 2 : c->min_depth + 1;
+	     n <= c->max_depth + 1 && n <= max_edges + 1; n++)
+		for (unsigned s = n > camera ? n - camera : 0; s < n && s <= max_light; s++) {
 			unsigned t = n - s;
 			if ((t == 1 && s < 2) || !path_may_connect(c, s, t))
 				continue;
-			bool is_known = known && known->s == s && known->edges + 1 - known->passed == n;
-			double i = is_known ? known->intensity : contribution(c, s, t);
-			unsigned passed = is_known ? known->passed : c->passed_count;
-			if (capped)
-				i /= survival(t) * survival(s);
+			bool is_known = known && known->s == s && known->edges + 1 - known->passed_count == n;
+			double i = is_known ? known->intensity : candidate_intensity(c, s, t);
+			unsigned passed = is_known ? known->passed_count : c->passed_count;
+			if (randomized)
+				i /= survival_probability(t) * survival_probability(s);
 			if (!(i > 0))
 				continue;
-			out->of[out->count++] = (struct candidate){i, s, passed, n - 1 + passed};
+			out->candidates[out->count++] = (struct candidate){i, s, passed, n - 1 + passed};
 			out->total += i;
 		}
 }
@@ -92,37 +92,37 @@ static void gather_candidates(struct path_context *c, unsigned camera, unsigned 
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out)
 {
 	double film[2];
-	c->one_way = false;
-	unsigned camera = path_walk_camera(c, s, n->camera, film), light = path_walk_light(c, s, n->light);
-	gather_candidates(c, camera, light, n->capped, NULL, out);
+	c->unidirectional = false;
+	unsigned camera = path_walk_camera(c, s, n->max_camera, film), light = path_walk_light(c, s, n->max_light);
+	gather_candidates(c, camera, light, n->randomized, NULL, out);
 }
 
 bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x)
 {
 	if (e->count == 0)
 		return false;
-	double rest = u * e->total;
+	double remaining = u * e->total;
 	unsigned i = 0;
-	while (i + 1 < e->count && rest >= e->of[i].intensity)
-		rest -= e->of[i++].intensity;
-	return full_path_from_subpaths(c, e->of[i].s, e->of[i].passed, e->of[i].edges, x);
+	while (i + 1 < e->count && remaining >= e->candidates[i].intensity)
+		remaining -= e->candidates[i++].intensity;
+	return full_path_from_subpaths(c, e->candidates[i].s, e->candidates[i].passed_count, e->candidates[i].edges, x);
 }
 
-/* Returns the throughput at the end of edge e: beta, the throughput at its start, times the scattering f at v[at],
+/* Returns the throughput at the end of edge e: beta, the throughput at its start, times the scattering f at v[start],
  * times the geometry term, divided by the density pdf. */
-static spectrum extend_weight(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f,
-			      unsigned at, unsigned e, double pdf)
+static spectrum extend_throughput(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f,
+				  unsigned start, unsigned e, double pdf)
 {
-	const struct path_vertex *v = &x->v[at];
+	const struct path_vertex *v = &x->v[start];
 	const struct full_path_edge *g = &x->edge[e];
 	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
-	if (at > 0 && !v->delta && v->kind != VERTEX_MEDIUM)
-		geometry *= full_path_cosine_to_light(x, at) / fabs(vec3_dot(v->x.ng, x->edge[at - 1].w));
-	spectrum all = spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
-	return EFFECT_IS_ON(c->w, scattering) ? spectrum_mul(all, g->left) : all;
+	if (start > 0 && !v->delta && v->kind != VERTEX_MEDIUM)
+		geometry *= full_path_cosine_to_light(x, start) / fabs(vec3_dot(v->x.ng, x->edge[start - 1].w));
+	spectrum throughput = spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
+	return EFFECT_IS_ON(c->w, scattering) ? spectrum_mul(throughput, g->transmittance) : throughput;
 }
 
-static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned vertex, struct path_vertex *v)
+static void set_next_event_numbers(struct sampler *s, enum sampler_side side, unsigned vertex, struct path_vertex *v)
 {
 	const double *u = s->block(s, side, vertex);
 	for (int i = 0; i < 3; i++)
@@ -130,27 +130,27 @@ static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned ver
 }
 
 /* Makes x_k .. x_{k-t+1} the camera's sub-path; t >= 2. The wavelengths are those of x. */
-static void put_camera(struct path_context *c, struct sampler *s, struct full_path *x, unsigned t)
+static void set_camera_subpath(struct path_context *c, struct sampler *s, struct full_path *x, unsigned t)
 {
 	unsigned k = x->edges;
 	struct path_vertex *v = c->camera;
 	for (unsigned i = 0; i < t; i++) {
 		v[i] = x->v[k - i];
-		keep_numbers(s, SIDE_CAMERA, i, &v[i]);
+		set_next_event_numbers(s, SIDE_CAMERA, i, &v[i]);
 		if (v[i].kind == VERTEX_EMITTER)
 			v[i].kind = VERTEX_SURFACE;
 	}
-	v[0].beta = spectrum_of(1);
+	v[0].beta = spectrum_constant(1);
 	v[0].edge.medium = c->w->camera_medium;
-	v[1].beta = spectrum_of(c->window.width * c->window.height);
+	v[1].beta = spectrum_constant(c->window.width * c->window.height);
 	if (EFFECT_IS_ON(c->w, scattering))
 		v[1].beta = spectrum_scale(v[1].beta.v[0] / path_edge_pdf(c, &v[1].edge, v[1].edge.medium, &v[1]),
-					   x->edge[k - 1].left);
+					   x->edge[k - 1].transmittance);
 	else if (EFFECT_IS_ON(c->w, absorption))
 		path_absorb(c, &v[0], vec3_neg(x->edge[k - 1].w), &v[1]);
 	for (unsigned i = 2; i < t; i++) {
-		v[i].beta =
-			extend_weight(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+		v[i].beta = extend_throughput(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i,
+					      v[i].pdf);
 		if (EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering))
 			path_absorb(c, &v[i - 1], vec3_neg(x->edge[k - i].w), &v[i]);
 	}
@@ -158,16 +158,16 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 }
 
 /* Turns the edge of x_i, which refers to x_{i+1} in a whole path, into the one that comes from x_{i-1}. */
-static void turn_edge(const struct full_path *x, unsigned i, struct path_vertex *v)
+static void reverse_edge(const struct full_path *x, unsigned i, struct path_vertex *v)
 {
 	v->to_prev = vec3_neg(x->edge[i - 1].w);
 	v->edge = x->v[i - 1].edge;
-	v->edge.medium = x->v[i - 1].edge.before;
-	v->edge.before = x->v[i - 1].edge.medium;
+	v->edge.medium = x->v[i - 1].edge.previous_medium;
+	v->edge.previous_medium = x->v[i - 1].edge.medium;
 }
 
 /* Makes x_0 .. x_{s-1} the light's sub-path; s >= 2. */
-static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path *x, unsigned s)
+static void set_light_subpath(struct path_context *c, struct sampler *sampler, struct full_path *x, unsigned s)
 {
 	struct path_vertex *v = c->light;
 	for (unsigned i = 0; i < s; i++) {
@@ -175,60 +175,61 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 		v[i].pdf = x->v[i].pdf_rev;
 		v[i].pdf_rev = x->v[i].pdf;
 		if (i > 0)
-			turn_edge(x, i, &v[i]);
-		keep_numbers(s_numbers, SIDE_LIGHT, i, &v[i]);
+			reverse_edge(x, i, &v[i]);
+		set_next_event_numbers(sampler, SIDE_LIGHT, i, &v[i]);
 	}
-	v[0].beta = spectrum_of(1 / v[0].pdf);
+	v[0].beta = spectrum_constant(1 / v[0].pdf);
 	for (unsigned i = 1; i < s; i++)
-		v[i].beta = extend_weight(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+		v[i].beta = extend_throughput(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
 	v[s - 1].delta = false;
 }
 
 /* A sampler whose first blocks are those of path x: the camera's has x's wavelength and point of the aperture, the
- * light's has x's time. All other numbers come from `under`. */
+ * light's has x's time. All other numbers come from `inner`. */
 struct pinned_sampler {
 	struct sampler base;
-	struct sampler *under;
-	double block[SAMPLER_BLOCK], wavelength, aperture[2], time;
+	struct sampler *inner;
+	double block[SAMPLER_BLOCK_SIZE], wavelength_u, aperture[2], time;
 };
 
 static const double *pinned_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
 	struct pinned_sampler *p = (struct pinned_sampler *)(void *)base;
-	const double *u = p->under->block(p->under, side, vertex);
+	const double *u = p->inner->block(p->inner, side, vertex);
 	if (vertex != 0)
 		return u;
-	for (int i = 0; i < SAMPLER_BLOCK; i++)
+	for (int i = 0; i < SAMPLER_BLOCK_SIZE; i++)
 		p->block[i] = u[i];
 	if (side == SIDE_LIGHT) {
 		p->block[DIM_TIME] = p->time;
 		return p->block;
 	}
-	p->block[DIM_WAVELENGTH] = p->wavelength;
+	p->block[DIM_WAVELENGTH] = p->wavelength_u;
 	p->block[DIM_APERTURE_U] = p->aperture[0];
 	p->block[DIM_APERTURE_V] = p->aperture[1];
 	return p->block;
 }
 
-static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path *x, unsigned most)
+static unsigned walk_pinned_camera(struct path_context *c, struct sampler *s, const struct full_path *x,
+				   unsigned max_vertices)
 {
 	struct pinned_sampler pinned = {
-		.base = {pinned_block}, .under = s, .wavelength = x->wavelength, .time = full_path_time(x)};
+		.base = {pinned_block}, .inner = s, .wavelength_u = x->wavelength_u, .time = full_path_time(x)};
 	double film[2];
-	struct camera room;
-	camera_point_inverse(world_camera(c->w, &x->v[x->edges].x, &room), x->v[x->edges].x.p, pinned.aperture);
-	return path_walk_camera(c, &pinned.base, most, film);
+	struct camera storage;
+	camera_point_inverse(world_camera(c->w, &x->v[x->edges].x, &storage), x->v[x->edges].x.p, pinned.aperture);
+	return path_walk_camera(c, &pinned.base, max_vertices, film);
 }
 
 /* Turns an emitter's point into a vertex on the surface, as if a sub-path had hit it. Returns false if it cannot. */
-static bool stands_on_surface(const struct path_context *c, struct path_vertex *v)
+static bool place_on_surface(const struct path_context *c, struct path_vertex *v)
 {
 	if (v->kind == VERTEX_INFINITE)
 		return false;
 	if (!v->bsdf) {
-		if (!surface_near(&c->w->shapes[v->x.prim.shape], v->x.prim, v->x.p, &v->x))
+		if (!surface_nearest(&c->w->shapes[v->x.prim.shape], v->x.prim, v->x.p, &v->x))
 			return false;
-		v->bsdf = &c->w->bsdfs[c->w->parts[v->x.prim.shape].bsdf];
+		v->bsdf = &c->w->bsdfs[c->w->shape_bindings[v->x.prim.shape].bsdf];
 	}
 	return true;
 }
@@ -248,34 +249,34 @@ static unsigned choose_technique(const double *log_pdf, unsigned k, double log_s
 	return s;
 }
 
-void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path *x, const double u[3],
-		     struct ensemble *out)
+void ensemble_draw_containing(struct path_context *c, struct sampler *sampler, struct full_path *x, const double u[3],
+			      struct ensemble *out)
 {
 	unsigned k = x->edges;
-	double log_pdf[FULL_PATH_MAX_VERTICES];
-	full_path_log_techniques(c, x, log_pdf);
+	double log_pdf[FULL_PATH_VERTICES_MAX];
+	full_path_log_technique_pdfs(c, x, log_pdf);
 	double log_sum = log_sum_exp(log_pdf, k + 1);
 	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]),
-		 passed = s > 0 ? full_path_joint_vertices(c, x, s) : 0, t = k + 1 - s - passed;
+		 passed = s > 0 ? full_path_joint_vertex_count(c, x, s) : 0, t = k + 1 - s - passed;
 	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, passed, k};
-	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
-	c->one_way = false;
+	struct ensemble_lengths n = ensemble_draw_lengths(c, u + 1, t, s);
+	c->unidirectional = false;
 	c->wl = x->wl;
 	c->time = full_path_time(x);
 	unsigned camera = t, light = s;
 	if (t >= 2) {
-		put_camera(c, sampler, x, t);
-		if (s > 0 || stands_on_surface(c, &c->camera[t - 1]))
-			camera = path_walk_on(c, sampler, SIDE_CAMERA, t, n.camera);
+		set_camera_subpath(c, sampler, x, t);
+		if (s > 0 || place_on_surface(c, &c->camera[t - 1]))
+			camera = path_continue_walk(c, sampler, SIDE_CAMERA, t, n.max_camera);
 	} else {
-		camera = walk_camera(c, sampler, x, n.camera);
+		camera = walk_pinned_camera(c, sampler, x, n.max_camera);
 		c->wl = x->wl;
 	}
 	if (s >= 2) {
-		put_light(c, sampler, x, s);
-		light = path_walk_on(c, sampler, SIDE_LIGHT, s, n.light);
+		set_light_subpath(c, sampler, x, s);
+		light = path_continue_walk(c, sampler, SIDE_LIGHT, s, n.max_light);
 	} else {
-		light = path_walk_light(c, sampler, n.light);
+		light = path_walk_light(c, sampler, n.max_light);
 	}
 	gather_candidates(c, camera, light, true, &known, out);
 }

@@ -5,7 +5,7 @@
  * full_path_from_subpaths builds a path from two sub-paths. The scattering factors f and f_h of its vertices are
  * computed on first use and cached; products over the vertices keep their exponents apart, so that long chains of
  * narrow lobes neither over- nor underflow. A mutation copies the vertices that it changes (full_path_copy) and
- * invalidates the caches of what it touched (full_path_forget).
+ * invalidates the caches of what it touched (full_path_invalidate).
  *
  * A vertex whose sides, mode and materials contradict each other has f = 0. Functions that build or check a path return
  * false for one that does not exist or is black; nothing else fails.
@@ -24,7 +24,7 @@
 
 /* Scales s by a power of two if it leaves the range, and returns the exponent taken out. The values of lobes reach down
  * to the smallest doubles, so both factors of a product have to be rescaled before they are multiplied. */
-static int bring_near_one(spectrum *s)
+static int take_out_exponent(spectrum *s)
 {
 	double m = spectrum_max(*s);
 	if ((m < PRODUCT_HIGH && m > PRODUCT_LOW) || !(m > 0) || !isfinite(m))
@@ -38,16 +38,16 @@ static int bring_near_one(spectrum *s)
 
 void product_mul(struct product *p, spectrum f)
 {
-	p->exponent += bring_near_one(&f);
+	p->exponent += take_out_exponent(&f);
 	p->v = spectrum_mul(p->v, f);
-	p->exponent += bring_near_one(&p->v);
+	p->exponent += take_out_exponent(&p->v);
 }
 
 /* Whether some vertex disperses light, so that the path only carries its hero wavelength. */
 static bool full_path_is_dispersed(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
-		if (path_disperses(&x->v[j]))
+		if (path_vertex_disperses(&x->v[j]))
 			return true;
 	return false;
 }
@@ -55,7 +55,7 @@ static bool full_path_is_dispersed(const struct full_path *x)
 static void to_xyz(const struct path_context *c, const struct full_path *x, spectrum l, double xyz[3])
 {
 	if (EFFECT_IS_ON(c->w, dispersion))
-		l = path_collapse(l, full_path_is_dispersed(x));
+		l = path_collapse_to_hero(l, full_path_is_dispersed(x));
 	if (!EFFECT_IS_ON(c->w, colour))
 		for (int i = 0; i < 3; i++)
 			xyz[i] = l.v[0] * c->w->grey_xyz[i];
@@ -70,7 +70,7 @@ double product_log_intensity(const struct path_context *c, const struct full_pat
 	return log(xyz[0] + xyz[1] + xyz[2]) + M_LN2 * p->exponent;
 }
 
-bool full_path_join(struct full_path *x, unsigned e)
+bool full_path_compute_edge(struct full_path *x, unsigned e)
 {
 	struct path_vertex *light = &x->v[e];
 	x->edge[e].w = path_direction(light, &x->v[e + 1], &x->edge[e].distance2);
@@ -80,10 +80,10 @@ bool full_path_join(struct full_path *x, unsigned e)
 
 static const struct surface_point *surface_facing(const struct full_path *x, unsigned j, struct surface_point *turned)
 {
-	return path_facing(&x->v[j], x->edge[j].w, turned);
+	return path_point_facing_camera(&x->v[j], x->edge[j].w, turned);
 }
 
-bool full_path_turned(const struct full_path *x, unsigned j)
+bool full_path_is_turned(const struct full_path *x, unsigned j)
 {
 	struct surface_point turned;
 	return x->v[j].kind == VERTEX_SURFACE && surface_facing(x, j, &turned) == &turned;
@@ -117,29 +117,29 @@ double full_path_eta(const struct full_path *x, unsigned j)
 	return path_eta(&x->v[j], &x->wl, x->edge[j].w);
 }
 
-spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, double *chance)
+spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *chance)
 {
 	const struct path_vertex *v = &x->v[j];
 	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
 	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
 }
 
-static spectrum scatter(const struct path_context *c, const struct full_path *x, unsigned j, bool halfvec)
+static spectrum eval_scattering(const struct path_context *c, const struct full_path *x, unsigned j, bool halfvec)
 {
 	const struct path_vertex *v = &x->v[j];
 	if (v->kind == VERTEX_MEDIUM)
 		return path_scatter_in_medium(c->w, &x->wl, v, x->edge[j].w, vec3_neg(x->edge[j - 1].w));
 	if (!full_path_mode(x, j))
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	vec3 wi;
 	if (v->delta) {
 		double chance;
-		return full_path_specular(x, j, &wi, &chance);
+		return full_path_specular_weight(x, j, &wi, &chance);
 	}
 	struct surface_point turned;
 	const struct surface_point *s = surface_facing(x, j, &turned);
 	if (halfvec && s == &turned)
-		return spectrum_of(0);
+		return spectrum_constant(0);
 	struct bsdf_point p = world_bsdf_point(s, &x->wl, TRANSPORT_RADIANCE);
 	vec3 wo = frame_to_local(&s->sh, x->edge[j].w);
 	wi = frame_to_local(&s->sh, vec3_neg(x->edge[j - 1].w));
@@ -148,33 +148,34 @@ static spectrum scatter(const struct path_context *c, const struct full_path *x,
 
 spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j)
 {
-	if (!vertex_set_has(&x->known_f, j)) {
-		x->f[j] = j > 0 ? scatter(c, x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
-		vertex_set_add(&x->known_f, j);
+	if (!vertex_set_has(&x->cached_f, j)) {
+		x->f[j] = j > 0 ? eval_scattering(c, x, j, false)
+				: path_emitted_radiance(c, &x->v[0], x->edge[0].w, &x->wl);
+		vertex_set_add(&x->cached_f, j);
 	}
 	return x->f[j];
 }
 
 spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j)
 {
-	if (!vertex_set_has(&x->known_fh, j)) {
-		x->fh[j] = scatter(c, x, j, true);
-		vertex_set_add(&x->known_fh, j);
+	if (!vertex_set_has(&x->cached_fh, j)) {
+		x->fh[j] = eval_scattering(c, x, j, true);
+		vertex_set_add(&x->cached_fh, j);
 	}
 	return x->fh[j];
 }
 
-double full_path_specular_miss(const struct full_path *x, unsigned j)
+double full_path_specular_error(const struct full_path *x, unsigned j)
 {
 	vec3 wi;
 	double chance;
-	if (spectrum_is_zero(full_path_specular(x, j, &wi, &chance)))
+	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &chance)))
 		return INFINITY;
 	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
 
 /* Returns the mask of the vertices first..last that lie in word i of a set. */
-static uint64_t bits(unsigned i, unsigned first, unsigned last)
+static uint64_t range_mask(unsigned i, unsigned first, unsigned last)
 {
 	unsigned begin = 64 * i, end = begin + 63;
 	if (last < begin || first > end)
@@ -182,28 +183,28 @@ static uint64_t bits(unsigned i, unsigned first, unsigned last)
 	return (~(uint64_t)0 >> (last < end ? end - last : 0)) & (~(uint64_t)0 << (first > begin ? first - begin : 0));
 }
 
-/* Copies the entries first..last from `from` to `to`. */
-static void take_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
+/* Copies the entries first..last from `begin` to `end`. */
+static void copy_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
 {
 	for (unsigned i = first / 64; i <= last / 64; i++) {
-		uint64_t range = bits(i, first, last);
+		uint64_t range = range_mask(i, first, last);
 		to->word[i] = (to->word[i] & ~range) | (from->word[i] & range);
 	}
 }
 
-static const struct vertex_set NONE = {{0}};
+static const struct vertex_set empty_vertex_set = {{0}};
 
-void full_path_forget(struct full_path *x, unsigned first, unsigned last)
+void full_path_invalidate(struct full_path *x, unsigned first, unsigned last)
 {
-	unsigned from = first > 0 ? first - 1 : 0, to = last < FULL_PATH_MAX_EDGES ? last + 1 : last;
-	take_range(&x->known_f, &NONE, from, to);
-	take_range(&x->known_fh, &NONE, from, to);
+	unsigned begin = first > 0 ? first - 1 : 0, end = last < FULL_PATH_EDGES_MAX ? last + 1 : last;
+	copy_range(&x->cached_f, &empty_vertex_set, begin, end);
+	copy_range(&x->cached_fh, &empty_vertex_set, begin, end);
 }
 
 void full_path_set_wavelength(const struct path_context *c, struct full_path *x, double u)
 {
-	x->wavelength = u;
-	x->known_f = x->known_fh = NONE;
+	x->wavelength_u = u;
+	x->cached_f = x->cached_fh = empty_vertex_set;
 	x->wl = world_wavelengths(c->w, u);
 }
 
@@ -211,11 +212,11 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 {
 	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0,
 		 edge_end = last < from->edges ? last + 1 : from->edges;
-	if (to->wavelength != from->wavelength)
-		to->known_f = to->known_fh = NONE;
+	if (to->wavelength_u != from->wavelength_u)
+		to->cached_f = to->cached_fh = empty_vertex_set;
 	to->edges = from->edges;
 	to->wl = from->wl;
-	to->wavelength = from->wavelength;
+	to->wavelength_u = from->wavelength_u;
 	to->film[0] = from->film[0];
 	to->film[1] = from->film[1];
 	memcpy(&to->v[first], &from->v[first], n * sizeof to->v[0]);
@@ -229,27 +230,27 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 	n = last_cached - edge + 1;
 	memcpy(&to->f[edge], &from->f[edge], n * sizeof to->f[0]);
 	memcpy(&to->fh[edge], &from->fh[edge], n * sizeof to->fh[0]);
-	take_range(&to->known_f, &from->known_f, edge, last_cached);
-	take_range(&to->known_fh, &from->known_fh, edge, last_cached);
+	copy_range(&to->cached_f, &from->cached_f, edge, last_cached);
+	copy_range(&to->cached_fh, &from->cached_fh, edge, last_cached);
 }
 
-bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e)
+bool full_path_edge_is_visible(struct path_context *c, struct full_path *x, unsigned e)
 {
 	struct path_vertex *v = &x->v[e];
 	if (!EFFECT_IS_ON(c->w, scattering))
-		return path_visible(c, v + 1, v);
+		return path_is_visible(c, v + 1, v);
 	c->wl = x->wl;
-	if (!path_see_in_media(c, v + 1, v, &v->edge, &x->edge[e].left))
+	if (!path_is_visible_in_media(c, v + 1, v, &v->edge, &x->edge[e].transmittance))
 		return false;
 	uint32_t medium = v->edge.medium;
 	return v->kind != VERTEX_MEDIUM || (medium && path_medium(c->w, medium)->scatters);
 }
 
-bool full_path_see_media(struct path_context *c, struct full_path *x)
+bool full_path_edges_are_visible(struct path_context *c, struct full_path *x)
 {
 	x->v[x->edges].edge.medium = c->w->camera_medium;
 	for (unsigned e = x->edges; e-- > 0;)
-		if (!full_path_visible(c, x, e))
+		if (!full_path_edge_is_visible(c, x, e))
 			return false;
 	return true;
 }
@@ -257,90 +258,90 @@ bool full_path_see_media(struct path_context *c, struct full_path *x)
 bool full_path_project(const struct path_context *c, struct full_path *x)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
-	struct camera room;
-	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &room);
+	struct camera storage;
+	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &storage);
 	vec3 d = vec3_neg(e->w);
 	double distance = sqrt(e->distance2);
 	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
 		/* An emitter at infinity is seen between the clipping planes. */
 		double t_min, t_max;
-		camera_clip(camera, d, &t_min, &t_max);
+		camera_clip_range(camera, d, &t_min, &t_max);
 		distance = 0.5 * (t_min + t_max);
 	}
 	if (!camera_project(camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
 		return false;
-	return film_window_holds(&c->window, x->film);
+	return film_window_contains(&c->window, x->film);
 }
 
 /* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `delta` only if `left`: the path leaves the
  * vertex in the way its sub-path did. */
-static void take_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool left)
+static void copy_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool keeps_mode)
 {
 	x->v[i] = *from;
-	if (!left) {
+	if (!keeps_mode) {
 		x->v[i].delta = false;
 		x->v[i].mode = 0;
 	}
 }
 
 /* Copies the emitter's point, drawn or hit, to the path's first vertex. */
-static void take_emitter(struct full_path *x, const struct path_vertex *from)
+static void copy_emitter(struct full_path *x, const struct path_vertex *from)
 {
-	take_vertex(x, 0, from, false);
+	copy_vertex(x, 0, from, false);
 	if (x->v[0].kind == VERTEX_SURFACE)
 		x->v[0].kind = VERTEX_EMITTER;
 }
 
-unsigned full_path_most_light(const struct path_context *c, const struct full_path *x)
+unsigned full_path_max_light_vertices(const struct path_context *c, const struct full_path *x)
 {
 	if (!EFFECT_IS_ON(c->w, scattering))
 		return x->edges;
 	struct joined_path p = {.edges = x->edges};
 	for (unsigned i = 0; i <= x->edges; i++)
 		p.v[i] = &x->v[i];
-	unsigned other = path_other_medium(c, &p);
-	return other ? other : x->edges;
+	unsigned mismatched_edge = path_find_mismatched_edge(c, &p);
+	return mismatched_edge ? mismatched_edge : x->edges;
 }
 
-unsigned full_path_passed(const struct path_context *c, const struct full_path *x, unsigned s)
+unsigned full_path_passed_count(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned end = s;
-	while (path_sees_through(c) && end < x->edges && path_is_passed(&x->v[end]))
+	while (path_allows_see_through(c) && end < x->edges && path_vertex_is_see_through(&x->v[end]))
 		end++;
 	return end - s;
 }
 
-unsigned full_path_joint_vertices(const struct path_context *c, const struct full_path *x, unsigned s)
+unsigned full_path_joint_vertex_count(const struct path_context *c, const struct full_path *x, unsigned s)
 {
-	unsigned passed = full_path_passed(c, x, s), refracted = 0;
-	while (s == 1 && passed == 0 && path_is_refracted(&x->v[1 + refracted]))
+	unsigned passed = full_path_passed_count(c, x, s), refracted = 0;
+	while (s == 1 && passed == 0 && path_vertex_is_refracting(&x->v[1 + refracted]))
 		refracted++;
 	return passed + refracted;
 }
 
-bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s)
+bool full_path_can_join(const struct path_context *c, const struct full_path *x, unsigned s)
 {
-	unsigned passed = full_path_passed(c, x, s), end = s + passed;
+	unsigned passed = full_path_passed_count(c, x, s), end = s + passed;
 	if (s == 1 && end == x->edges) /* only samples join emitters to the lens */
 		return false;
-	return passed <= PATH_PASSED_MOST && !(s > 1 && x->v[s - 1].delta) && !(end < x->edges && x->v[end].delta);
+	return passed <= PATH_PASSED_MAX && !(s > 1 && x->v[s - 1].delta) && !(end < x->edges && x->v[end].delta);
 }
 
-bool full_path_is_made(const struct path_context *c, const struct full_path *x)
+bool full_path_can_be_made(const struct path_context *c, const struct full_path *x)
 {
 	if (path_can_be_hit(c, &x->v[0]))
 		return true;
-	for (unsigned s = full_path_most_light(c, x); s > 0; s--)
-		if (full_path_joins(c, x, s) && !(s == 1 && c->w->emitters[x->v[0].emitter].beam))
+	for (unsigned s = full_path_max_light_vertices(c, x); s > 0; s--)
+		if (full_path_can_join(c, x, s) && !(s == 1 && c->w->emitters[x->v[0].emitter].is_beam))
 			return true;
 	return false;
 }
 
 bool full_path_finish(struct path_context *c, struct full_path *x)
 {
-	x->known_f = x->known_fh = NONE;
+	x->cached_f = x->cached_fh = empty_vertex_set;
 	for (unsigned e = 0; e < x->edges; e++)
-		if (!full_path_join(x, e))
+		if (!full_path_compute_edge(x, e))
 			return false;
 	for (unsigned j = 1; j < x->edges; j++) {
 		unsigned mode = full_path_mode(x, j);
@@ -351,7 +352,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 	}
 	if (!full_path_project(c, x))
 		return false;
-	if (EFFECT_IS_ON(c->w, scattering) && !(full_path_see_media(c, x) && full_path_is_made(c, x)))
+	if (EFFECT_IS_ON(c->w, scattering) && !(full_path_edges_are_visible(c, x) && full_path_can_be_made(c, x)))
 		return false;
 	for (unsigned j = 0; j < x->edges; j++)
 		if (spectrum_is_zero(full_path_f(c, x, j)))
@@ -360,69 +361,71 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 }
 
 /* Whether nothing lies between the vertices of the joint. */
-static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned s, unsigned passed)
+static bool joint_is_visible(struct path_context *c, struct full_path *x, unsigned s, unsigned passed)
 {
 	for (unsigned e = s - 1; e < s + passed; e++)
-		if (!full_path_visible(c, x, e))
+		if (!full_path_edge_is_visible(c, x, e))
 			return false;
 	return true;
 }
 
 /* Traces the joint between y and z, the camera's last vertex, and copies its vertices to x. Returns false if it has not
  * exactly `passed` vertices. */
-static bool take_passed(struct path_context *c, const struct path_vertex *z, bool from_lens,
+static bool trace_joint(struct path_context *c, const struct path_vertex *z, bool from_lens,
 			const struct path_vertex *y, unsigned s, unsigned passed, struct full_path *x)
 {
-	spectrum left;
+	spectrum transmittance;
 	const struct path_vertex *before = from_lens ? NULL : z - 1;
-	bool open = (path_sees_through(c) && path_see_through(c, before, z, y, &left)) ||
-		    (s == 1 && !from_lens && path_refracts(c) && path_refract_to(c, before, z, y, &left));
-	if (!open || c->passed_count != passed)
+	bool is_open = (path_allows_see_through(c) && path_trace_passed(c, before, z, y, &transmittance)) ||
+		       (s == 1 && !from_lens && path_allows_refraction(c) &&
+			path_trace_refracted(c, before, z, y, &transmittance));
+	if (!is_open || c->passed_count != passed)
 		return false;
 	for (unsigned i = 0; i < passed; i++)
-		take_vertex(x, s + i, &c->passed[passed - 1 - i], true);
+		copy_vertex(x, s + i, &c->passed[passed - 1 - i], true);
 	return true;
 }
 
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x)
 {
 	unsigned t = edges + 1 - s - passed;
-	assert(edges <= FULL_PATH_MAX_EDGES && t >= 1);
+	assert(edges <= FULL_PATH_EDGES_MAX && t >= 1);
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex drawn;
 	double pdf;
 	x->edges = edges;
 	x->wl = c->wl;
-	x->wavelength = EFFECT_IS_ON(c->w, colour) ? c->wl.u : 0;
+	x->wavelength_u = EFFECT_IS_ON(c->w, colour) ? c->wl.u : 0;
 	if (s > 0 && t > 1 && (z->kind == VERTEX_INFINITE || !path_scatters_smoothly(z)))
 		return false;
 	if (s == 0) {
 		if (z->emitter < 0)
 			return false;
-		take_emitter(x, z);
+		copy_emitter(x, z);
 	} else if (s == 1) {
-		if (!path_next_event(c, z, &drawn, &pdf))
+		if (!path_draw_next_event(c, z, &drawn, &pdf))
 			return false;
-		take_emitter(x, &drawn);
+		copy_emitter(x, &drawn);
 	} else {
 		if (!path_scatters_smoothly(&c->light[s - 1]))
 			return false;
-		take_emitter(x, &c->light[0]);
+		copy_emitter(x, &c->light[0]);
 		for (unsigned i = 1; i < s; i++)
-			take_vertex(x, i, &c->light[i], i + 1 < s);
+			copy_vertex(x, i, &c->light[i], i + 1 < s);
 	}
-	if (passed && !take_passed(c, z, t == 1, s == 1 ? &drawn : &c->light[s - 1], s, passed, x))
+	if (passed && !trace_joint(c, z, t == 1, s == 1 ? &drawn : &c->light[s - 1], s, passed, x))
 		return false;
 	for (unsigned i = s > 0 ? s + passed : 1; i <= edges; i++)
-		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s + passed);
-	return full_path_finish(c, x) && (s == 0 || EFFECT_IS_ON(c->w, scattering) || joint_is_open(c, x, s, passed));
+		copy_vertex(x, i, &c->camera[edges - i], s == 0 || i > s + passed);
+	return full_path_finish(c, x) &&
+	       (s == 0 || EFFECT_IS_ON(c->w, scattering) || joint_is_visible(c, x, s, passed));
 }
 
 void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p)
 {
 	if (EFFECT_IS_ON(w, scattering)) {
 		for (unsigned e = 0; e < x->edges; e++)
-			product_mul(p, x->edge[e].left);
+			product_mul(p, x->edge[e].transmittance);
 		return;
 	}
 	uint32_t medium = w->camera_medium;
@@ -437,7 +440,7 @@ void full_path_colour(const struct path_context *c, struct full_path *x, double 
 {
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
-		product_mul(&p, vertex_set_has(&x->known_fh, j) ? x->fh[j] : full_path_f(c, x, j));
+		product_mul(&p, vertex_set_has(&x->cached_fh, j) ? x->fh[j] : full_path_f(c, x, j));
 	full_path_attenuate(c->w, x, &p);
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];

@@ -17,12 +17,12 @@
 #include "worker/render/path/connect.h"
 
 enum {
-	FULL_PATH_MAX_EDGES = PATH_MAX_EDGES,
-	FULL_PATH_MAX_VERTICES = FULL_PATH_MAX_EDGES + 1,
+	FULL_PATH_EDGES_MAX = PATH_EDGES_MAX,
+	FULL_PATH_VERTICES_MAX = FULL_PATH_EDGES_MAX + 1,
 };
 
 struct vertex_set {
-	uint64_t word[FULL_PATH_MAX_VERTICES / 64 + 1];
+	uint64_t word[FULL_PATH_VERTICES_MAX / 64 + 1];
 };
 
 static inline bool vertex_set_has(const struct vertex_set *s, unsigned j)
@@ -37,21 +37,21 @@ static inline void vertex_set_add(struct vertex_set *s, unsigned j)
 
 /* The edge between v[e] and v[e + 1]. */
 struct full_path_edge {
-	vec3 w;		  /* unit, from v[e] to v[e + 1] */
-	double distance2; /* 1 where v[0] lies at infinity */
-	spectrum left;	  /* transmittance of the edge, where media scatter */
+	vec3 w;			/* unit, from v[e] to v[e + 1] */
+	double distance2;	/* 1 where v[0] lies at infinity */
+	spectrum transmittance; /* transmittance of the edge, where media scatter */
 };
 
 struct full_path {
 	unsigned edges; /* k; 0: no path */
 	struct wavelengths wl;
-	double wavelength; /* the number in [0,1) from which wl was computed */
+	double wavelength_u; /* the number in [0,1) from which wl was computed */
 	double film[2];
-	struct path_vertex v[FULL_PATH_MAX_VERTICES];
-	struct full_path_edge edge[FULL_PATH_MAX_EDGES];
+	struct path_vertex v[FULL_PATH_VERTICES_MAX];
+	struct full_path_edge edge[FULL_PATH_EDGES_MAX];
 	/* Caches for each vertex: read them through full_path_f and full_path_fh. */
-	struct vertex_set known_f, known_fh;
-	spectrum f[FULL_PATH_MAX_VERTICES], fh[FULL_PATH_MAX_VERTICES];
+	struct vertex_set cached_f, cached_fh;
+	spectrum f[FULL_PATH_VERTICES_MAX], fh[FULL_PATH_VERTICES_MAX];
 };
 
 /* A product that neither over- nor underflows: its value is v 2^exponent. */
@@ -71,11 +71,11 @@ static inline double full_path_time(const struct full_path *x)
 }
 
 /* Computes edge e from the positions of its ends, and to_prev of v[e]. Returns false if the ends coincide. */
-bool full_path_join(struct full_path *x, unsigned e);
+bool full_path_compute_edge(struct full_path *x, unsigned e);
 
-/* Whether an inner vertex scatters with another shading normal than that of v[j].x (see path_facing). Half vectors
- * refer to the normal of v[j].x and cannot describe such a vertex. */
-bool full_path_turned(const struct full_path *x, unsigned j);
+/* Whether an inner vertex scatters with another shading normal than that of v[j].x (see path_point_facing_camera). Half
+ * vectors refer to the normal of v[j].x and cannot describe such a vertex. */
+bool full_path_is_turned(const struct full_path *x, unsigned j);
 /* Returns |n . i_j| at an inner vertex, where n is the shading normal with which it scatters. */
 double full_path_cosine_to_light(const struct full_path *x, unsigned j);
 
@@ -91,16 +91,16 @@ double full_path_eta(const struct full_path *x, unsigned j);
  * cosine, or the weight of the lobe if specular. Computed on first use. */
 spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j);
 /* Like full_path_f for inner vertices, but in half vector space: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the
- * weight of the lobe if specular; 0 where full_path_turned. */
+ * weight of the lobe if specular; 0 where full_path_is_turned. */
 spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j);
 /* Invalidates the caches of the vertices first..last, which are about to change, and of their neighbours. */
-void full_path_forget(struct full_path *x, unsigned first, unsigned last);
+void full_path_invalidate(struct full_path *x, unsigned first, unsigned last);
 /* Returns the weight of the exactly specular lobe of v[j]'s mode as seen along o_j (see bsdf_eval_delta). Sets its
  * direction in the shading frame and the probability with which it is chosen. */
-spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, double *chance);
+spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *chance);
 /* Returns the distance between i_j and the unit direction into which the exactly specular lobe of v[j]'s mode sends
  * o_j; INFINITY if there is no such lobe. */
-double full_path_specular_miss(const struct full_path *x, unsigned j);
+double full_path_specular_error(const struct full_path *x, unsigned j);
 void full_path_set_wavelength(const struct path_context *c, struct full_path *x, double u);
 
 /* Copies the vertices first..last with their edges and caches, and the members that belong to the path as a whole. */
@@ -109,9 +109,9 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 /* Whether nothing lies between v[e] and v[e + 1]. Where media scatter, it also computes the transmittance of
  * edge e, for which the medium of v[e + 1] must be set; a VERTEX_MEDIUM outside of a scattering medium is
  * not visible. Counts rays. */
-bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e);
-/* Calls full_path_visible for all edges, at x's wavelengths; only where media scatter. */
-bool full_path_see_media(struct path_context *c, struct full_path *x);
+bool full_path_edge_is_visible(struct path_context *c, struct full_path *x, unsigned e);
+/* Calls full_path_edge_is_visible for all edges, at x's wavelengths; only where media scatter. */
+bool full_path_edges_are_visible(struct path_context *c, struct full_path *x);
 
 /* Sets x->film to the projection of v[edges - 1] as seen from v[edges]. Returns false if it lies outside
  * the window that is sampled. */
@@ -119,15 +119,15 @@ bool full_path_project(const struct path_context *c, struct full_path *x);
 
 /* Returns the largest number of light vertices of any technique that can make x; less than `edges` where the scene
  * states media that do not fit together (path/media.h). */
-unsigned full_path_most_light(const struct path_context *c, const struct full_path *x);
+unsigned full_path_max_light_vertices(const struct path_context *c, const struct full_path *x);
 /* Returns the number of vertices, starting at v[s], that the joint of technique s passes (transparent.h). */
-unsigned full_path_passed(const struct path_context *c, const struct full_path *x, unsigned s);
+unsigned full_path_passed_count(const struct path_context *c, const struct full_path *x, unsigned s);
 /* Returns the number of passed or refracting vertices in the joint of technique s > 0, which must be able to make x. */
-unsigned full_path_joint_vertices(const struct path_context *c, const struct full_path *x, unsigned s);
+unsigned full_path_joint_vertex_count(const struct path_context *c, const struct full_path *x, unsigned s);
 /* Whether technique s > 0 can make x by a joint that is not refracted, as far as specular vertices are concerned. */
-bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s);
+bool full_path_can_join(const struct path_context *c, const struct full_path *x, unsigned s);
 /* Whether any technique can make x. Where media do not fit together, some paths cannot be made at all. */
-bool full_path_is_made(const struct path_context *c, const struct full_path *x);
+bool full_path_can_be_made(const struct path_context *c, const struct full_path *x);
 
 /* Computes everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
  * scattering. Returns false if two neighbours coincide, the path leaves the window, the directions contradict a mode,

@@ -25,32 +25,32 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 		const struct full_path_edge *g = &x->edge[e];
 		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);
 	}
-	struct camera room;
+	struct camera storage;
 	log_geometry +=
-		log(camera_jac_film_from_solid(world_camera(c->w, &x->v[k].x, &room), vec3_neg(x->edge[k - 1].w)));
+		log(camera_jac_film_from_solid(world_camera(c->w, &x->v[k].x, &storage), vec3_neg(x->edge[k - 1].w)));
 	return product_log_intensity(c, x, &p) + log_geometry;
 }
 
 /* Sets the densities generated at the specular vertex v[j]: *to_light of v[j - 1] from the camera's side and *to_camera
  * of v[j + 1] from the light's side. */
-static void delta_densities(const struct full_path *x, unsigned j, double *to_light, double *to_camera)
+static void specular_densities(const struct full_path *x, unsigned j, double *to_light, double *to_camera)
 {
 	const struct path_vertex *v = &x->v[j];
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w), wi;
 	double chance = 0, light, camera;
-	if (spectrum_is_zero(full_path_specular(x, j, &wi, &chance)))
+	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &chance)))
 		chance = 0;
-	double from_light = chance;
-	if (v->bsdf->directed) {
+	double chance_from_light = chance;
+	if (v->bsdf->is_nonreciprocal) {
 		struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_IMPORTANCE);
-		from_light = path_delta_chance(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
+		chance_from_light = path_delta_chance(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
 	}
-	path_delta_per_solid(&v->x, i, o, full_path_eta(x, j), &light, &camera);
-	*to_light = path_meets(i, &x->v[j - 1])
+	path_delta_densities(&v->x, i, o, full_path_eta(x, j), &light, &camera);
+	*to_light = path_ray_can_meet(i, &x->v[j - 1])
 			    ? chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2
 			    : 0;
-	*to_camera = path_meets(o, &x->v[j + 1])
-			     ? from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2
+	*to_camera = path_ray_can_meet(o, &x->v[j + 1])
+			     ? chance_from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2
 			     : 0;
 }
 
@@ -63,7 +63,7 @@ static void multiply_by_media(const struct path_context *c, struct path_vertex *
 		const struct path_edge *edge = &v[e].edge;
 		v[e].pdf *= path_edge_pdf(c, edge, edge->medium, &v[e]);
 		if (e + 1 < edges)
-			v[e + 1].pdf_rev *= path_edge_pdf(c, edge, edge->before, &v[e + 1]);
+			v[e + 1].pdf_rev *= path_edge_pdf(c, edge, edge->previous_medium, &v[e + 1]);
 	}
 }
 
@@ -80,7 +80,7 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 	for (unsigned j = 1; j < k; j++) {
 		double to_light, to_camera;
 		if (v[j].delta) {
-			delta_densities(x, j, &to_light, &to_camera);
+			specular_densities(x, j, &to_light, &to_camera);
 		} else {
 			to_light = path_pdf(c, &v[j + 1], &v[j], &v[j - 1], TRANSPORT_RADIANCE);
 			to_camera = j + 1 < k ? path_pdf(c, &v[j - 1], &v[j], &v[j + 1], TRANSPORT_IMPORTANCE) : 1;
@@ -97,11 +97,11 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 
 /* Returns the logarithm of the density with which technique 1 makes x by a refracted joint; -INFINITY if it does not.
  * from_camera[i]: log density of v[i .. k] from the camera's side. */
-static double log_refracted(struct path_context *c, const struct full_path *x, const double *from_camera)
+static double log_pdf_refracted(struct path_context *c, const struct full_path *x, const double *from_camera)
 {
-	const struct path_vertex *v[FULL_PATH_MAX_VERTICES];
-	double pdf[PATH_REFRACTED_MOST], log_transfer;
-	if (!path_refracts(c) || !path_is_refracted(&x->v[1]))
+	const struct path_vertex *v[FULL_PATH_VERTICES_MAX];
+	double pdf[PATH_REFRACTED_MAX], log_transfer;
+	if (!path_allows_refraction(c) || !path_vertex_is_refracting(&x->v[1]))
 		return -INFINITY;
 	for (unsigned i = 0; i <= x->edges; i++)
 		v[i] = &x->v[i];
@@ -114,13 +114,13 @@ static double log_refracted(struct path_context *c, const struct full_path *x, c
 	       log(path_refracted_ratio(v, end - 1, log_transfer, pdf));
 }
 
-void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)
+void full_path_log_technique_pdfs(struct path_context *c, struct full_path *x, double *log_pdf)
 {
 	unsigned k = x->edges;
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
-	unsigned most = full_path_most_light(c, x);
-	double from_camera[FULL_PATH_MAX_VERTICES]; /* log density of v[s .. k] from the camera's side */
+	unsigned max_light = full_path_max_light_vertices(c, x);
+	double from_camera[FULL_PATH_VERTICES_MAX]; /* log density of v[s .. k] from the camera's side */
 	from_camera[k] = 0;
 	for (unsigned s = k; s > 0; s--)
 		from_camera[s - 1] = from_camera[s] + log(v[s - 1].pdf);
@@ -128,12 +128,12 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	double light = 0; /* log density of v[0 .. s - 1] from the light's side */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
-		log_pdf[s] = s == 1 ? log_refracted(c, x, from_camera) : -INFINITY;
-		if (s > most || !full_path_joins(c, x, s))
+		log_pdf[s] = s == 1 ? log_pdf_refracted(c, x, from_camera) : -INFINITY;
+		if (s > max_light || !full_path_can_join(c, x, s))
 			continue;
-		unsigned end = s + full_path_passed(c, x, s);
+		unsigned end = s + full_path_passed_count(c, x, s);
 		log_pdf[s] = from_camera[end] + (s == 1 ? log(path_pdf_toward(c, &v[0], v[end].x.p)) : light);
 		if (end > s)
-			log_pdf[s] += log(path_passed_ratio_in(v, s, end - 1, false));
+			log_pdf[s] += log(path_passed_ratio_of_array(v, s, end - 1, false));
 	}
 }

@@ -11,6 +11,6 @@ double full_path_log_f(const struct path_context *c, struct full_path *x);
 
 /* Fills in pdf and pdf_rev of all vertices and sets log_pdf[s] to the logarithm of the density with which technique s
  * makes this path, s = 0..edges; -INFINITY where it cannot. */
-void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf);
+void full_path_log_technique_pdfs(struct path_context *c, struct full_path *x, double *log_pdf);
 
 #endif

@@ -6,8 +6,8 @@
 
 #include "worker/render/path/path.h"
 
-void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
-/* Like path_trace_both_ways(), but with the techniques of ensemble_draw, which do not join points of emitters
+void path_trace_bidirectional(struct path_context *c, struct sampler *s, struct path_sample *out);
+/* Like path_trace_bidirectional(), but with the techniques of ensemble_draw, which do not join points of emitters
  * to the lens: the result is the sum of the candidates from which a chain is seeded. The pilot uses it, too,
  * because with those joints every sample would add a splat in the pixels of a small lamp, which the pilot
  * would mistake for rare light. */

@@ -14,17 +14,17 @@
 void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
-	struct classes classes;
-	out->count = 0;
-	out->classes = 0;
+	struct path_classes classes;
+	out->splat_count = 0;
+	out->class_mask = 0;
 	out->intensity = 0;
-	c->one_way = true;
+	c->unidirectional = true;
 	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
-	spectrum sum = spectrum_of(0);
-	if (!c->unclassed)
-		classes_begin(&classes, c, n, 0, out);
+	spectrum sum = spectrum_constant(0);
+	if (!c->skips_classes)
+		path_classes_begin(&classes, c, n, 0, out);
 	if (EFFECT_IS_ON(c->w, medium_light))
-		sum = volume_emission(c, c->min_depth, c->max_depth, c->unclassed ? NULL : &classes);
+		sum = volume_emission(c, c->min_depth, c->max_depth, c->skips_classes ? NULL : &classes);
 	for (unsigned t = 2; t <= n; t++) {
 		for (unsigned j = 0; j <= 1; j++) {
 			if (!path_may_connect(c, j, t))
@@ -33,16 +33,16 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 			if (!path_accept(c, l))
 				continue;
 			sum = spectrum_add(sum, l);
-			if (!c->unclassed)
-				classes_add(&classes, c, j, t, l);
+			if (!c->skips_classes)
+				path_classes_add(&classes, c, j, t, l);
 		}
 	}
-	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
-		classes_clear(out);
+	if (!path_add_splat(c, out, film[0], film[1], sum) && out->class_mask)
+		path_classes_clear(out);
 }
 
 const struct integrator integrator_path = {
-	.face = {.name = "path", .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES, .from_camera = true},
+	.properties = {.name = "path", .kind = PLAN_SAMPLES, .max_depth = PATH_EDGES_MAX, .only_from_camera = true},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };

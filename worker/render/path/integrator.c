@@ -17,7 +17,7 @@ const struct integrator *const integrator_registry[] = {
 const struct integrator *integrator_find(const char *name)
 {
 	for (size_t i = 0; integrator_registry[i]; i++)
-		if (strcmp(integrator_registry[i]->face.name, name) == 0)
+		if (strcmp(integrator_registry[i]->properties.name, name) == 0)
 			return integrator_registry[i];
 	return NULL;
 }

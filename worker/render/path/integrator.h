@@ -7,12 +7,12 @@
 #ifndef WORKER_RENDER_PATH_INTEGRATOR_H
 #define WORKER_RENDER_PATH_INTEGRATOR_H
 
-#include "worker/render/path/integrator_face.h"
+#include "worker/render/path/integrator_properties.h"
 #include "worker/render/path/path.h"
 
 struct integrator {
-	struct render_integrator face; /* properties that all programs know */
-	enum rng_stream stream;	       /* random number stream of its samples */
+	struct integrator_properties properties; /* properties that all programs know */
+	enum rng_stream stream;			 /* random number stream of its samples */
 	path_tracer *evaluate;
 	uint32_t light_every; /* path_context.light_every for its samples */
 	/* Contributions that are too bright for one sample are spread by chains: chain/redistribution.h. */

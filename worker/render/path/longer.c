@@ -13,20 +13,21 @@
 
 #include <string.h>
 
-enum { FULL = PATH_MAX_EDGES + 1, CARRIED = 3, CARRIED_END = 2 + CARRIED };
+enum { STRETCH_VERTICES = PATH_EDGES_MAX + 1, CARRIED_VERTICES = 3, CARRIED_END = 2 + CARRIED_VERTICES };
 
-/* Sums the paths that end at the camera sub-path's vertices first - 1 ... n - 1. `before` counts their edges that are
- * no longer in the sub-path. */
-static spectrum gather_light(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
-			     uint32_t most, double film[2])
+/* Sums the paths that end at the camera sub-path's vertices first - 1 ... n - 1. `removed_edges` counts their edges
+ * that are no longer in the sub-path. */
+static spectrum gather_light(struct path_context *c, unsigned first, unsigned n, unsigned removed_edges,
+			     uint32_t min_edges, uint32_t max_edges, double film[2])
 {
-	spectrum sum = spectrum_of(0);
+	spectrum sum = spectrum_constant(0);
 	if (EFFECT_IS_ON(c->w, medium_light))
-		sum = volume_emission(c, least > before + first - 1 ? least - before : first - 1, most - before, NULL);
+		sum = volume_emission(c, min_edges > removed_edges + first - 1 ? min_edges - removed_edges : first - 1,
+				      max_edges - removed_edges, NULL);
 	for (unsigned t = first; t <= n; t++)
 		for (unsigned j = 0; j <= 1; j++) {
-			unsigned edges = before + t + j - 1;
-			if (edges < least || edges > most)
+			unsigned edges = removed_edges + t + j - 1;
+			if (edges < min_edges || edges > max_edges)
 				continue;
 			spectrum l = path_connect(c, j, t, 1, film);
 			if (path_accept(c, l))
@@ -35,38 +36,41 @@ static spectrum gather_light(struct path_context *c, unsigned first, unsigned n,
 	return sum;
 }
 
-double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint32_t longest,
-		    struct path_sample *scratch)
+double longer_paths_sample_energy(struct path_context *c, uint64_t seed, uint64_t index, uint32_t max_edges,
+				  struct path_sample *scratch)
 {
-	const double roulette = c->roulette;
-	const bool one_way = c->one_way, opaque = c->opaque;
-	uint32_t least = c->max_depth + 1 > c->min_depth ? c->max_depth + 1 : c->min_depth;
-	unsigned first = 2, before = 0, most = longest + 1 < FULL ? longest + 1 : FULL;
+	const double roulette = c->max_survival;
+	const bool one_way = c->unidirectional, opaque = c->opaque_joints;
+	uint32_t min_edges = c->max_depth + 1 > c->min_depth ? c->max_depth + 1 : c->min_depth;
+	unsigned first = 2, removed_edges = 0,
+		 max_vertices = max_edges + 1 < STRETCH_VERTICES ? max_edges + 1 : STRETCH_VERTICES;
 	double film[2];
 	struct sampler_random s;
-	c->roulette = 1;
-	c->one_way = true;
-	c->opaque = true; /* a passed surface would make the path longer than was asked for */
-	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
-	unsigned n = path_walk_camera(c, &s.base, most, film);
-	spectrum sum = gather_light(c, first, n, before, least, longest, film);
-	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind != VERTEX_INFINITE && before + n - 1 < longest;
+	c->max_survival = 1;
+	c->unidirectional = true;
+	c->opaque_joints = true; /* a passed surface would make the path longer than was asked for */
+	sampler_random_init(&s, seed, RNG_LONGER_PATH, index, 0);
+	unsigned n = path_walk_camera(c, &s.base, max_vertices, film);
+	spectrum sum = gather_light(c, first, n, removed_edges, min_edges, max_edges, film);
+	for (uint64_t stretch = 1;
+	     n == STRETCH_VERTICES && c->camera[n - 1].kind != VERTEX_INFINITE && removed_edges + n - 1 < max_edges;
 	     stretch++) {
-		for (unsigned i = 1; i + CARRIED < n; i++)
-			c->dispersed = c->dispersed || path_disperses(&c->camera[i]);
-		memmove(&c->camera[CARRIED_END - CARRIED], &c->camera[n - CARRIED], CARRIED * sizeof *c->camera);
-		before += n - CARRIED_END;
-		sampler_random_init(&s, seed, RNG_BEYOND, index, stretch);
-		n = path_walk_on(c, &s.base, SIDE_CAMERA, CARRIED_END, FULL);
-		sum = spectrum_add(sum, gather_light(c, CARRIED_END + 1, n, before, least, longest, film));
+		for (unsigned i = 1; i + CARRIED_VERTICES < n; i++)
+			c->dispersed = c->dispersed || path_vertex_disperses(&c->camera[i]);
+		memmove(&c->camera[CARRIED_END - CARRIED_VERTICES], &c->camera[n - CARRIED_VERTICES],
+			CARRIED_VERTICES * sizeof *c->camera);
+		removed_edges += n - CARRIED_END;
+		sampler_random_init(&s, seed, RNG_LONGER_PATH, index, stretch);
+		n = path_continue_walk(c, &s.base, SIDE_CAMERA, CARRIED_END, STRETCH_VERTICES);
+		sum = spectrum_add(sum, gather_light(c, CARRIED_END + 1, n, removed_edges, min_edges, max_edges, film));
 	}
 	c->dispersed = false;
-	c->roulette = roulette;
-	c->one_way = one_way;
-	c->opaque = opaque;
-	scratch->count = 0;
-	scratch->classes = 0;
+	c->max_survival = roulette;
+	c->unidirectional = one_way;
+	c->opaque_joints = opaque;
+	scratch->splat_count = 0;
+	scratch->class_mask = 0;
 	scratch->intensity = 0;
-	path_splat(c, scratch, film[0], film[1], sum);
+	path_add_splat(c, scratch, film[0], film[1], sum);
 	return scratch->intensity;
 }

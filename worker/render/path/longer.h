@@ -8,12 +8,12 @@
 
 #include "worker/render/path/path.h"
 
-enum { LONGER_EDGES = 4096 }; /* taken as unlimited */
+enum { LONGER_EDGES_MAX = 4096 }; /* taken as unlimited */
 
 /* Returns one sample of the energy, measured as path_sample.intensity, in paths of more than c->max_depth, at least
- * c->min_depth and at most `longest` edges. Its random numbers are those of the stream RNG_BEYOND with this index. c is
- * restored except for its sub-paths and counters; `scratch` is overwritten. Does not allocate. */
-double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint32_t longest,
-		    struct path_sample *scratch);
+ * c->min_depth and at most `max_edges` edges. Its random numbers are those of the stream RNG_LONGER_PATH with this
+ * index. c is restored except for its sub-paths and counters; `scratch` is overwritten. Does not allocate. */
+double longer_paths_sample_energy(struct path_context *c, uint64_t seed, uint64_t index, uint32_t max_edges,
+				  struct path_sample *scratch);
 
 #endif

@@ -25,7 +25,7 @@
 #include "worker/render/path/vertex.h"
 
 /* Limit on the `null` faces along one edge; beyond it, the ray counts as a miss. */
-enum { PATH_FACES_MOST = 1024 };
+enum { PATH_NULL_FACES_MAX = 1024 };
 
 /* Returns the medium with this number, which must not be 0. */
 static inline const struct medium *path_medium(const struct world *w, uint32_t number)
@@ -41,13 +41,13 @@ uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, u
 /* Returns the transmittance of the edge between two vertices. */
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b);
-/* Sets the medium of `to`, which the camera's sub-path reached from `at` along wi, and multiplies its beta by the
+/* Sets the medium of `to`, which the camera's sub-path reached from `vertex` along wi, and multiplies its beta by the
  * transmittance of the edge. */
-void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to);
-/* Like path_absorb(), but for a vertex in a joint: sets the beta of `to` to `share` times the transmittance of the
- * edge, and returns it. Returns `share` if the world has no absorption. */
-spectrum path_absorb_share(const struct path_context *c, const struct path_vertex *at, vec3 wi, spectrum share,
-			   struct path_vertex *to);
+void path_absorb(const struct path_context *c, const struct path_vertex *vertex, vec3 wi, struct path_vertex *to);
+/* Like path_absorb(), but for a vertex in a joint: sets the beta of `to` to `weight` times the transmittance of the
+ * edge, and returns it. Returns `weight` if the world has no absorption. */
+spectrum path_absorb_weight(const struct path_context *c, const struct path_vertex *vertex, vec3 wi, spectrum weight,
+			    struct path_vertex *to);
 
 /* ---- where media scatter ---- */
 
@@ -64,17 +64,17 @@ struct path_emission {
 /* Like path_extend(), but ends at the next event in a medium, chosen by u in [0,1), or at the first hit that is not a
  * `null` face. Sets *left to the transmittance of the edge. If emission is not NULL, the light emitted along the way is
  * added to its sum, whatever the ray meets. */
-bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			  double u, struct path_emission *emission, struct path_vertex *to, spectrum *left);
+bool path_extend_in_media(struct path_context *c, const struct path_vertex *vertex, vec3 d, double t_min, double t_max,
+			  double u, struct path_emission *emission, struct path_vertex *to, spectrum *transmittance);
 /* Like path_extend_in_media(), but without events and emission. */
-bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			     struct path_vertex *to, spectrum *left);
+bool path_extend_without_events(struct path_context *c, const struct path_vertex *vertex, vec3 d, double t_min,
+				double t_max, struct path_vertex *to, spectrum *transmittance);
 /* Makes `to` an event at that distance from `from` along d. Its edge is not set. */
-void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d);
+void path_make_medium_vertex(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d);
 /* Whether z (an end of the camera's sub-path, not at infinity) and y see each other through faces of `null`. Fills in
  * the edge to y, whose `before` is the medium at z, and sets *left to its transmittance. Counts rays. */
-bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
-		       struct path_edge *edge, spectrum *left);
+bool path_is_visible_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+			      struct path_edge *edge, spectrum *transmittance);
 
 /* Returns the factor that the edge contributes to the density of `to` as generated from its other end. If `to` is
  * an event in `medium`, this is the density of the event per length; otherwise it is the probability that no
@@ -82,7 +82,7 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 double path_edge_pdf(const struct path_context *c, const struct path_edge *edge, uint32_t medium,
 		     const struct path_vertex *to);
 /* Multiplies the density of `to` by path_edge_pdf of its edge, and its beta by left / path_edge_pdf. */
-void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left);
+void path_apply_edge(const struct path_context *c, struct path_vertex *to, spectrum transmittance);
 
 /* Returns sigma_s times the phase function at a VERTEX_MEDIUM, in 1 / (length x solid angle). */
 spectrum path_scatter_in_medium(const struct world *w, const struct wavelengths *wl, const struct path_vertex *v,

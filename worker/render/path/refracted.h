@@ -28,30 +28,30 @@
 #include "worker/render/path/vertex.h"
 
 /* Whether this evaluation refracts connections to emitters. */
-static inline bool path_refracts(const struct path_context *c)
+static inline bool path_allows_refraction(const struct path_context *c)
 {
-	return c->refract && EFFECT_IS_ON(c->w, refracted_shadows) && !c->opaque;
+	return c->refract && EFFECT_IS_ON(c->w, refracted_shadows) && !c->opaque_joints;
 }
 
 /* Whether v could be a vertex of a refracted connection: an exactly specular lobe refracts its path there. */
-static inline bool path_is_refracted(const struct path_vertex *v)
+static inline bool path_vertex_is_refracting(const struct path_vertex *v)
 {
 	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_TRANSMIT) && !(v->mode & BSDF_STRAIGHT) &&
-	       bsdf_refracts(v->bsdf);
+	       bsdf_refracts_connections(v->bsdf);
 }
 
-/* Whether a refracted connection from z to y is tried. y is drawn with density `toward`; the connection is tried if
+/* Whether a refracted connection from z to y is tried. y is drawn with density `pdf_toward`; the connection is tried if
  * that is much larger than the density with which sub-paths from z would find y. f: scattering at z from the straight
  * direction; before: the vertex before z on the camera's sub-path. */
-bool path_tries_to_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
-			   const struct path_vertex *y, double toward, spectrum f);
+bool path_should_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+			 const struct path_vertex *y, double pdf_toward, spectrum f);
 
 /* Joins z, a vertex of the camera's sub-path, to y by a refracted path. Fills in c->passed and c->log_transfer, the
  * logarithm of T. Sets *left to the product of the weights of the lobes and of the transmittance of absorbing media
  * between z and the last surface; the caller adds the edge from that surface to y. before: the vertex before z. Returns
  * false if there is no such path. Counts rays. */
-bool path_refract_to(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
-		     const struct path_vertex *y, spectrum *left);
+bool path_trace_refracted(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+			  const struct path_vertex *y, spectrum *transmittance);
 
 /* Returns the index `end` of the vertex to which technique 1 would join x_0 by refraction: x_1 .. x_{end-1}
  * refract, x_end does not. 0: there is none. v: the vertices from the emitter to the camera, k edges. Technique 1
@@ -67,11 +67,11 @@ bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex
 
 /* Returns the density of technique 1's refracted joint divided by that of drawing x_1 .. x_{end-1} as their sub-path
  * did; 0 if technique 1 does not make the path. */
-double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned end);
+double path_refracted_over_drawn_ratio(struct path_context *c, const struct path_vertex *const *v, unsigned end);
 
 /* Like path_pdf(), but from a refracting vertex: returns the density of `next` for a sub-path that comes from prev. */
-double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
-			  const struct path_vertex *next, enum transport transport);
+double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev,
+			  const struct path_vertex *vertex, const struct path_vertex *next, enum transport transport);
 
 /* Returns J for x_1 .. x_count divided by the product of their densities pdf[0 .. count - 1]. */
 double path_refracted_ratio(const struct path_vertex *const *v, unsigned count, double log_transfer, const double *pdf);

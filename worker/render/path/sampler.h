@@ -11,7 +11,7 @@
 #include "worker/render/math/rng.h"
 
 enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
-enum { SAMPLER_BLOCK = 8 };
+enum { SAMPLER_BLOCK_SIZE = 8 };
 
 /* The uses of the numbers in a block. Block 0 of the camera: film x and y, wavelength, distance to the first event in a
  * medium, point of the aperture, whether there is a light sub-path (path_context.light_every), and which faint
@@ -33,20 +33,20 @@ struct sampler_random {
 	struct sampler base;
 	uint64_t seed, index, step;
 	enum rng_stream stream;
-	double value[SAMPLER_SIDES][SAMPLER_BLOCK];
+	double values[SAMPLER_SIDES][SAMPLER_BLOCK_SIZE];
 };
 
 void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index,
 			 uint64_t step);
 
 /* Returns the index of a block's first half among all halves of a sample; the second half has the next index. */
-static inline uint64_t sampler_half(enum sampler_side side, unsigned vertex)
+static inline uint64_t sampler_half_index(enum sampler_side side, unsigned vertex)
 {
 	return ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
 }
 
 /* Fills `out` with the eight numbers of one block, from the counter-based generator. */
-void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
-		  unsigned vertex, double out[SAMPLER_BLOCK]);
+void sampler_fill_block(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
+			unsigned vertex, double out[SAMPLER_BLOCK_SIZE]);
 
 #endif

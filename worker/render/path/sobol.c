@@ -13,7 +13,7 @@ enum { DIMENSIONS = 4 };
 /* The generator matrices by columns, least significant bit first, two dimensions in a word. These are the
  * direction numbers, bits reversed, from the primitive polynomials and initial numbers of Joe and Kuo 2008
  * (new-joe-kuo-6), dimensions 1 to 4. */
-static const uint64_t first_two[8][16] = {
+static const uint64_t first_two_dimensions[8][16] = {
 	NIBBLE(UINT64_C(0x0000000100000001), UINT64_C(0x0000000300000002), UINT64_C(0x0000000500000004),
 	       UINT64_C(0x0000000f00000008)),
 	NIBBLE(UINT64_C(0x0000001100000010), UINT64_C(0x0000003300000020), UINT64_C(0x0000005500000040),
@@ -31,7 +31,7 @@ static const uint64_t first_two[8][16] = {
 	NIBBLE(UINT64_C(0x1111111110000000), UINT64_C(0x3333333320000000), UINT64_C(0x5555555540000000),
 	       UINT64_C(0xffffffff80000000)),
 };
-static const uint64_t last_two[8][16] = {
+static const uint64_t last_two_dimensions[8][16] = {
 	NIBBLE(UINT64_C(0x0000000100000001), UINT64_C(0x0000000300000003), UINT64_C(0x0000000400000006),
 	       UINT64_C(0x0000000a00000009)),
 	NIBBLE(UINT64_C(0x0000001f00000017), UINT64_C(0x0000002e0000003a), UINT64_C(0x0000004500000071),
@@ -51,7 +51,7 @@ static const uint64_t last_two[8][16] = {
 };
 
 /* Reverses the bits of both halves of a word and exchanges the halves. */
-static uint64_t reverse(uint64_t x)
+static uint64_t reverse_bits(uint64_t x)
 {
 	x = __builtin_bswap64(x);
 	x = (x & UINT64_C(0x0f0f0f0f0f0f0f0f)) << 4 | (x >> 4 & UINT64_C(0x0f0f0f0f0f0f0f0f));
@@ -84,22 +84,22 @@ static void scramble(uint64_t reversed, uint64_t seeds, uint64_t tail, double ou
 {
 	uint64_t low = permute((uint32_t)reversed, (uint32_t)seeds),
 		 high = permute((uint32_t)(reversed >> 32), (uint32_t)(seeds >> 32));
-	uint64_t x = reverse(high << 32 | low);
+	uint64_t x = reverse_bits(high << 32 | low);
 	out[0] = (double)((x >> 32) << 16 | (tail & 0xffff)) * 0x1p-48;
 	out[1] = (double)((x & 0xffffffff) << 16 | (tail >> 16 & 0xffff)) * 0x1p-48;
 }
 
 /* Computes the four numbers of one half of a block. */
-static void fill(const struct sampler_sobol *s, uint64_t half, double out[DIMENSIONS])
+static void fill_half(const struct sampler_sobol *s, uint64_t half, double out[DIMENSIONS])
 {
 	uint64_t hash[4], point[2] = {0, 0};
 	for (int i = 0; i < 4; i++)
 		hash[i] = mix(s->key[i] + half * UINT64_C(0x9e3779b97f4a7c15));
-	uint32_t order = permute(s->reversed, (uint32_t)hash[0]);
-	uint32_t number = (uint32_t)(reverse(order) >> 32);
+	uint32_t order = permute(s->reversed_sample, (uint32_t)hash[0]);
+	uint32_t number = (uint32_t)(reverse_bits(order) >> 32);
 	for (int i = 0; i < 8; i++, number >>= 4) {
-		point[0] ^= first_two[i][number & 15];
-		point[1] ^= last_two[i][number & 15];
+		point[0] ^= first_two_dimensions[i][number & 15];
+		point[1] ^= last_two_dimensions[i][number & 15];
 	}
 	uint64_t tail = mix(hash[3] + s->sample);
 	scramble(point[0], hash[1], tail, out);
@@ -108,10 +108,10 @@ static void fill(const struct sampler_sobol *s, uint64_t half, double out[DIMENS
 
 double *sampler_sobol_fill(struct sampler_sobol *s, enum sampler_side side, unsigned vertex)
 {
-	uint64_t half = sampler_half(side, vertex);
-	fill(s, half, s->value[side]);
-	fill(s, half + 1, s->value[side] + DIMENSIONS);
-	return s->value[side];
+	uint64_t half = sampler_half_index(side, vertex);
+	fill_half(s, half, s->values[side]);
+	fill_half(s, half + 1, s->values[side] + DIMENSIONS);
+	return s->values[side];
 }
 
 static const double *sobol_block(struct sampler *base, enum sampler_side side, unsigned vertex)
@@ -124,6 +124,6 @@ void sampler_sobol_init(struct sampler_sobol *s, uint64_t seed, enum rng_stream 
 {
 	s->base.block = sobol_block;
 	s->sample = sample;
-	s->reversed = (uint32_t)(reverse(sample) >> 32);
+	s->reversed_sample = (uint32_t)(reverse_bits(sample) >> 32);
 	rng_bits4(seed, stream, index, replicate, sample >> 32, s->key);
 }

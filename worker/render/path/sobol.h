@@ -22,15 +22,15 @@
 struct sampler_sobol {
 	struct sampler base;
 	uint64_t sample, key[4];
-	uint32_t reversed; /* bits of `sample` in reversed order */
-	double value[SAMPLER_SIDES][SAMPLER_BLOCK];
+	uint32_t reversed_sample; /* bits of `sample` in reversed order */
+	double values[SAMPLER_SIDES][SAMPLER_BLOCK_SIZE];
 };
 
 /* index: for example the pixel; replicate: for example the group of samples. */
 void sampler_sobol_init(struct sampler_sobol *s, uint64_t seed, enum rng_stream stream, uint64_t index,
 			uint64_t replicate, uint64_t sample);
 
-/* Computes the numbers of one block into s->value[side] and returns them. For samplers that are built on this one. */
+/* Computes the numbers of one block into s->values[side] and returns them. For samplers that are built on this one. */
 double *sampler_sobol_fill(struct sampler_sobol *s, enum sampler_side side, unsigned vertex);
 
 #endif

@@ -25,32 +25,32 @@
 #include "worker/render/path/vertex.h"
 
 /* Whether connections look through surfaces in this evaluation. */
-static inline bool path_sees_through(const struct path_context *c)
+static inline bool path_allows_see_through(const struct path_context *c)
 {
-	return EFFECT_IS_ON(c->w, transparent_shadows) && !c->opaque;
+	return EFFECT_IS_ON(c->w, transparent_shadows) && !c->opaque_joints;
 }
 
 /* Whether a connection could have passed v: the path continues straight through it. */
-static inline bool path_is_passed(const struct path_vertex *v)
+static inline bool path_vertex_is_see_through(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_STRAIGHT) && bsdf_is_passed(v->bsdf);
+	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_STRAIGHT) && bsdf_passes_connections(v->bsdf);
 }
 
-/* Whether z, a vertex of the camera's sub-path, and y see each other through at least one and at most PATH_PASSED_MOST
+/* Whether z, a vertex of the camera's sub-path, and y see each other through at least one and at most PATH_PASSED_MAX
  * surfaces. before: the vertex before z; NULL if z is on the lens. Fills in c->passed. Sets *left to the share of light
  * that the surfaces let through, times the transmittance of absorbing media between z and the last surface; the caller
  * adds the edge from that surface to y. Counts rays. */
-bool path_see_through(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
-		      const struct path_vertex *y, spectrum *left);
+bool path_trace_passed(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+		       const struct path_vertex *y, spectrum *transmittance);
 
 /* Like path_pdf(), but from a passed vertex: returns the density of `next` for a sub-path that
- * goes straight through `at`. */
-double path_pdf_passed(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *next,
+ * goes straight through `vertex`. */
+double path_pdf_passed(const struct path_context *c, const struct path_vertex *vertex, const struct path_vertex *next,
 		       enum transport transport);
 
 /* Returns J for the passed vertices v[first..last] divided by the product of their densities pdf[0..last - first]. */
 double path_passed_ratio(const struct path_vertex *const *v, unsigned first, unsigned last, const double *pdf);
 /* Like path_passed_ratio(), but for an array of vertices, with their pdf as densities; J alone if not over_pdf. */
-double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, bool over_pdf);
+double path_passed_ratio_of_array(const struct path_vertex *v, unsigned first, unsigned last, bool over_pdf);
 
 #endif

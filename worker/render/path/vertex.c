@@ -1,27 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/path/vertex.h"
 
-spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
+spectrum path_emitted_radiance(const struct path_context *c, const struct path_vertex *v, vec3 w,
+			       const struct wavelengths *wl)
 {
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
+	struct emitter_storage storage;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &storage);
 	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
+	p.is_infinite = v->kind == VERTEX_INFINITE;
 	return em->ops->radiance(em, &p, w, wl);
 }
 
 struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p,
 				       double time)
 {
-	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
+	struct path_vertex v = {.kind = p->is_infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
 	uint32_t shape = w->emitter_shape[emitter];
 	v.x.p = p->p;
 	v.x.ng = v.x.sh.n = p->n;
-	v.x.u = p->where.u;
-	v.x.v = p->where.v;
-	v.x.b1 = p->where.b1;
-	v.x.b2 = p->where.b2;
-	v.x.prim = shape == UINT32_MAX ? prim_none_at(time) : (struct prim_ref){shape, p->where.prim, time};
+	v.x.u = p->texture_point.u;
+	v.x.v = p->texture_point.v;
+	v.x.b1 = p->texture_point.b1;
+	v.x.b2 = p->texture_point.b2;
+	v.x.prim = shape == UINT32_MAX ? prim_none_at(time) : (struct prim_ref){shape, p->texture_point.prim, time};
 	return v;
 }
 
@@ -35,11 +36,11 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 	to->delta = false;
 	to->pdf_rev = 0;
 	if (accel_closest(c->w->accel, &start, d, t_min, t_max, &hit)) {
-		const struct world_shape *part = &c->w->parts[hit.prim.shape];
+		const struct shape_binding *binding = &c->w->shape_bindings[hit.prim.shape];
 		surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
 		to->kind = VERTEX_SURFACE;
-		to->bsdf = &c->w->bsdfs[part->bsdf];
-		to->emitter = part->emitter;
+		to->bsdf = &c->w->bsdfs[binding->bsdf];
+		to->emitter = binding->emitter;
 		return true;
 	}
 	to->kind = VERTEX_INFINITE;

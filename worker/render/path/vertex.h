@@ -15,9 +15,9 @@
 #include "worker/render/world/world.h"
 
 enum {
-	PATH_MAX_EDGES = 128,
-	PATH_PASSED_MOST = 16,	 /* limit on the surfaces that one connection passes straight through */
-	PATH_REFRACTED_MOST = 8, /* limit on the surfaces that refract one connection */
+	PATH_EDGES_MAX = 128,
+	PATH_PASSED_MAX = 16,	/* limit on the surfaces that one connection passes straight through */
+	PATH_REFRACTED_MAX = 8, /* limit on the surfaces that refract one connection */
 };
 
 enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE, VERTEX_MEDIUM };
@@ -28,12 +28,12 @@ struct path_edge {
 	/* Medium of the edge at the vertex; for VERTEX_MEDIUM, the medium that contains the vertex. */
 	uint32_t medium;
 	/* The other members are only set where media scatter. */
-	uint32_t before; /* medium of the edge at the preceding vertex */
+	uint32_t previous_medium; /* medium of the edge at the preceding vertex */
 	/* Every `null` face along the edge that states media has the edge's medium on the side from which the edge
 	 * reaches it. */
-	bool fits;
-	spectrum free; /* exp(-optical depth) of the scattering media along the edge */
-	vec3 d;	       /* unit direction of the edge; either orientation */
+	bool media_match;
+	spectrum free_flight; /* exp(-optical depth) of the scattering media along the edge */
+	vec3 d;		      /* unit direction of the edge; either orientation */
 };
 
 struct path_vertex {
@@ -61,34 +61,34 @@ struct film_window {
 	double x, y, width, height;
 };
 
-static inline bool film_window_holds(const struct film_window *w, const double film[2])
+static inline bool film_window_contains(const struct film_window *w, const double film[2])
 {
 	return film[0] >= w->x && film[0] < w->x + w->width && film[1] >= w->y && film[1] < w->y + w->height;
 }
 
 struct path_context;
 
-/* Divides each contribution between the film and another consumer. `keep` is given the weighted contribution l of
+/* Divides each contribution between the film and another consumer. `film_part` is given the weighted contribution l of
  * joining s light vertices to t camera vertices, which lands at `film`. It returns the part of l that the film gets and
  * takes care of the rest. It must leave the context as it finds it. */
 struct path_split {
-	spectrum (*keep)(struct path_split *p, struct path_context *c, unsigned s, unsigned t, const double film[2],
-			 spectrum l);
+	spectrum (*film_part)(struct path_split *p, struct path_context *c, unsigned s, unsigned t,
+			      const double film[2], spectrum l);
 };
 
 /* A path along which light from a point of an emitter is refracted to a vertex: see path/refracted.h. */
 struct path_refraction {
 	unsigned count;
-	struct path_vertex v[PATH_REFRACTED_MOST]; /* ordered from the camera to the emitter */
-	double log_transfer;			   /* log T of refracted.h */
+	struct path_vertex v[PATH_REFRACTED_MAX]; /* ordered from the camera to the emitter */
+	double log_transfer;			  /* log T of refracted.h */
 };
 /* The last refraction that was computed to weight a path of another technique. All connections to one light sub-path
  * need the same one, so it is kept. */
-struct path_refraction_known {
-	bool any, found;
+struct path_refraction_cache {
+	bool is_filled, found;
 	vec3 z, y;
 	double time, nm;
-	struct path_refraction of;
+	struct path_refraction refraction;
 };
 /* Finds the refracted path between z and y, which lies on an emitter. Returns false if there is none. */
 typedef bool path_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
@@ -102,46 +102,46 @@ struct path_context {
 	double time; /* time of both sub-paths: see struct prim_ref */
 	/* Limits on the number of edges of a path. */
 	uint32_t min_depth, max_depth;
-	double roulette; /* upper limit on the survival probability; 0: no roulette */
-	bool unclassed;	 /* path_sample.classes is not needed */
+	double max_survival; /* upper limit on the survival probability; 0: no roulette */
+	bool skips_classes;  /* path_sample.classes is not needed */
 	/* pdf_rev is not needed, because no technique has more than one light vertex. */
-	bool one_way;
+	bool unidirectional;
 	/* Points of emitters are joined to the lens, which also finds paths of one edge. */
-	bool joins_lens;
+	bool joins_emitters_to_lens;
 	/* Connections do not look through surfaces, even if the world's effects allow it. */
-	bool opaque;
+	bool opaque_joints;
 	/* A vertex that has been removed from the front of the camera sub-path dispersed the light (path/longer.c). */
 	bool dispersed;
 	/* Only one in light_every samples has a light sub-path, whose contributions are multiplied by light_every. 0 or
 	 * 1: every sample has one. */
 	uint32_t light_every;
-	bool makes_all; /* every connection is made, however faint */
+	bool connects_all; /* every connection is made, however faint */
 	/* A connection between two surfaces that contributes less than this is only made with a
 	 * probability. 0: make all. */
-	double faint;
+	double faint_threshold;
 	/* Position of the next faint connection in the systematic sampling of connect.c. */
-	double faint_place;
+	double faint_position;
 	uint64_t *counters;	  /* indexed by enum batch_counter */
 	struct path_split *split; /* NULL: the film gets every contribution */
 	path_refract *refract;	  /* NULL: connections are not refracted */
-	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
+	struct path_vertex camera[PATH_EDGES_MAX + 2], light[PATH_EDGES_MAX + 2];
 	/* The vertices that the last connection passed (transparent.h) or at which it was refracted (refracted.h),
 	 * ordered from the camera to the light. Their pdf is that of a camera sub-path that meets them one by one. */
 	unsigned passed_count;
-	struct path_vertex passed[PATH_PASSED_MOST];
+	struct path_vertex passed[PATH_PASSED_MAX];
 	double log_transfer; /* log T of refracted.h if the last connection was refracted */
-	struct path_refraction_known refraction;
+	struct path_refraction_cache refraction_cache;
 	/* emission[e], for e = 1 .. emission_edges, is the contribution of the light that media emit along edge e of
 	 * the camera's sub-path, whether or not the edge ends in a vertex (volume_emission.h). */
 	unsigned emission_edges;
-	spectrum emission[PATH_MAX_EDGES + 1];
+	spectrum emission[PATH_EDGES_MAX + 1];
 };
 
 /* Returns false for x_0 on a delta emitter, which no camera sub-path can hit. */
 static inline bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
 {
-	bool end = v->kind == VERTEX_EMITTER || v->kind == VERTEX_INFINITE;
-	return !end || v->emitter < 0 || !c->w->emitters[v->emitter].delta;
+	bool is_emitter_point = v->kind == VERTEX_EMITTER || v->kind == VERTEX_INFINITE;
+	return !is_emitter_point || v->emitter < 0 || !c->w->emitters[v->emitter].is_delta;
 }
 
 /* Returns a vertex with the kind, emitter, position and time of a point drawn on an emitter; all other members are
@@ -157,9 +157,9 @@ static inline bool path_scatters_smoothly(const struct path_vertex *v)
 }
 
 /* Whether the path continues from v with a single wavelength. */
-static inline bool path_disperses(const struct path_vertex *v)
+static inline bool path_vertex_disperses(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->bsdf->dispersive;
+	return v->kind == VERTEX_SURFACE && v->bsdf->is_dispersive;
 }
 
 /* Returns |ng . w| of the geometry term; 1 for vertices without a surface: the camera, vertices at infinity, point
@@ -173,10 +173,10 @@ static inline double path_cosine(const struct path_vertex *v, vec3 w)
 }
 
 /* Whether a ray along w meets the vertex: culled curves are only met from outside. */
-static inline bool path_meets(vec3 w, const struct path_vertex *v)
+static inline bool path_ray_can_meet(vec3 w, const struct path_vertex *v)
 {
 	const struct geom_shape *s = v->kind == VERTEX_SURFACE ? v->x.shape : NULL; /* photons (merging.h) have none */
-	return !s || !s->culled || vec3_dot(v->x.ng, w) < 0;
+	return !s || !s->culls_backfaces || vec3_dot(v->x.ng, w) < 0;
 }
 
 /* Converts a density per solid angle at x to one per area at y, or per volume if y is in a medium. omega: the unit
@@ -194,7 +194,8 @@ static inline double path_geometry_term(const struct path_vertex *x, const struc
 }
 
 /* Returns the radiance that the emitter's point v emits in direction w. */
-spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
+spectrum path_emitted_radiance(const struct path_context *c, const struct path_vertex *v, vec3 w,
+			       const struct wavelengths *wl);
 
 /* Traces the ray from `from` along d and fills in the vertex where it ends: a surface, or the emitter at infinity.
  * Returns false if it meets neither. Counts a ray. */

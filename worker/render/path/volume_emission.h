@@ -10,6 +10,6 @@
 
 /* Returns the contribution to the film of the paths that end on the edges first ... last of the camera's sub-path.
  * classes: NULL, or gets each path's class and contribution. */
-spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct classes *classes);
+spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct path_classes *classes);
 
 #endif

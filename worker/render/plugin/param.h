@@ -24,28 +24,29 @@ enum value_type {
 /* A colour or a texture. */
 #define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
 /* Combined with VALUE_NODE: the object is a volume, not a texture. */
-#define VALUE_IN_SPACE (1 << 10)
-#define VALUE_VOLUME (VALUE_TEXTURE | VALUE_IN_SPACE)
+#define VALUE_IS_VOLUME (1 << 10)
+#define VALUE_VOLUME (VALUE_TEXTURE | VALUE_IS_VOLUME)
 /* Combined with types: only Mitsuba 3's plug-in has the parameter. In scenes of 0.5/0.6 it is ignored with a note,
  * as Mitsuba 0.6 ignores it. */
-#define VALUE_OF_3 (1 << 11)
+#define VALUE_DIALECT_3_ONLY (1 << 11)
 /* Combined with types: a number outside the range is not refused but clamped to it, with a note. */
-#define VALUE_CLIPPED (1 << 12)
+#define VALUE_CLAMPED (1 << 12)
 /* Combined with VALUE_TRANSFORM: the transform may be an <animation>. */
-#define VALUE_MOTION (1 << 9)
-#define VALUE_PLACE (VALUE_TRANSFORM | VALUE_MOTION)
+#define VALUE_ANIMATION (1 << 9)
+#define VALUE_TRANSFORM_OR_ANIMATION (VALUE_TRANSFORM | VALUE_ANIMATION)
 
 /* Common ranges. PARAM_LENGTH_MAX bounds lengths and entries of matrices so that squares of areas can be
- * represented. Distances relative to the scene's size are checked later, when that size is known (PARAM_REACH_MAX). */
+ * represented. Distances relative to the scene's size are checked later, when that size is known (PARAM_DISTANCE_MAX).
+ */
 #define PARAM_LENGTH_MAX 1e60
-#define PARAM_LIGHT_MAX 1e30 /* radiance, irradiance, intensity: their sums fit into a film of floats */
-#define PARAM_REACH_MAX 1e12 /* distance of cameras and lights from the centre of the scene, in scene radii */
-#define PARAM_UV_MAX 1e6     /* factors and offsets of texture coordinates: leaves enough digits to select a pixel */
+#define PARAM_LIGHT_MAX 1e30	/* radiance, irradiance, intensity: their sums fit into a film of floats */
+#define PARAM_DISTANCE_MAX 1e12 /* distance of cameras and lights from the centre of the scene, in scene radii */
+#define PARAM_UV_MAX 1e6	/* factors and offsets of texture coordinates: leaves enough digits to select a pixel */
 #define PARAM_IOR_MIN 1e-3
 #define PARAM_IOR_MAX 1e3
 #define PARAM_METAL_MAX 1e9 /* eta and k of conductors */
 
-enum param_class {
+enum param_status {
 	PARAM_UNDERSTOOD,
 	PARAM_IGNORED, /* has no effect on light: reported once, with file and line */
 	PARAM_DIFFERS, /* changes light a little and is not modelled: a warning, unless its value is `false` or 0 */
@@ -55,7 +56,7 @@ enum param_class {
 struct param {
 	const char *name;
 	unsigned types; /* of enum value_type */
-	enum param_class status;
+	enum param_status status;
 	double min, max; /* Range of every number in the value, including those in points, colours and spectra; a number
 			    outside it is an error. min < max for all types with numbers, which a test checks for all
 			    tables. Textures have ranges of their own. */
@@ -90,8 +91,8 @@ struct plugin_decl {
 	const char *type;	    /* as written in type="..." */
 	const struct param *params; /* ends with a row whose name is NULL; NULL: no parameters */
 	unsigned nested_classes;    /* bits 1 << enum plugin_class */
-	enum param_class status;    /* PARAM_IGNORED: only the parameters that it understands have an effect, as for
-				       samplers. Never PARAM_REFUSED: a plug-in that is not listed is refused. */
+	enum param_status status;   /* PARAM_IGNORED: only the parameters that it understands have an effect, as for
+				      samplers. Never PARAM_REFUSED: a plug-in that is not listed is refused. */
 };
 
 /* A list of parameters, terminated. */

@@ -40,39 +40,39 @@ void plugin_offer_classes(struct spelling *s)
 		spelling_offer(s, class_names[i]);
 }
 
-static bool is_any(const char *name)
+static bool is_wildcard(const char *name)
 {
 	return strcmp(name, "*") == 0;
 }
 
 const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plugin_class cls, const char *type)
 {
-	const struct plugin_decl *any = NULL;
+	const struct plugin_decl *wildcard = NULL;
 	for (const struct plugin_decl *d = decls; d->type; d++) {
 		if (d->cls != cls)
 			continue;
 		if (strcasecmp(d->type, type) ==
 		    0) /* Mitsuba opens a file of this name, so "Sphere" works on Windows */
 			return d;
-		if (is_any(d->type))
-			any = d;
+		if (is_wildcard(d->type))
+			wildcard = d;
 	}
-	return any;
+	return wildcard;
 }
 
-const struct param *plugin_param(const struct plugin_decl *d, const char *name)
+const struct param *plugin_find_param(const struct plugin_decl *d, const char *name)
 {
-	const struct param *any = NULL;
+	const struct param *wildcard = NULL;
 	for (const struct param *p = d->params; p && p->name; p++) {
 		if (strcmp(p->name, name) == 0)
 			return p;
-		if (is_any(p->name))
-			any = p;
+		if (is_wildcard(p->name))
+			wildcard = p;
 	}
-	return any;
+	return wildcard;
 }
 
-bool plugin_any_has(const struct plugin_decl *decls, const char *name)
+bool plugin_any_has_param(const struct plugin_decl *decls, const char *name)
 {
 	for (; decls->type; decls++)
 		for (const struct param *p = decls->params; p && p->name; p++)
@@ -83,34 +83,35 @@ bool plugin_any_has(const struct plugin_decl *decls, const char *name)
 
 static const struct {
 	enum plugin_class cls;
-	const char *type, *old, *now;
-} names[] = {
+	const char *type, *old, *current;
+} renamed_params[] = {
 	{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
 	{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
 	{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
 };
 
-bool plugin_new_name_at(size_t i, struct renamed *out)
+bool plugin_renamed_param(size_t i, struct renamed_name *out)
 {
-	if (i >= sizeof names / sizeof *names)
+	if (i >= sizeof renamed_params / sizeof *renamed_params)
 		return false;
-	*out = (struct renamed){.element = class_names[names[i].cls],
-				.type = names[i].type,
-				.old = names[i].old,
-				.now = names[i].now,
-				.parameter = true};
+	*out = (struct renamed_name){.element = class_names[renamed_params[i].cls],
+				     .type = renamed_params[i].type,
+				     .old = renamed_params[i].old,
+				     .current = renamed_params[i].current,
+				     .is_parameter = true};
 	return true;
 }
 
-const char *plugin_new_name(const struct plugin_decl *d, const char *name)
+const char *plugin_current_param_name(const struct plugin_decl *d, const char *name)
 {
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
-			return names[i].now;
+	for (size_t i = 0; i < sizeof renamed_params / sizeof *renamed_params; i++)
+		if (renamed_params[i].cls == d->cls && strcmp(renamed_params[i].type, d->type) == 0 &&
+		    strcmp(renamed_params[i].old, name) == 0)
+			return renamed_params[i].current;
 	return name;
 }
 
-bool plugin_is_guide(const char *element, const char *type)
+bool plugin_is_sampling_hint(const char *element, const char *type)
 {
 	return strcmp(element, class_names[PLUGIN_EMITTER]) == 0 && type && strcasecmp(type, "portal") == 0;
 }
@@ -118,7 +119,7 @@ bool plugin_is_guide(const char *element, const char *type)
 static const struct {
 	enum plugin_class cls;
 	const char *type;
-} mitsubas[] = {
+} mitsuba_plugins[] = {
 	{PLUGIN_SHAPE, "deformable"},
 	{PLUGIN_SHAPE, "displace"},
 	{PLUGIN_SHAPE, "ellipsoids"},
@@ -165,18 +166,18 @@ static const struct {
 	{PLUGIN_VOLUME, "volcache"},
 };
 
-const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls)
+const char *plugin_mitsuba_at(size_t index, enum plugin_class *cls)
 {
-	if (index >= sizeof mitsubas / sizeof *mitsubas)
+	if (index >= sizeof mitsuba_plugins / sizeof *mitsuba_plugins)
 		return NULL;
-	*cls = mitsubas[index].cls;
-	return mitsubas[index].type;
+	*cls = mitsuba_plugins[index].cls;
+	return mitsuba_plugins[index].type;
 }
 
-bool plugin_is_mitsubas(enum plugin_class cls, const char *type)
+bool plugin_is_known_to_mitsuba(enum plugin_class cls, const char *type)
 {
-	for (size_t i = 0; i < sizeof mitsubas / sizeof *mitsubas; i++)
-		if (mitsubas[i].cls == cls && strcasecmp(mitsubas[i].type, type) == 0)
+	for (size_t i = 0; i < sizeof mitsuba_plugins / sizeof *mitsuba_plugins; i++)
+		if (mitsuba_plugins[i].cls == cls && strcasecmp(mitsuba_plugins[i].type, type) == 0)
 			return true;
 	return false;
 }
@@ -184,14 +185,14 @@ bool plugin_is_mitsubas(enum plugin_class cls, const char *type)
 void plugin_offer_types(const struct plugin_decl *decls, enum plugin_class cls, struct spelling *s)
 {
 	for (const struct plugin_decl *d = decls; d->type; d++)
-		if (d->cls == cls && !is_any(d->type))
+		if (d->cls == cls && !is_wildcard(d->type))
 			spelling_offer(s, d->type);
 }
 
 void plugin_offer_params(const struct plugin_decl *d, struct spelling *s)
 {
 	for (const struct param *p = d->params; p && p->name; p++)
-		if (!is_any(p->name))
+		if (!is_wildcard(p->name))
 			spelling_offer(s, p->name);
 }
 
@@ -199,18 +200,18 @@ void plugin_list_types(const struct plugin_decl *decls, enum plugin_class cls, c
 {
 	text[0] = 0;
 	for (const struct plugin_decl *d = decls; d->type; d++)
-		if (d->cls == cls && !is_any(d->type))
-			spelling_list(text, size, d->type);
+		if (d->cls == cls && !is_wildcard(d->type))
+			spelling_append_to_list(text, size, d->type);
 	if (!text[0])
-		spelling_list(text, size, "none");
+		spelling_append_to_list(text, size, "none");
 }
 
 void plugin_list_params(const struct plugin_decl *d, char *text, size_t size)
 {
 	text[0] = 0;
 	for (const struct param *p = d->params; p && p->name; p++)
-		if (p->status == PARAM_UNDERSTOOD && !is_any(p->name))
-			spelling_list(text, size, p->name);
+		if (p->status == PARAM_UNDERSTOOD && !is_wildcard(p->name))
+			spelling_append_to_list(text, size, p->name);
 	if (!text[0])
-		spelling_list(text, size, "none");
+		spelling_append_to_list(text, size, "none");
 }

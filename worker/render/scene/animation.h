@@ -13,6 +13,6 @@ int animation_read(const struct xml_element **el, struct arena *arena, const str
 
 /* Returns, as a noun for the message, the kind of node that cannot be animated although its plug-in can; NULL if it
  * can. */
-const char *animation_refused(const struct scene_node *n, const struct xml_element *el);
+const char *animation_unsupported_kind(const struct scene_node *n, const struct xml_element *el);
 
 #endif

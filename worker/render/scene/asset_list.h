@@ -9,21 +9,21 @@
 
 struct asset_use {
 	const char *name;
-	const struct xml_element *by; /* the element that names the file; NULL: none */
-	size_t at;		      /* index in order of appearance */
+	const struct xml_element *element; /* the element that names the file; NULL: none */
+	size_t index;			   /* index in order of appearance */
 };
 
 struct asset_list {
 	struct asset_use *uses;
-	size_t count, room;
+	size_t count, capacity;
 	const char **names, **places; /* once finished; a place is "scene.xml:12: <shape type=\"obj\">", or "" */
 };
 
 /* Returns 0 or -ENOMEM. */
-int asset_list_add(struct asset_list *l, const char *name, const struct xml_element *by, struct arena *arena);
+int asset_list_add(struct asset_list *l, const char *name, const struct xml_element *element, struct arena *arena);
 
-/* Sorts the names, removes duplicates (keeping the first place that names a file) and removes the name `but`.
+/* Sorts the names, removes duplicates (keeping the first place that names a file) and removes the name `excluded`.
  * Returns 0 or -ENOMEM. */
-int asset_list_finish(struct asset_list *l, const char *but, struct arena *arena);
+int asset_list_finish(struct asset_list *l, const char *excluded, struct arena *arena);
 
 #endif

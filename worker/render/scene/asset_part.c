@@ -12,7 +12,7 @@ int asset_part_open(struct asset_range *p, const struct scene_node *n, const str
 	int rc;
 	if (text) {
 		*p = (struct asset_range){.bytes = (const unsigned char *)text, .size = strlen(text)};
-		rc = asset_range_decode(p, "embedded", &inner);
+		rc = asset_range_decode_base64(p, "embedded", &inner);
 	} else if (name) {
 		rc = asset_range_open(p, assets, name, (uint64_t)node_int(n, "first_byte", 0),
 				      (uint64_t)node_int(n, "byte_count", -1), node_bool(n, "base64", false), &inner);

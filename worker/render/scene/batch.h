@@ -10,11 +10,11 @@
 #include "common/base/arena.h"
 #include "worker/render/scene/node.h"
 
-bool batch_is(const struct scene_node *n);
+bool node_is_batch(const struct scene_node *n);
 
 /* Stores the sensors of a batch, at most as many as it has children. Fails if there is none, if the film's width is
  * not a multiple of their number, for a crop window, and for a batch inside a batch. */
-int batch_spread(const struct scene_node *batch, struct arena *arena, const struct scene_node **out, uint32_t *count,
+int batch_expand(const struct scene_node *batch, struct arena *arena, const struct scene_node **out, uint32_t *count,
 		 struct error *e);
 
 #endif

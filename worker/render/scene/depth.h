@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { SCENE_MAX_DEPTH = 128, SCENE_DIRECT_DEPTH = 2, SCENE_PRB_DEPTH = 6 };
+enum { SCENE_DEPTH_MAX = 128, SCENE_DIRECT_DEPTH = 2, SCENE_PRB_DEPTH = 6 };
 
 /* Returns whether an integrator of this type shows only light that is scattered at most once, as Mitsuba's `direct`
  * and its variants do. */

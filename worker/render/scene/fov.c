@@ -9,7 +9,7 @@
 
 int fov_read(const struct scene_node *n, double *degrees, char axis[FOV_AXIS_MAX], struct error *e)
 {
-	const struct property *fov = node_find(n, "fov");
+	const struct property *fov = node_find_property(n, "fov");
 	const char *focal_length = node_string(n, "focal_length", NULL);
 	if (fov && focal_length)
 		return node_error(n, e, EINVAL, "fov and focal_length are both given: only one is allowed");

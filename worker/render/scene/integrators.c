@@ -6,9 +6,9 @@
 /* The integrators of both dialects, and this program's own. */
 static const struct {
 	const char *type;
-	bool other; /* Mitsuba's image shows something other than all light */
+	bool shows_other; /* Mitsuba's image shows something other than all light */
 	/* Mitsuba's image has no media */
-	bool no_media;
+	bool lacks_media;
 } types[] = {
 	{"path", false, true},
 	{"volpath", false, false},
@@ -48,7 +48,7 @@ static const struct {
 enum { TYPES = sizeof types / sizeof *types };
 
 /* Returns the index of the type, or TYPES if it is unknown. */
-static size_t find(const char *type)
+static size_t find_type(const char *type)
 {
 	size_t i = 0;
 	while (i < TYPES && strcmp(types[i].type, type) != 0)
@@ -56,66 +56,67 @@ static size_t find(const char *type)
 	return i;
 }
 
-const char *integrators_at(size_t i, struct integrator_image *out)
+const char *integrator_type_at(size_t i, struct integrator_image *out)
 {
 	if (i >= TYPES)
 		return NULL;
-	*out = (struct integrator_image){.other = types[i].other,
-					 .direct = depth_is_direct(types[i].type),
-					 .prb = depth_is_prb(types[i].type),
-					 .no_media = types[i].no_media};
+	*out = (struct integrator_image){.shows_other = types[i].shows_other,
+					 .is_direct = depth_is_direct(types[i].type),
+					 .is_prb = depth_is_prb(types[i].type),
+					 .lacks_media = types[i].lacks_media};
 	return types[i].type;
 }
 
-bool integrators_show_other(const struct scene_node *n)
+bool integrator_shows_other(const struct scene_node *n)
 {
-	size_t i = find(n->type);
-	return i < TYPES && types[i].other;
+	size_t i = find_type(n->type);
+	return i < TYPES && types[i].shows_other;
 }
 
-bool integrators_are_known(const struct scene_node *n)
+bool integrator_is_known(const struct scene_node *n)
 {
-	return find(n->type) < TYPES || depth_is_direct(n->type);
+	return find_type(n->type) < TYPES || depth_is_direct(n->type);
 }
 
-const struct scene_node *integrators_inner(const struct scene_node *n)
+const struct scene_node *integrator_inner(const struct scene_node *n)
 {
 	const struct scene_node *inner;
 	for (uint32_t i = 0; (inner = node_child(n, PLUGIN_INTEGRATOR, i)); i++)
-		if (!integrators_show_other(inner))
+		if (!integrator_shows_other(inner))
 			return inner;
 	return node_child(n, PLUGIN_INTEGRATOR, 0);
 }
 
-/* Returns the maximum depth of n; -1: no limit. `around` is the depth of the enclosing integrator, which applies if
- * n states none. In Mitsuba `direct` has no such parameter, so a stated depth can only shorten its paths. */
-static int64_t depth_of(const struct scene_node *n, int64_t around)
+/* Returns the maximum depth of n; -1: no limit. `inherited_depth` is the depth of the enclosing integrator, which
+ * applies if n states none. In Mitsuba `is_direct` has no such parameter, so a stated depth can only shorten its paths.
+ */
+static int64_t effective_depth(const struct scene_node *n, int64_t inherited_depth)
 {
-	int64_t depth = node_int(n, "max_depth", depth_is_prb(n->type) ? SCENE_PRB_DEPTH : around);
+	int64_t depth = node_int(n, "max_depth", depth_is_prb(n->type) ? SCENE_PRB_DEPTH : inherited_depth);
 	if (depth_is_direct(n->type) && (depth < 0 || depth > SCENE_DIRECT_DEPTH))
 		return SCENE_DIRECT_DEPTH;
 	return depth;
 }
 
-int64_t integrators_depth(const struct scene_node *n)
+int64_t integrator_depth(const struct scene_node *n)
 {
 	int64_t depth = -1;
-	for (; n; n = integrators_inner(n))
-		depth = depth_of(n, depth);
+	for (; n; n = integrator_inner(n))
+		depth = effective_depth(n, depth);
 	return depth;
 }
 
-const struct scene_node *integrators_without_media(const struct scene_node *n)
+const struct scene_node *integrator_find_without_media(const struct scene_node *n)
 {
-	for (; n; n = integrators_inner(n)) {
-		size_t i = find(n->type);
-		if (i < TYPES && types[i].no_media)
+	for (; n; n = integrator_inner(n)) {
+		size_t i = find_type(n->type);
+		if (i < TYPES && types[i].lacks_media)
 			return n;
 	}
 	return NULL;
 }
 
-void integrators_offer(struct spelling *s)
+void integrator_offer_types(struct spelling *s)
 {
 	for (size_t i = 0; i < TYPES; i++)
 		spelling_offer(s, types[i].type);

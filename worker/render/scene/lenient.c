@@ -27,7 +27,7 @@ static bool is_one_of(const char *name, const char *const *list)
 static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
-} likes[] = {
+} replacements[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"}, /* if its file is missing */
 	{PLUGIN_BSDF, "measured_polarized", "roughplastic"},
 	{PLUGIN_BSDF, "dielectric_disp", "dielectric"},
@@ -38,16 +38,16 @@ static const struct {
 };
 
 /* Textures that modify the texture inside them. */
-static const char *const around_texture[] = {"lut", "math", "uv_set_selector", NULL};
+static const char *const texture_modifiers[] = {"lut", "math", "uv_set_selector", NULL};
 
-enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
+enum lenient_action lenient_plugin_action(enum plugin_class cls, const char *type, const char **stand_in)
 {
 	*stand_in = NULL;
-	if (cls == PLUGIN_TEXTURE && is_one_of(type, around_texture))
+	if (cls == PLUGIN_TEXTURE && is_one_of(type, texture_modifiers))
 		return LENIENT_INNER;
-	for (size_t i = 0; i < sizeof likes / sizeof *likes; i++)
-		if (likes[i].cls == cls && strcmp(likes[i].type, type) == 0) {
-			*stand_in = likes[i].stand_in;
+	for (size_t i = 0; i < sizeof replacements / sizeof *replacements; i++)
+		if (replacements[i].cls == cls && strcmp(replacements[i].type, type) == 0) {
+			*stand_in = replacements[i].stand_in;
 			return LENIENT_REPLACE;
 		}
 	switch (cls) {
@@ -75,11 +75,11 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 }
 
 /* Returns the plug-in for the mesh file that a shape names; NULL if it names none. */
-static const char *mesh_of(const struct xml_element *el)
+static const char *mesh_plugin(const struct xml_element *el)
 {
 	static const char *const formats[] = {"obj", "ply", "serialized"};
-	for (const struct xml_element *c = el->first; c; c = c->next) {
-		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"),
+	for (const struct xml_element *c = el->first_child; c; c = c->next_sibling) {
+		const char *name = xml_attribute_value(c, "name"), *file = xml_attribute_value(c, "value"),
 			   *end = file ? strrchr(file, '.') : NULL;
 		for (size_t i = 0; end && i < sizeof formats / sizeof *formats; i++)
 			if (name && strcmp(name, "filename") == 0 && strcasecmp(end + 1, formats[i]) == 0)
@@ -89,7 +89,7 @@ static const char *mesh_of(const struct xml_element *el)
 }
 
 /* Returns the first of `parts` that occurs in the type's name; NULL if none does. */
-static const char *part_of(const char *type, const char *const *parts)
+static const char *first_part_in(const char *type, const char *const *parts)
 {
 	while (*parts && !strcasestr(type, *parts))
 		parts++;
@@ -99,11 +99,11 @@ static const char *part_of(const char *type, const char *const *parts)
 /* Returns the camera whose name is part of the type, as in "codedOrthographic" and "thinlens_srf". Other types
  * called a lens or a camera become a camera without a lens. NULL for types that project, or measure light, in some
  * other way. */
-static const char *camera_of(const char *type)
+static const char *camera_plugin(const char *type)
 {
 	static const char *const cameras[] = {"perspective", "thinlens",  "orthographic",
 					      "telecentric", "spherical", NULL};
-	const char *camera = part_of(type, cameras);
+	const char *camera = first_part_in(type, cameras);
 	if (camera)
 		return camera;
 	return strcasestr(type, "lens") || strcasestr(type, "camera") ? "perspective" : NULL;
@@ -111,14 +111,14 @@ static const char *camera_of(const char *type)
 
 static bool has_parameter(const struct xml_element *el, const char *const *list)
 {
-	for (const struct xml_element *c = el->first; c; c = c->next)
-		if (xml_attribute(c, "name") && is_one_of(xml_attribute(c, "name"), list))
+	for (const struct xml_element *c = el->first_child; c; c = c->next_sibling)
+		if (xml_attribute_value(c, "name") && is_one_of(xml_attribute_value(c, "name"), list))
 			return true;
 	return false;
 }
 
 /* Guesses a material by its parameters, whose names most branches of Mitsuba keep, and glass by its type's name. */
-static const char *material_of(const struct xml_element *el, const char *type, const char *fallback)
+static const char *material_plugin(const struct xml_element *el, const char *type, const char *fallback)
 {
 	static const char *const glass[] = {"dielectric", "glass", NULL}, *const other[] = {"thin", "coat", NULL};
 	static const char *const base[] = {"base_color", "baseColor", NULL},
@@ -127,7 +127,7 @@ static const char *material_of(const struct xml_element *el, const char *type, c
 				 *const rough[] = {"alpha", "roughness", NULL},
 				 *const diffuse[] = {"diffuse_reflectance", "diffuseReflectance", NULL},
 				 *const specular[] = {"specular_reflectance", "specularReflectance", NULL};
-	if (part_of(type, glass) && !part_of(type, other) && !has_parameter(el, diffuse))
+	if (first_part_in(type, glass) && !first_part_in(type, other) && !has_parameter(el, diffuse))
 		return has_parameter(el, rough) ? "roughdielectric" : "dielectric";
 	if (has_parameter(el, base) && has_parameter(el, disney))
 		return "principled";
@@ -138,42 +138,42 @@ static const char *material_of(const struct xml_element *el, const char *type, c
 	return fallback;
 }
 
-enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
-				 const char **stand_in)
+enum lenient_action lenient_element_action(const struct xml_element *el, enum plugin_class cls, const char *type,
+					   const char **stand_in)
 {
-	enum lenient_way way = lenient_plugin(cls, type, stand_in);
+	enum lenient_action action = lenient_plugin_action(cls, type, stand_in);
 	const char *mesh = NULL;
 	switch (cls) {
 	case PLUGIN_BSDF:
-		if (way == LENIENT_INNER)
-			*stand_in = material_of(el, type, *stand_in);
-		return way;
+		if (action == LENIENT_INNER)
+			*stand_in = material_plugin(el, type, *stand_in);
+		return action;
 	case PLUGIN_SENSOR:
-		*stand_in = camera_of(type);
-		return *stand_in ? LENIENT_REPLACE : way;
+		*stand_in = camera_plugin(type);
+		return *stand_in ? LENIENT_REPLACE : action;
 	case PLUGIN_SHAPE:
 		/* Mitsuba's own `ellipsoids` have a PLY file too, but it contains points. */
-		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el)))
-			return way;
+		if (plugin_is_known_to_mitsuba(cls, type) || !(mesh = mesh_plugin(el)))
+			return action;
 		*stand_in = mesh;
 		return LENIENT_REPLACE;
 	case PLUGIN_EMITTER:
-		if (way != LENIENT_LEAVE_OUT || !el->parent || strcmp(el->parent->name, "shape") != 0)
-			return way;
+		if (action != LENIENT_LEAVE_OUT || !el->parent || strcmp(el->parent->name, "shape") != 0)
+			return action;
 		*stand_in = "area";
 		return LENIENT_REPLACE;
 	default:
-		return way;
+		return action;
 	}
 }
 
-const char *lenient_param(const char *stand_in, const char *name)
+const char *lenient_param_name(const char *stand_in, const char *name)
 {
 	static const char *const colors[] = {"base_color", "diffuse_reflectance", "color", "diffuse", "albedo", NULL};
 	static const char *const days[] = {"start_year", "start_month", "start_day", NULL};
 	static const struct {
 		const char *other, *principled;
-	} shares[] = {
+	} renames[] = {
 		{"base_metalness", "metallic"},
 		{"specular_roughness", "roughness"},
 		{"specular_roughness_anisotropy", "anisotropic"},
@@ -188,52 +188,53 @@ const char *lenient_param(const char *stand_in, const char *name)
 		return "reflectance";
 	if (strncmp(stand_in, "rough", strlen("rough")) == 0 && strcmp(name, "roughness") == 0)
 		return "alpha";
-	bool clear = strcmp(stand_in, "dielectric") == 0 || strcmp(stand_in, "roughdielectric") == 0;
-	if (clear && (strcmp(name, "eta") == 0 || strcmp(name, "ior") == 0))
+	bool is_clear = strcmp(stand_in, "dielectric") == 0 || strcmp(stand_in, "roughdielectric") == 0;
+	if (is_clear && (strcmp(name, "eta") == 0 || strcmp(name, "ior") == 0))
 		return "int_ior";
-	if (clear && is_one_of(name, colors))
+	if (is_clear && is_one_of(name, colors))
 		return "specular_transmittance";
-	for (size_t i = 0; i < sizeof shares / sizeof *shares && strcmp(stand_in, "principled") == 0; i++)
-		if (strcmp(shares[i].other, name) == 0)
-			return shares[i].principled;
+	for (size_t i = 0; i < sizeof renames / sizeof *renames && strcmp(stand_in, "principled") == 0; i++)
+		if (strcmp(renames[i].other, name) == 0)
+			return renames[i].principled;
 	if (strcmp(stand_in, "sunsky") == 0 && is_one_of(name, days))
 		return name + strlen("start_");
 	return name;
 }
 
-bool lenient_says_again(const char *stand_in, const char *name, const struct xml_element *owner)
+bool lenient_is_redundant_param(const char *stand_in, const char *name, const struct xml_element *owner)
 {
-	static const char *const index[] = {"eta", "specular_ior", NULL};
-	return strcmp(stand_in, "principled") == 0 && strcmp(name, "specular") == 0 && has_parameter(owner, index);
+	static const char *const index_names[] = {"eta", "specular_ior", NULL};
+	return strcmp(stand_in, "principled") == 0 && strcmp(name, "specular") == 0 &&
+	       has_parameter(owner, index_names);
 }
 
 /* Returns whether an object is also given the parameter by its own name, or earlier by the same old name. */
-static bool is_given(const struct xml_element *el, const char *own, const char *old)
+static bool is_given_otherwise(const struct xml_element *el, const char *name_3, const char *old)
 {
-	bool before = true;
-	for (const struct xml_element *c = el->parent->first; c; c = c->next) {
-		const char *name = xml_attribute(c, "name");
-		before &= c != el;
-		if (name && (strcmp(name, own) == 0 || (before && strcmp(name, old) == 0)))
+	bool is_before = true;
+	for (const struct xml_element *c = el->parent->first_child; c; c = c->next_sibling) {
+		const char *name = xml_attribute_value(c, "name");
+		is_before &= c != el;
+		if (name && (strcmp(name, name_3) == 0 || (is_before && strcmp(name, old) == 0)))
 			return true;
 	}
 	return false;
 }
 
-const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_in, const struct xml_element *el,
+const struct param *lenient_old_param(const struct plugin_decl *d, bool is_stand_in, const struct xml_element *el,
 				      const char *name)
 {
 	char snake[128];
 	if (strlen(name) >= sizeof snake / 2)
 		return NULL;
-	snake_case(name, snake);
-	const char *here = plugin_new_name(d, snake);
-	const struct param *p = plugin_param(d, stands_in ? lenient_param(d->type, here) : here);
-	return p && !is_given(el, p->name, name) ? p : NULL;
+	snake_case_from_camel(name, snake);
+	const char *new_name = plugin_current_param_name(d, snake);
+	const struct param *p = plugin_find_param(d, is_stand_in ? lenient_param_name(d->type, new_name) : new_name);
+	return p && !is_given_otherwise(el, p->name, name) ? p : NULL;
 }
 
 /* Returns whether the material, or one inside it, lets light through. */
-static bool has_passage(const struct scene_node *n)
+static bool transmits_light(const struct scene_node *n)
 {
 	static const char *const types[] = {"null",	  "polarizer",	     "circular",       "retarder",  "mask",
 					    "dielectric", "roughdielectric", "thindielectric", "difftrans", "hk",
@@ -243,21 +244,21 @@ static bool has_passage(const struct scene_node *n)
 		return true;
 	for (uint32_t i = 0; i < n->property_count; i++) {
 		const struct value *v = &n->properties[i].value;
-		bool zero = v->type == VALUE_FLOAT && v->as.number == 0;
-		if (is_one_of(n->properties[i].name, parameters) && !zero)
+		bool is_zero = v->type == VALUE_FLOAT && v->as.number == 0;
+		if (is_one_of(n->properties[i].name, parameters) && !is_zero)
 			return true;
 	}
 	for (uint32_t i = 0; i < n->child_count; i++)
-		if (n->children[i]->cls == PLUGIN_BSDF && has_passage(n->children[i]))
+		if (n->children[i]->cls == PLUGIN_BSDF && transmits_light(n->children[i]))
 			return true;
 	return false;
 }
 
-const struct scene_node *lenient_uncovered(const struct scene_node *n)
+const struct scene_node *lenient_transmissive_inner(const struct scene_node *n)
 {
-	static const char *const covers[] = {"coating", "roughcoating", "twosided", NULL};
+	static const char *const opaque_holders[] = {"coating", "roughcoating", "twosided", NULL};
 	const struct scene_node *inner = n->cls == PLUGIN_BSDF ? node_child(n, PLUGIN_BSDF, 0) : NULL;
-	return inner && is_one_of(n->type, covers) && has_passage(inner) ? inner : NULL;
+	return inner && is_one_of(n->type, opaque_holders) && transmits_light(inner) ? inner : NULL;
 }
 
 const char *lenient_texture_hint(const char *sentence)
@@ -272,22 +273,22 @@ bool lenient_needs_texture(const char *type)
 	return is_one_of(type, types);
 }
 
-const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el)
+const char *lenient_missing_file(const struct asset_source *assets, const struct xml_element *el)
 {
-	const char *type = xml_attribute(el, "type");
-	bool measured = type && (strcasecmp(type, "measured") == 0 || strcasecmp(type, "measured_polarized") == 0);
-	if (strcmp(el->name, "texture") != 0 && !(strcmp(el->name, "bsdf") == 0 && measured))
+	const char *type = xml_attribute_value(el, "type");
+	bool is_measured = type && (strcasecmp(type, "measured") == 0 || strcasecmp(type, "measured_polarized") == 0);
+	if (strcmp(el->name, "texture") != 0 && !(strcmp(el->name, "bsdf") == 0 && is_measured))
 		return NULL;
-	for (const struct xml_element *c = el->first; c; c = c->next) {
-		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"), *rest;
-		struct asset there;
+	for (const struct xml_element *c = el->first_child; c; c = c->next_sibling) {
+		const char *name = xml_attribute_value(c, "name"), *file = xml_attribute_value(c, "value"), *rest;
+		struct asset asset;
 		struct error e;
 		if (strcmp(c->name, "string") != 0 || !name || strcmp(name, "filename") != 0 || !file)
 			continue;
-		int r = assets->open(assets->user, file, &there, &e);
+		int r = assets->open(assets->user, file, &asset, &e);
 		if (!r)
-			assets->close(assets->user, &there);
-		return r == -ENOENT || (r && asset_name_up(file, &rest) == ASSET_NAME_ABSOLUTE) ? file : NULL;
+			assets->close(assets->user, &asset);
+		return r == -ENOENT || (r && asset_name_levels_up(file, &rest) == ASSET_NAME_ABSOLUTE) ? file : NULL;
 	}
 	return NULL;
 }
@@ -297,18 +298,18 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 static bool is_coat(const struct xml_element *bsdf)
 {
 	static const char *const clear[] = {"dielectric", "null", NULL};
-	const char *type = xml_attribute(bsdf, "type");
-	return type && part_of(type, clear);
+	const char *type = xml_attribute_value(bsdf, "type");
+	return type && first_part_in(type, clear);
 }
 
-struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted)
+struct xml_element *lenient_find_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted)
 {
 	struct error unused;
 	enum plugin_class cls;
 	struct xml_element *coat = NULL;
-	for (struct xml_element *c = el->first; c; c = c->next) {
+	for (struct xml_element *c = el->first_child; c; c = c->next_sibling) {
 		struct xml_element *target = c;
-		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, &target, &unused))
+		if (strcmp(c->name, "ref") == 0 && id_table_resolve(ids, c, &target, &unused))
 			continue;
 		if (!plugin_class_find(target->name, &cls) || cls != wanted)
 			continue;

@@ -4,8 +4,8 @@
  * read_property reads parameters, and read_object reads nested or referenced objects, for which it calls maker_node in
  * turn. An element is made into a node once; later references share the node.
  *
- * Failures: a problem is reported and reading goes on. With `lenient`, what is not supported is left out or replaced,
- * with a note. Circular references are an error, and the depth and number of objects are limited (nesting.h).
+ * Failures: a problem is reported and reading goes on. With `is_lenient`, what is not supported is left out or
+ * replaced, with a note. Circular references are an error, and the depth and number of objects are limited (nesting.h).
  */
 #include "worker/render/scene/maker.h"
 
@@ -33,10 +33,10 @@
 struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
-	bool stands_in; /* replaces a plug-in that is not supported */
-	bool lacks;	/* something inside it is missing: left out, or already reported as a problem */
-	bool unsure;	/* something that decides whether the object itself is sound is missing or wrong */
-	bool flat;	/* its transform has no inverse */
+	bool is_stand_in;   /* replaces a plug-in that is not supported */
+	bool lacks_content; /* something inside it is missing: left out, or already reported as a problem */
+	bool may_be_flawed; /* something that decides whether the object itself is sound is missing or wrong */
+	bool is_flat;	    /* its transform has no inverse */
 	struct property *properties;
 	const struct scene_node **children;
 	struct xml_nesting nesting;
@@ -48,18 +48,18 @@ int maker_out_of_memory(struct maker *m)
 			 XML_MEMORY_MAX >> 20);
 }
 
-int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by)
+int maker_add_asset(struct maker *m, const char *name, const struct xml_element *element)
 {
-	return asset_list_add(&m->assets, name, by, m->arena) ? maker_out_of_memory(m) : 0;
+	return asset_list_add(&m->assets, name, element, m->arena) ? maker_out_of_memory(m) : 0;
 }
 
 static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
 {
-	if (!el->snake)
+	if (!el->is_camel_case)
 		return name;
 	char *snake = arena_alloc(m->arena, 2 * strlen(name) + 1, 1);
 	if (snake)
-		snake_case(name, snake);
+		snake_case_from_camel(name, snake);
 	return snake;
 }
 
@@ -67,29 +67,29 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 			struct value v)
 {
 	int r = param_check(el, p, &v, m->error);
-	if (r == -ERANGE && over_one(d->node->cls, p, &v)) {
+	if (r == -ERANGE && over_one_applies(d->node->cls, p, &v)) {
 		const struct error why = *m->error;
 		return error_set(m->error, ERANGE, "%s%s", why.text, OVER_ONE_HINT);
 	}
 	if (r)
 		return r;
-	const struct property *before = node_find(d->node, p->name);
-	if (before && el->snake)
-		return given_again(&m->notes, d->decl, el, &d->properties[before - d->node->properties], v);
-	if (before)
-		return given_twice(el, before, m->error);
+	const struct property *previous = node_find_property(d->node, p->name);
+	if (previous && el->is_camel_case)
+		return resolve_second_value(&m->notes, d->decl, el, &d->properties[previous - d->node->properties], v);
+	if (previous)
+		return refuse_second_value(el, previous, m->error);
 	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
 	return 0;
 }
 
 /* Returns whether another plug-in of the class has the parameter, by this name or converted from 0.6's camelCase. */
-static bool is_of_another(const struct maker *m, enum plugin_class cls, const char *name)
+static bool belongs_to_other_plugin(const struct maker *m, enum plugin_class cls, const char *name)
 {
 	char snake[128] = "";
 	if (strlen(name) < sizeof snake / 2)
-		snake_case(name, snake);
+		snake_case_from_camel(name, snake);
 	for (const struct plugin_decl *other = m->decls; other->type; other++)
-		if (other->cls == cls && (plugin_param(other, name) || plugin_param(other, snake)))
+		if (other->cls == cls && (plugin_find_param(other, name) || plugin_find_param(other, snake)))
 			return true;
 	return false;
 }
@@ -98,33 +98,35 @@ static bool is_of_another(const struct maker *m, enum plugin_class cls, const ch
  * mistake. It must not resemble a parameter that has an effect and, in 3.x, no other plug-in of the class may have it.
  * In files of 0.6 an object may have kept parameters of a type that it had before. The parameters of materials,
  * textures, media and filters show in the image; so in 3.x a name counts as a mistake there not only if it may be
- * misspelt, but whenever it may mean one of the table (meant_parameter), and if the object comes from a glTF file or
+ * misspelt, but whenever it may mean one of the table (guess_parameter), and if the object comes from a glTF file or
  * stands in for another plug-in. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
-	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
+	bool has_no_visible_params =
+		cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
 	/* In Mitsuba 3 a shape may hold textures of any name, which others read as its attributes. */
-	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
-	if (!value_is_element(el->name) && !(attribute && !el->snake))
+	bool may_be_attribute =
+		cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
+	if (!value_is_element(el->name) && !(may_be_attribute && !el->is_camel_case))
 		return false;
-	if (!el->snake && !hidden && (gltf_is(el->file) || d->stands_in))
+	if (!el->is_camel_case && !has_no_visible_params && (gltf_is_file_name(el->file) || d->is_stand_in))
 		return false;
 	struct spelling s = {.wanted = name};
 	plugin_offer_params(d->decl, &s);
-	const struct param *meant = s.best		  ? plugin_param(d->decl, s.best)
-				    : hidden || el->snake ? NULL
-							  : meant_parameter(d->decl, name);
+	const struct param *meant = s.best					 ? plugin_find_param(d->decl, s.best)
+				    : has_no_visible_params || el->is_camel_case ? NULL
+										 : guess_parameter(d->decl, name);
 	if (!meant)
-		return el->snake || !is_of_another(m, cls, name);
+		return el->is_camel_case || !belongs_to_other_plugin(m, cls, name);
 	return meant->status == PARAM_IGNORED;
 }
 
 /* Everything but a few parameters of an integrator or a sampler is ignored. A name that resembles one of these may be a
  * misspelling of it, which is noted. */
-static int note_resembling(const struct maker *m, const struct draft *d, const struct xml_element *owner,
-			   const struct xml_element *el, const char *name)
+static int note_similar_name(const struct maker *m, const struct draft *d, const struct xml_element *owner,
+			     const struct xml_element *el, const char *name)
 {
 	struct spelling s = {.wanted = name};
 	char hint[128], text[192];
@@ -132,41 +134,44 @@ static int note_resembling(const struct maker *m, const struct draft *d, const s
 	if (!s.best)
 		return 0;
 	snprintf(text, sizeof text, "is not known and is ignored%s", spelling_hint(&s, hint, sizeof hint));
-	return note_parameter(&m->notes, owner, el, element_spelling(el, name), text);
+	return note_parameter(&m->notes, owner, el, element_written_name(el, name), text);
 }
 
 /* Looks up a name in the table. *p is its parameter, or NULL if nothing more is to be done: it was ignored, or is an
  * error. */
-static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
-		   const struct xml_element *el, const char *name, const struct param **p)
+static int look_up_param(struct maker *m, const struct draft *d, const struct xml_element *owner,
+			 const struct xml_element *el, const char *name, const struct param **p)
 {
-	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
-	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
-	const char *written = element_spelling(el, name);
+	const char *new_name = el->is_camel_case ? plugin_current_param_name(d->decl, name) : name;
+	const struct param *found =
+		plugin_find_param(d->decl, d->is_stand_in ? lenient_param_name(d->decl->type, new_name) : new_name);
+	const char *written = element_written_name(el, name);
 	int r = 0;
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
-		return *p || !value_is_element(el->name) ? 0 : note_resembling(m, d, owner, el, name);
+		return *p || !value_is_element(el->name) ? 0 : note_similar_name(m, d, owner, el, name);
 	}
-	if (!found && m->lenient && !el->snake && (found = lenient_old_param(d->decl, d->stands_in, el, name)))
+	if (!found && m->is_lenient && !el->is_camel_case &&
+	    (found = lenient_old_param(d->decl, d->is_stand_in, el, name)))
 		r = note_old_name(&m->notes, owner, el, found->name);
 	/* In 0.6 every BSDF has this parameter; those whose reflectances can add up to more than 1 have it in their
 	 * tables. */
-	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
+	if (!found && el->is_camel_case && d->node->cls == PLUGIN_BSDF &&
+	    strcmp(name, "ensure_energy_conservation") == 0)
 		return note_no_effect(&m->notes, owner, el, written);
 	if (!found && is_foreign_parameter(m, d, el, name))
 		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
-	if (found && d->stands_in && lenient_says_again(d->decl->type, found->name, owner))
+	if (found && d->is_stand_in && lenient_is_redundant_param(d->decl->type, found->name, owner))
 		return note_parameter(&m->notes, owner, el, written,
 				      "is left out, because the index of refraction says the same (lenient)");
-	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
-		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
+	if ((!found || found->status == PARAM_REFUSED) && m->is_lenient)
+		return note_left_out(&m->notes, el, xml_attribute_value(owner, "type"), written, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
 		return note_no_effect(&m->notes, owner, el, written);
-	if ((found->types & VALUE_OF_3) && !m->tree->dialect_3)
+	if ((found->types & VALUE_DIALECT_3_ONLY) && !m->tree->is_dialect_3)
 		return note_parameter(&m->notes, owner, el, written,
 				      "is not a parameter of Mitsuba 0.6 and is ignored, as there");
 	if (found->status == PARAM_DIFFERS)
@@ -181,61 +186,62 @@ static int adjust_value(struct maker *m, const struct draft *d, const struct xml
 			const struct xml_element *el, const struct param *p, struct value *v)
 {
 	enum plugin_class cls = d->node->cls;
-	int r = el->snake ? old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
-	if (!r && (p->types & VALUE_CLIPPED))
+	int r = el->is_camel_case ? adapt_old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
+	if (!r && (p->types & VALUE_CLAMPED))
 		return clip_value(&m->notes, owner, el, p, v);
-	return !r && m->lenient && !d->stands_in ? over_one_value(&m->notes, owner, el, cls, p, m->arena, v) : r;
+	return !r && m->is_lenient && !d->is_stand_in ? over_one_limit_value(&m->notes, owner, el, cls, p, m->arena, v)
+						      : r;
 }
 
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
 			 const struct xml_element *el)
 {
-	const char *written = xml_attribute(el, "name");
+	const char *written = xml_attribute_value(el, "name");
 	const struct animation *animation = NULL;
 	if (!written)
-		return element_needs(el, "name", m->error);
-	bool unset = element_is_unset(el);
-	if (unset && (strchr(written, '$') || strcmp(el->name, "animation") == 0))
-		return REPORT_TOLD;
+		return element_refuse_missing_attribute(el, "name", m->error);
+	bool is_unset = element_is_unset(el);
+	if (is_unset && (strchr(written, '$') || strcmp(el->name, "animation") == 0))
+		return REPORT_ALREADY_REPORTED;
 	if (strcmp(el->name, "animation") == 0) {
-		const struct xml_element *whole = el;
+		const struct xml_element *outer = el;
 		int r = animation_read(&el, m->arena, &animation, m->error);
 		if (r)
-			return transform_report(whole, r, &m->report, m->error);
+			return transform_report(outer, r, &m->report, m->error);
 		written = strcmp(written, "animation") == 0 ? "to_world" : written;
 	}
 	const char *name = property_name(m, el, written);
 	if (!name)
 		return maker_out_of_memory(m);
 	const struct param *p;
-	int r = look_up(m, d, owner, el, name, &p);
-	if (r || !p || unset)
-		return r || !p ? r : REPORT_TOLD;
+	int r = look_up_param(m, d, owner, el, name, &p);
+	if (r || !p || is_unset)
+		return r || !p ? r : REPORT_ALREADY_REPORTED;
 	struct value v;
-	r = value_read(el, m->assets_from, m->arena, &v, m->error);
+	r = value_read(el, m->asset_source, m->arena, &v, m->error);
 	if (!r)
 		r = adjust_value(m, d, owner, el, p, &v);
 	if (!r && v.type == VALUE_TRANSFORM)
 		v.animation = animation;
 	if (!r)
 		r = add_property(m, d, el, p, v);
-	bool strange = d->stands_in && (r == -EINVAL || r == -ERANGE);
-	if (strange || (r == -EINVAL && m->lenient && p->choices))
-		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
+	bool is_untranslatable = d->is_stand_in && (r == -EINVAL || r == -ERANGE);
+	if (is_untranslatable || (r == -EINVAL && m->is_lenient && p->choices))
+		return note_left_out(&m->notes, el, written, xml_attribute_value(el, "value"), "the value");
 	if (r)
 		return transform_report(el, r, &m->report, m->error);
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
 				 : xml_error(el, m->error, EINVAL, "an empty file name");
 	mat4 inverse;
-	bool flat = !r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE &&
-		    !mat4_invert(v.as.transform, &inverse);
-	d->flat |= flat;
-	if (flat && !m->lenient)
+	bool is_flat = !r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE &&
+		       !mat4_invert(v.as.transform, &inverse);
+	d->is_flat |= is_flat;
+	if (is_flat && !m->is_lenient)
 		r = xml_error(owner, m->error, EINVAL,
 			      "%s flattens the shape (it has no inverse): line %d; --lenient leaves it out", written,
 			      el->line);
-	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
+	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute_value(el, "filename") : NULL;
 	return r || !file ? r : maker_add_asset(m, file, el);
 }
 
@@ -245,17 +251,18 @@ static int add_child(struct maker *m, struct draft *d, const struct xml_element 
 {
 	enum plugin_class cls;
 	plugin_class_find(target->name, &cls);
-	const char *written = xml_attribute(el, "name");
-	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
-					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
-	bool second = !many && node_child(d->node, cls, 0);
-	if (second && d->stands_in)
-		return leave_out(&m->notes, el, d->node->type, written ? written : target->name, "a second object,");
-	if (second)
+	const char *written = xml_attribute_value(el, "name");
+	bool allows_many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
+						   cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
+	bool is_second = !allows_many && node_child(d->node, cls, 0);
+	if (is_second && d->is_stand_in)
+		return note_left_out(&m->notes, el, d->node->type, written ? written : target->name,
+				     "a second object,");
+	if (is_second)
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
 				 plugin_class_name(cls), owner->name, d->node->type);
 	d->children[d->node->child_count++] = child;
-	d->node->shines |= child->shines;
+	d->node->emits_light |= child->emits_light;
 	return 0;
 }
 
@@ -269,134 +276,136 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	assert(is_class);
 	if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_EMITTER) /* the world finds the medium it is in */
 		return 0;
-	const char *written = xml_attribute(el, "name");
+	const char *written = xml_attribute_value(el, "name");
 	const struct param *p = NULL;
-	bool nested = d->decl->nested_classes >> cls & 1;
+	bool is_nested = d->decl->nested_classes >> cls & 1;
 	if (written) {
 		const char *name = property_name(m, el, written);
 		if (!name)
 			return maker_out_of_memory(m);
-		const struct param *found = plugin_param(d->decl, name);
-		if (found || !nested) {
-			int r = look_up(m, d, owner, el, name, &p);
+		const struct param *found = plugin_find_param(d->decl, name);
+		if (found || !is_nested) {
+			int r = look_up_param(m, d, owner, el, name, &p);
 			if (r || !p)
 				return r;
-			nested = false;
+			is_nested = false;
 		}
 	}
-	if (!p && !nested) {
+	if (!p && !is_nested) {
 		if (d->decl->status == PARAM_IGNORED)
 			return 0;
-		if (m->lenient)
-			return leave_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");
+		if (m->is_lenient)
+			return note_left_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
 				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
 	}
-	enum plugin_class colours = p && (p->types & VALUE_IN_SPACE) ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
-	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colours)
-		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", element_spelling(el, p->name),
-				 plugin_class_name(colours), plugin_class_name(cls));
-	if (p && m->lenient && !(p->types & VALUE_NODE))
-		return leave_out(&m->notes, el, xml_attribute(owner, "type"), element_spelling(el, p->name),
-				 "an object for the parameter");
+	enum plugin_class colour_class = p && (p->types & VALUE_IS_VOLUME) ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
+	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colour_class)
+		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s",
+				 element_written_name(el, p->name), plugin_class_name(colour_class),
+				 plugin_class_name(cls));
+	if (p && m->is_lenient && !(p->types & VALUE_NODE))
+		return note_left_out(&m->notes, el, xml_attribute_value(owner, "type"),
+				     element_written_name(el, p->name), "an object for the parameter");
 	const struct scene_node *child;
 	int r = maker_node(m, target, &child);
-	bool once = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
-	if (!r && once)
-		r = nesting_count(&m->objects, target, m->error);
+	bool is_shared = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
+	if (!r && is_shared)
+		r = nesting_add_to_scene(&m->object_count, target, m->error);
 	if (!r)
-		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
+		r = nesting_add(&d->nesting, d->node->cls, el, target, is_shared, m->error);
 	if (r)
-		return r == -E2BIG && m->resumed ? REPORT_TOLD : r;
-	if (p && (r = over_one_texture(&m->notes, d->node->cls, p, m->lenient, m->arena, target, &child)))
+		return r == -E2BIG && m->is_resumed ? REPORT_ALREADY_REPORTED : r;
+	if (p && (r = over_one_limit_texture(&m->notes, d->node->cls, p, m->is_lenient, m->arena, target, &child)))
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
 	return add_child(m, d, owner, el, target, child);
 }
 
-int maker_foreign(struct maker *m, const struct xml_element *el)
+int maker_reject_element(struct maker *m, const struct xml_element *el)
 {
-	return m->lenient ? leave_out(&m->notes, el, el->name, "", "the element") : refuse_element(el, m->error);
+	return m->is_lenient ? note_left_out(&m->notes, el, el->name, "", "the element") : refuse_element(el, m->error);
 }
 
 static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
 {
 	enum plugin_class cls;
-	if (el->ignored)
-		return note_foreign(&m->notes, el);
+	if (el->is_ignored)
+		return note_ignored_element(&m->notes, el);
 	if (value_is_element(el->name))
 		return read_property(m, d, owner, el);
 	if (plugin_class_find(el->name, &cls))
 		return read_object(m, d, owner, el, el);
 	if (strcmp(el->name, "default") == 0)
 		return 0;
-	if (strcmp(el->name, "include") == 0 && el->unset)
-		return REPORT_TOLD;
+	if (strcmp(el->name, "include") == 0 && el->is_unset)
+		return REPORT_ALREADY_REPORTED;
 	if (strcmp(el->name, "ref") != 0)
-		return d->decl->status == PARAM_IGNORED ? 0 : maker_foreign(m, el);
+		return d->decl->status == PARAM_IGNORED ? 0 : maker_reject_element(m, el);
 	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
 		return 0;
 	struct xml_element *target;
-	int r = element_check(el, "id|name", false, m->error);
+	int r = element_check_contents(el, "id|name", false, m->error);
 	if (!r)
-		r = id_table_find(&m->ids, el, &target, m->error);
-	if (!r && id_table_is_absent(target)) /* has been reported where it stands */
-		return REPORT_TOLD;
+		r = id_table_resolve(&m->ids, el, &target, m->error);
+	if (!r && id_table_is_never_node(target)) /* has been reported where it stands */
+		return REPORT_ALREADY_REPORTED;
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
 /* Refuses the motion of an object that cannot move; a lenient reader keeps the first transform instead. */
-static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
+static int refuse_motion(struct maker *m, struct draft *d, const struct xml_element *el)
 {
 	for (uint32_t i = 0; i < d->node->property_count; i++) {
 		struct value *v = &d->properties[i].value;
-		const struct param *p = v->animation ? plugin_param(d->decl, d->properties[i].name) : NULL;
-		const char *what = p && (p->types & VALUE_MOTION) ? animation_refused(d->node, el) : "this plug-in";
-		if (!v->animation || !what)
+		const struct param *p = v->animation ? plugin_find_param(d->decl, d->properties[i].name) : NULL;
+		const char *subject =
+			p && (p->types & VALUE_ANIMATION) ? animation_unsupported_kind(d->node, el) : "this plug-in";
+		if (!v->animation || !subject)
 			continue;
 		v->animation = NULL;
-		return m->lenient ? leave_out(&m->notes, el, d->node->type, "motion", "all but the start of the")
-				  : xml_error(el, m->error, ENOTSUP,
-					      "motion of %s is not supported (line %d); --lenient keeps the first "
-					      "transform",
-					      what, d->properties[i].line);
+		return m->is_lenient ? note_left_out(&m->notes, el, d->node->type, "motion", "all but the start of the")
+				     : xml_error(el, m->error, ENOTSUP,
+						 "motion of %s is not supported (line %d); --lenient keeps the first "
+						 "transform",
+						 subject, d->properties[i].line);
 	}
 	return 0;
 }
 
 /* Returns whether the object may be refused merely because this element in it is missing or wrong. A shape, other
  * than an instance, is judged without its material and other objects. */
-static bool decides(const struct scene_node *n, const struct xml_element *c)
+static bool decides_soundness(const struct scene_node *n, const struct xml_element *c)
 {
 	return n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0 || value_is_element(c->name);
 }
 
 /* Returns whether the node holds a flawed one, as a shape with a flawed texture does: then it is flawed itself. */
-static bool holds_flawed(const struct scene_node *n)
+static bool contains_flawed(const struct scene_node *n)
 {
-	bool with_children = n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0;
+	bool considers_children = n->cls != PLUGIN_SHAPE || strcmp(n->type, "instance") == 0;
 	for (uint32_t i = 0; i < n->property_count; i++)
-		if (n->properties[i].value.type == VALUE_NODE && n->properties[i].value.as.node->flawed)
+		if (n->properties[i].value.type == VALUE_NODE && n->properties[i].value.as.node->is_flawed)
 			return true;
-	for (uint32_t i = 0; i < n->child_count && with_children; i++)
-		if (n->children[i]->flawed)
+	for (uint32_t i = 0; i < n->child_count && considers_children; i++)
+		if (n->children[i]->is_flawed)
 			return true;
 	return false;
 }
 
 /* Marks the node as flawed and adds it to the scene's list of these. */
-static int note_flaw(struct maker *m, struct scene_node *n)
+static int mark_flawed(struct maker *m, struct scene_node *n)
 {
 	uint32_t count = m->flawed_count;
-	n->flawed = true;
+	n->is_flawed = true;
 	if ((count & (count - 1)) == 0) { /* 0 or a power of two: the list is full */
-		const struct scene_node **more = arena_alloc(m->arena, count ? 2 * (size_t)count : 1, sizeof *more);
-		if (!more)
+		const struct scene_node **grown = arena_alloc(m->arena, count ? 2 * (size_t)count : 1, sizeof *grown);
+		if (!grown)
 			return maker_out_of_memory(m);
 		if (count)
-			memcpy(more, m->flawed, count * sizeof *more);
-		m->flawed = more;
+			memcpy(grown, m->flawed, count * sizeof *grown);
+		m->flawed = grown;
 	}
 	m->flawed[m->flawed_count++] = n;
 	return 0;
@@ -405,7 +414,7 @@ static int note_flaw(struct maker *m, struct scene_node *n)
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 {
 	size_t n = 0;
-	for (const struct xml_element *c = el->first; c; c = c->next)
+	for (const struct xml_element *c = el->first_child; c; c = c->next_sibling)
 		n++;
 	d->properties = arena_alloc(m->arena, n, sizeof *d->properties);
 	d->children = arena_alloc(m->arena, n, sizeof *d->children);
@@ -413,11 +422,11 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 		return maker_out_of_memory(m);
 	d->node->properties = d->properties;
 	d->node->children = d->children;
-	for (struct xml_element *c = el->first; c; c = c->next) {
-		uint32_t before = m->report.problem_count;
+	for (struct xml_element *c = el->first_child; c; c = c->next_sibling) {
+		uint32_t problems_before = m->report.problem_count;
 		int r = read_content(m, d, el, c);
-		d->lacks |= r == REPORT_TOLD;
-		d->unsure |= (r || m->report.problem_count > before) && decides(d->node, c);
+		d->lacks_content |= r == REPORT_ALREADY_REPORTED;
+		d->may_be_flawed |= (r || m->report.problem_count > problems_before) && decides_soundness(d->node, c);
 		r = report_problem(&m->report, r, m->error);
 		if (r)
 			return r;
@@ -426,93 +435,94 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 }
 
 /* Makes the node of `inner`, which stands in for el. */
-static int make_inner(struct maker *m, struct xml_element *el, struct xml_element *inner, const struct scene_node **out)
+static int make_stand_in(struct maker *m, struct xml_element *el, struct xml_element *inner,
+			 const struct scene_node **out)
 {
-	el->busy = true;
+	el->is_in_progress = true;
 	m->depth++;
 	int r = maker_node(m, inner, out);
 	m->depth--;
-	el->busy = false;
+	el->is_in_progress = false;
 	el->nesting = inner->nesting;
 	return r;
 }
 
 /* Checks that the value of a parameter is well formed, in an object of unknown type. */
-static int read_unknown(struct maker *m, const struct xml_element *el)
+static int check_unknown_value(struct maker *m, const struct xml_element *el)
 {
-	const struct animation *moves;
-	const struct xml_element *whole = el;
+	const struct animation *animation;
+	const struct xml_element *outer = el;
 	struct value unused;
 	if (element_is_unset(el))
-		return REPORT_TOLD;
-	int r = strcmp(el->name, "animation") == 0 ? animation_read(&el, m->arena, &moves, m->error)
-						   : value_read(el, m->assets_from, m->arena, &unused, m->error);
-	return transform_report(whole, r, &m->report, m->error);
+		return REPORT_ALREADY_REPORTED;
+	int r = strcmp(el->name, "animation") == 0 ? animation_read(&el, m->arena, &animation, m->error)
+						   : value_read(el, m->asset_source, m->arena, &unused, m->error);
+	return transform_report(outer, r, &m->report, m->error);
 }
 
 /* Reports the problems inside an object of unknown type: in its objects, such as the film of a sensor, in the names of
  * its elements, and in how its values are written. Which parameters it may have is not known, nor whether it may have
  * the elements of Mitsuba's that are not supported. */
-static int read_inside(struct maker *m, struct xml_element *el)
+static int check_contents(struct maker *m, struct xml_element *el)
 {
 	int r = 0;
 	m->depth++;
-	for (struct xml_element *c = el->first; c && !r; c = c->next) {
+	for (struct xml_element *c = el->first_child; c && !r; c = c->next_sibling) {
 		enum plugin_class cls;
 		const struct scene_node *unused;
 		struct xml_element *target;
-		bool not_ours = strcmp(c->name, "field") == 0 || strcmp(c->name, "subsurface") == 0;
-		if (c->ignored || not_ours || strcmp(c->name, "default") == 0)
+		bool is_unsupported = strcmp(c->name, "field") == 0 || strcmp(c->name, "subsurface") == 0;
+		if (c->is_ignored || is_unsupported || strcmp(c->name, "default") == 0)
 			continue;
 		if (plugin_class_find(c->name, &cls))
 			r = maker_node(m, c, &unused);
 		else if (strcmp(c->name, "ref") == 0)
-			r = id_table_find(&m->ids, c, &target, m->error);
+			r = id_table_resolve(&m->ids, c, &target, m->error);
 		else if (value_is_element(c->name))
-			r = read_unknown(m, c);
-		else if (strcmp(c->name, "include") != 0 || !c->unset)
-			r = maker_foreign(m, c);
+			r = check_unknown_value(m, c);
+		else if (strcmp(c->name, "include") != 0 || !c->is_unset)
+			r = maker_reject_element(m, c);
 		r = report_problem(&m->report, r, m->error);
 	}
 	m->depth--;
-	return r ? r : REPORT_TOLD;
+	return r ? r : REPORT_ALREADY_REPORTED;
 }
 
 /* Reports the problems inside an object of unknown type as if it were of the nearest type, and makes no node. */
-static int read_as(struct maker *m, struct xml_element *el, const struct plugin_decl *decl)
+static int check_contents_as(struct maker *m, struct xml_element *el, const struct plugin_decl *decl)
 {
 	struct scene_node node = {
 		.cls = decl->cls, .type = decl->type, .file = el->file, .line = el->line, .decl = decl};
-	struct draft d = {.node = &node, .decl = decl, .nesting = {.height = 1, .objects = 1}};
-	el->busy = true;
+	struct draft d = {.node = &node, .decl = decl, .nesting = {.height = 1, .object_count = 1}};
+	el->is_in_progress = true;
 	m->depth++;
 	int r = fill_node(m, &d, el);
 	m->depth--;
-	el->busy = false;
-	return r ? r : REPORT_TOLD;
+	el->is_in_progress = false;
+	return r ? r : REPORT_ALREADY_REPORTED;
 }
 
 /* Reports that an object is refused, and the problems inside it. */
-static int report_refused(struct maker *m, struct xml_element *el, enum plugin_class cls, const char *type, int refused)
+static int report_refused(struct maker *m, struct xml_element *el, enum plugin_class cls, const char *type, int code)
 {
-	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
-		return refused;
-	const struct plugin_decl *meant = meant_type(m->decls, el, cls, type);
-	return meant ? read_as(m, el, meant) : read_inside(m, el);
+	if (code >= 0 || (code = report_problem(&m->report, code, m->error)))
+		return code;
+	const struct plugin_decl *meant = guess_type(m->decls, el, cls, type);
+	return meant ? check_contents_as(m, el, meant) : check_contents(m, el);
 }
 
 /* Fills in d's node from el's contents, and records whether it may be flawed. */
 static int fill_draft(struct maker *m, struct draft *d, struct xml_element *el)
 {
-	el->busy = true;
+	el->is_in_progress = true;
 	m->depth++;
 	int r = fill_node(m, d, el);
 	if (!r)
-		r = report_problem(&m->report, hold_still(m, d, el), m->error);
-	if (!r && (d->unsure || holds_flawed(d->node)))
-		r = note_flaw(m, d->node);
+		r = report_problem(&m->report, refuse_motion(m, d, el), m->error);
+	if (!r && (d->may_be_flawed || contains_flawed(d->node)))
+		r = mark_flawed(m, d->node);
 	m->depth--;
-	el->busy = false;
+	el->is_in_progress = false;
 	el->nesting = d->nesting;
 	return r;
 }
@@ -520,37 +530,38 @@ static int fill_draft(struct maker *m, struct draft *d, struct xml_element *el)
 /* Adds the remarks on a complete node and makes a lenient reader's replacements, which may change *out. */
 static int finish_node(struct maker *m, const struct draft *d, struct xml_element *el, const struct scene_node **out)
 {
-	if (d->flat && m->lenient) {
-		if (m->flat_shapes++ == 0)
-			m->first_flat = el;
-		return REPORT_TOLD;
+	if (d->is_flat && m->is_lenient) {
+		if (m->flat_shape_count++ == 0)
+			m->first_flat_shape = el;
+		return REPORT_ALREADY_REPORTED;
 	}
 	int r = remarks_on_object(d->node, &m->report, m->error);
-	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d->lacks, d->node)))
+	if (!r && m->is_lenient && (r = substitute_medium(&m->notes, el, d->lacks_content, d->node)))
 		return r;
-	if (!r && m->lenient && !m->tree->dialect_3 && (r = substitute_volume(&m->notes, el, d->node)))
+	if (!r && m->is_lenient && !m->tree->is_dialect_3 && (r = substitute_volume(&m->notes, el, d->node)))
 		return r;
-	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d->lacks, out)) == REPORT_TOLD)
+	if (!r && m->is_lenient &&
+	    (r = substitute_cover(&m->notes, el, d->lacks_content, out)) == REPORT_ALREADY_REPORTED)
 		return r;
 	el->node = *out;
 	return r;
 }
 
 /* Refuses an element that refers to itself, was refused before, or lies too deep. */
-static int check_place(struct maker *m, struct xml_element *el)
+static int check_can_make(struct maker *m, struct xml_element *el)
 {
-	if (el->busy)
+	if (el->is_in_progress)
 		return xml_error(el, m->error, ELOOP, "refers to itself");
-	if (el->told)
-		return REPORT_TOLD;
+	if (el->is_rejected)
+		return REPORT_ALREADY_REPORTED;
 	if (m->depth == 0)
-		m->resumed = el->deep;
+		m->is_resumed = el->is_too_deep;
 	if (m->depth >= XML_DEPTH_MAX) {
-		bool said = el->deep || m->resumed;
-		el->deep = true;
-		return said ? REPORT_TOLD
-			    : xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep",
-					XML_DEPTH_MAX);
+		bool is_reported = el->is_too_deep || m->is_resumed;
+		el->is_too_deep = true;
+		return is_reported ? REPORT_ALREADY_REPORTED
+				   : xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep",
+					       XML_DEPTH_MAX);
 	}
 	return 0;
 }
@@ -563,30 +574,31 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 		*out = el->node;
 		return 0;
 	}
-	int r = check_place(m, el);
+	int r = check_can_make(m, el);
 	if (r)
 		return r;
-	el->told = true; /* reset on success */
+	el->is_rejected = true; /* reset on success */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
-	bool file = el->parent && strcmp(el->parent->name, "include") == 0;
-	r = element_check(el, file || m->tree->dialect_3 ? "type|id|name|version" : "type|id|name", true, m->error);
+	bool is_included = el->parent && strcmp(el->parent->name, "include") == 0;
+	r = element_check_contents(el, is_included || m->tree->is_dialect_3 ? "type|id|name|version" : "type|id|name",
+				   true, m->error);
 	if (r)
 		return r;
-	const char *type = xml_attribute(el, "type");
+	const char *type = xml_attribute_value(el, "type");
 	if (!type)
-		return element_needs(el, "type", m->error);
-	if (el->unset && strchr(type, '$'))
-		return REPORT_TOLD;
+		return element_refuse_missing_attribute(el, "type", m->error);
+	if (el->is_unset && strchr(type, '$'))
+		return REPORT_ALREADY_REPORTED;
 	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
-	bool stands_in = !decl;
+	bool is_stand_in = !decl;
 	struct xml_element *inner = NULL;
-	if (!decl && !m->lenient)
+	if (!decl && !m->is_lenient)
 		return report_refused(m, el, cls, type, refuse_type(m->decls, el, cls, type, m->error));
 	if (!decl && (r = substitute_plugin(&m->notes, m->decls, &m->ids, el, cls, &type, &decl, &inner)))
 		return report_refused(m, el, cls, type, r);
 	if (inner) {
-		r = make_inner(m, el, inner, out);
+		r = make_stand_in(m, el, inner, out);
 		el->node = r ? NULL : *out;
 		return r;
 	}
@@ -594,22 +606,22 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
 		return r;
-	const struct plugin_decl *named = decl;
-	if (m->lenient && (r = substitute_lost(&m->notes, m->assets_from, m->decls, el, &type, &decl)))
+	const struct plugin_decl *named_decl = decl;
+	if (m->is_lenient && (r = substitute_missing_file(&m->notes, m->asset_source, m->decls, el, &type, &decl)))
 		return r;
 	struct draft d = {.node = arena_alloc(m->arena, 1, sizeof *d.node),
 			  .decl = decl,
-			  .stands_in = stands_in || decl != named,
-			  .nesting = {.height = 1, .objects = 1}};
+			  .is_stand_in = is_stand_in || decl != named_decl,
+			  .nesting = {.height = 1, .object_count = 1}};
 	if (!d.node)
 		return maker_out_of_memory(m);
 	*d.node = (struct scene_node){.cls = cls,
 				      .type = type,
-				      .id = xml_attribute(el, "id"),
+				      .id = xml_attribute_value(el, "id"),
 				      .file = el->file,
 				      .line = el->line,
 				      .decl = decl,
-				      .shines = cls == PLUGIN_EMITTER};
+				      .emits_light = cls == PLUGIN_EMITTER};
 	r = fill_draft(m, &d, el);
 	*out = d.node;
 	if (!r)

@@ -21,14 +21,14 @@ struct mtl_material {
 	int line;
 	struct mtl_value diffuse, specular, exponent, model, opacity;
 	struct mtl_value diffuse_map, specular_map, opacity_map, bump;
-	const struct mtl_material *before;
+	const struct mtl_material *previous;
 };
 
 struct mtl {
 	const char *file;
-	bool there; /* the file can be opened */
-	const struct mtl_material *last;
-	struct mtl_value unread; /* the first keyword that would change the image but is not supported */
+	bool exists; /* the file can be opened */
+	const struct mtl_material *last_material;
+	struct mtl_value unsupported; /* the first keyword that would change the image but is not supported */
 };
 
 enum { MTL_MATERIALS_MAX = 4096 };
@@ -41,11 +41,12 @@ int mtl_read(struct mtl *m, const struct asset_source *assets, const char *file,
 const struct mtl_material *mtl_find(const struct mtl *m, const char *name);
 
 /* Adds the material's <bsdf> to `shape`. Returns the number of elements made, or -ENOMEM. */
-int mtl_put(const struct mtl *m, const struct mtl_material *of, struct xml_element *shape, struct arena *arena);
+int mtl_add_bsdf(const struct mtl *m, const struct mtl_material *material, struct xml_element *shape,
+		 struct arena *arena);
 
 /* Returns the canonical name of `name` in the folder of `beside`. If `name` has folders and there is no such file,
  * the folders are dropped. NULL if out of memory. */
-const char *mtl_file(const struct asset_source *assets, const char *beside, const char *name, size_t length,
-		     struct arena *arena);
+const char *mtl_resolve_file(const struct asset_source *assets, const char *beside, const char *name, size_t length,
+			     struct arena *arena);
 
 #endif

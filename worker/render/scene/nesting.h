@@ -16,15 +16,16 @@
 #define NESTING_PARTS_MAX 65536	     /* for one material or texture: an evaluation may visit all its objects */
 #define NESTING_OBJECTS_MAX 67108864 /* for the scene */
 
-/* Adds `taken`, which has been made, to the contents of `owner`, an object of class `cls`; `el` is the element
- * inside the owner that names it. once: `taken` is built once for all its owners, and adds only depth. Returns -E2BIG
- * with a sentence if a limit is exceeded. `owner` is then marked as beyond the limits, and taking it returns
- * REPORT_TOLD, without another sentence. */
-int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
-		 const struct xml_element *taken, bool once, struct error *e);
+/* Adds `part`, which has been made, to the contents of `owner`, an object of class `cls`; `el` is the element
+ * inside the owner that names it. is_shared: `part` is built once for all its owners, and adds only depth. Returns
+ * -E2BIG with a sentence if a limit is exceeded. `owner` is then marked as beyond the limits, and taking it returns
+ * REPORT_ALREADY_REPORTED, without another sentence. */
+int nesting_add(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
+		const struct xml_element *part, bool is_shared, struct error *e);
 
 /* Adds an object with its contents to the scene's number of objects, once per element. Returns -E2BIG with a
- * sentence the first time that there are too many, then REPORT_TOLD, also for an object beyond the limits. */
-int nesting_count(uint64_t *objects, struct xml_element *el, struct error *e);
+ * sentence the first time that there are too many, then REPORT_ALREADY_REPORTED, also for an object beyond the limits.
+ */
+int nesting_add_to_scene(uint64_t *scene_object_count, struct xml_element *el, struct error *e);
 
 #endif

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct property *node_find(const struct scene_node *n, const char *name)
+const struct property *node_find_property(const struct scene_node *n, const char *name)
 {
 	for (uint32_t i = 0; i < n->property_count; i++)
 		if (strcmp(n->properties[i].name, name) == 0)
@@ -17,7 +17,8 @@ const struct property *node_find(const struct scene_node *n, const char *name)
 	return NULL;
 }
 
-const struct scene_node *node_with(const struct scene_node *n, const char *name, struct value v, struct arena *arena)
+const struct scene_node *node_with_property(const struct scene_node *n, const char *name, struct value v,
+					    struct arena *arena)
 {
 	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
 	struct property *p = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *p);
@@ -35,7 +36,7 @@ const struct scene_node *node_with(const struct scene_node *n, const char *name,
 
 double node_float(const struct scene_node *n, const char *name, double fallback)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	if (p && p->value.type == VALUE_FLOAT)
 		return p->value.as.number;
 	return p && p->value.type == VALUE_INT ? (double)p->value.as.integer : fallback;
@@ -43,25 +44,25 @@ double node_float(const struct scene_node *n, const char *name, double fallback)
 
 int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p && p->value.type == VALUE_INT ? p->value.as.integer : fallback;
 }
 
 bool node_bool(const struct scene_node *n, const char *name, bool fallback)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p && p->value.type == VALUE_BOOL ? p->value.as.boolean : fallback;
 }
 
 const char *node_string(const struct scene_node *n, const char *name, const char *fallback)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p && p->value.type == VALUE_STRING ? p->value.as.string : fallback;
 }
 
 mat4 node_transform(const struct scene_node *n, const char *name)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p && p->value.type == VALUE_TRANSFORM ? p->value.as.transform : mat4_identity();
 }
 
@@ -75,24 +76,24 @@ const struct scene_node *node_child(const struct scene_node *n, enum plugin_clas
 
 const struct scene_node *node_ref(const struct scene_node *n, const char *name)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
 }
 
 const struct animation *node_animation(const struct scene_node *n)
 {
-	const struct property *p = node_find(n, "to_world");
+	const struct property *p = node_find_property(n, "to_world");
 	return p ? p->value.animation : NULL;
 }
 
-static bool same_animations(const struct animation *a, const struct animation *b)
+static bool animations_equal(const struct animation *a, const struct animation *b)
 {
 	return a == b || (a && b && a->count == b->count && memcmp(a->key, b->key, a->count * sizeof *a->key) == 0);
 }
 
-static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left);
+static bool nodes_equal(const struct scene_node *a, const struct scene_node *b, uint32_t *remaining);
 
-static bool same_values(const struct value *a, const struct value *b, uint32_t *left)
+static bool values_equal(const struct value *a, const struct value *b, uint32_t *remaining)
 {
 	if (a->type != b->type)
 		return false;
@@ -116,38 +117,38 @@ static bool same_values(const struct value *a, const struct value *b, uint32_t *
 			memcmp(a->as.spectrum.nm, b->as.spectrum.nm, a->as.spectrum.count * sizeof(double)) == 0);
 	case VALUE_TRANSFORM:
 		return memcmp(&a->as.transform, &b->as.transform, sizeof a->as.transform) == 0 &&
-		       same_animations(a->animation, b->animation);
+		       animations_equal(a->animation, b->animation);
 	case VALUE_NODE:
-		return same_objects(a->as.node, b->as.node, left);
+		return nodes_equal(a->as.node, b->as.node, remaining);
 	}
 	return false;
 }
 
-/* left: how many more objects may be compared; limited, because a few lines can nest objects in each other many
+/* remaining: how many more objects may be compared; limited, because a few lines can nest objects in each other many
  * times over. */
-static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left)
+static bool nodes_equal(const struct scene_node *a, const struct scene_node *b, uint32_t *remaining)
 {
 	if (a == b)
 		return true;
-	if (*left == 0 || a->cls != b->cls || strcmp(a->type, b->type) != 0 || a->property_count != b->property_count ||
-	    a->child_count != b->child_count)
+	if (*remaining == 0 || a->cls != b->cls || strcmp(a->type, b->type) != 0 ||
+	    a->property_count != b->property_count || a->child_count != b->child_count)
 		return false;
-	--*left;
+	--*remaining;
 	for (uint32_t i = 0; i < a->property_count; i++) {
-		const struct property *other = node_find(b, a->properties[i].name);
-		if (!other || !same_values(&a->properties[i].value, &other->value, left))
+		const struct property *other = node_find_property(b, a->properties[i].name);
+		if (!other || !values_equal(&a->properties[i].value, &other->value, remaining))
 			return false;
 	}
 	for (uint32_t i = 0; i < a->child_count; i++)
-		if (!same_objects(a->children[i], b->children[i], left))
+		if (!nodes_equal(a->children[i], b->children[i], remaining))
 			return false;
 	return true;
 }
 
-bool node_same(const struct scene_node *a, const struct scene_node *b)
+bool node_equals(const struct scene_node *a, const struct scene_node *b)
 {
-	uint32_t left = NODE_SAME_MOST;
-	return same_objects(a, b, &left);
+	uint32_t remaining = NODE_EQUALS_OBJECTS_MAX;
+	return nodes_equal(a, b, &remaining);
 }
 
 int node_error(const struct scene_node *n, struct error *e, int errno_value, const char *format, ...)
@@ -163,12 +164,14 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 
 const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX])
 {
-	enum { MOST = NODE_PLACE_MAX - 16 }; /* leaves room for "...", ":", a line number and the terminating 0 */
+	enum {
+		NAME_LENGTH_MAX = NODE_PLACE_MAX - 16
+	}; /* leaves room for "...", ":", a line number and the terminating 0 */
 	size_t length = strlen(n->file);
-	const char *end = n->file + (length > MOST ? length - MOST : 0);
+	const char *end = n->file + (length > NAME_LENGTH_MAX ? length - NAME_LENGTH_MAX : 0);
 	while (end > n->file && ((unsigned char)*end & 0xC0) == 0x80) /* in the middle of a UTF-8 character */
 		end++;
-	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > MOST ? "..." : "", end, n->line);
+	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > NAME_LENGTH_MAX ? "..." : "", end, n->line);
 	return text;
 }
 

@@ -45,15 +45,15 @@ struct scene_node {
 	const char *file; /* as the user named it */
 	int line;
 	const struct plugin_decl *decl;
-	bool shines; /* an emitter, or a shape that contains one at any depth */
-	bool flawed; /* something inside it was refused: any other problem of the node may be only a consequence */
+	bool emits_light; /* an emitter, or a shape that contains one at any depth */
+	bool is_flawed;	  /* something inside it was refused: any other problem of the node may be only a consequence */
 	uint32_t property_count, child_count;
 	const struct property *properties;
 	const struct scene_node *const *children; /* nested objects without a name */
 };
 
 /* Look-ups; the caller gives the default. A property that exists has the type and range stated in its table. */
-const struct property *node_find(const struct scene_node *n, const char *name);
+const struct property *node_find_property(const struct scene_node *n, const char *name);
 double node_float(const struct scene_node *n, const char *name, double fallback); /* converts integers */
 int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback);
 bool node_bool(const struct scene_node *n, const char *name, bool fallback);
@@ -65,12 +65,13 @@ const struct scene_node *node_ref(const struct scene_node *n, const char *name);
 
 /* Returns a copy of n in which the property has this value, whether or not n has the property. NULL if out of
  * memory. */
-const struct scene_node *node_with(const struct scene_node *n, const char *name, struct value v, struct arena *arena);
+const struct scene_node *node_with_property(const struct scene_node *n, const char *name, struct value v,
+					    struct arena *arena);
 
 /* Returns whether both nodes have the same type, parameters and contents, regardless of where they stand in the
- * file. False if that takes comparing more than NODE_SAME_MOST objects. */
-enum { NODE_SAME_MOST = 1000 };
-bool node_same(const struct scene_node *a, const struct scene_node *b);
+ * file. False if that takes comparing more than NODE_EQUALS_OBJECTS_MAX objects. */
+enum { NODE_EQUALS_OBJECTS_MAX = 1000 };
+bool node_equals(const struct scene_node *a, const struct scene_node *b);
 
 /* Writes "room.xml:3", with only the end of a long file name. Returns text. */
 enum { NODE_PLACE_MAX = 64 };

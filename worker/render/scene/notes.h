@@ -13,15 +13,15 @@
 struct notes {
 	struct report *report;
 	struct error *error;
-	const struct xml_element *owner; /* the object whose parameters without effect were noted last, or NULL */
-	uint32_t at;			 /* the index of that note */
-	int line;			 /* its line */
-	char names[256];		 /* the parameters that it lists */
+	const struct xml_element *last_owner; /* the object whose parameters without effect were noted last, or NULL */
+	uint32_t note_index;		      /* the index of that note */
+	int note_line;			      /* its line */
+	char parameter_names[256];	      /* the parameters that it lists */
 };
 
 /* Adds a note. The element's name, `type` and `property` together identify the kind of thing. */
-__attribute__((format(printf, 5, 6))) int note(const struct notes *t, const struct xml_element *el, const char *type,
-					       const char *property, const char *format, ...);
+__attribute__((format(printf, 5, 6))) int note_add(const struct notes *t, const struct xml_element *el,
+						   const char *type, const char *property, const char *format, ...);
 /* Notes what happens to a parameter; what: "is ignored", for example. */
 int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		   const char *name, const char *what);
@@ -33,13 +33,14 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 /* Notes that a name of 0.6 in a file of 3.x is read as a name of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
-int note_guide(const struct notes *t, const struct xml_element *el); /* an object for which plugin_is_guide() is true */
+int note_guide(const struct notes *t,
+	       const struct xml_element *el); /* an object for which plugin_is_sampling_hint() is true */
 /* The first is for an element that is ignored with everything inside it, the second for an object of which only the
  * parameters in its table are used. */
-int note_foreign(const struct notes *t, const struct xml_element *el);
+int note_ignored_element(const struct notes *t, const struct xml_element *el);
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);
 /* Leaves out an element that is not supported, with a note. */
-int leave_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
-	      const char *what);
+int note_left_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
+		  const char *what);
 
 #endif

@@ -16,7 +16,7 @@ enum { OBJ_MATERIALS_MAX = 4096 }; /* per file */
 
 /* Splits all such shapes of the tree. Adds the .mtl files to `files` and problems to the report. Returns 0, -ENOMEM
  * or REPORT_FULL. */
-int obj_materials_spread(struct xml_tree *t, struct id_table *ids, const struct asset_source *assets,
-			 struct asset_list *files, struct arena *arena, struct report *report, struct error *e);
+int obj_materials_split(struct xml_tree *t, struct id_table *ids, const struct asset_source *assets,
+			struct asset_list *files, struct arena *arena, struct report *report, struct error *e);
 
 #endif

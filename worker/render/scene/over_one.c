@@ -8,29 +8,29 @@
 #include <math.h>
 #include <string.h>
 
-static bool is_share(enum plugin_class cls, const struct param *p)
+static bool is_fraction(enum plugin_class cls, const struct param *p)
 {
-	bool colour = p->types & VALUE_RGB;
-	return (p->types & VALUE_FLOAT) && (cls == PLUGIN_BSDF || colour) && p->min == 0 && p->max == 1;
+	bool allows_colour = p->types & VALUE_RGB;
+	return (p->types & VALUE_FLOAT) && (cls == PLUGIN_BSDF || allows_colour) && p->min == 0 && p->max == 1;
 }
 
 /* Returns the largest number of a value if all are finite and none is below 0; otherwise 0. */
 static double largest_value(const struct value *v)
 {
-	double scratch[3], most = 0;
+	double scratch[3], largest = 0;
 	uint32_t count;
 	const double *x = value_numbers(v, scratch, &count);
 	for (uint32_t i = 0; i < count; i++) {
 		if (!(x[i] >= 0 && isfinite(x[i])))
 			return 0;
-		most = fmax(most, x[i]);
+		largest = fmax(largest, x[i]);
 	}
-	return most;
+	return largest;
 }
 
-bool over_one(enum plugin_class cls, const struct param *p, const struct value *v)
+bool over_one_applies(enum plugin_class cls, const struct param *p, const struct value *v)
 {
-	return is_share(cls, p) && largest_value(v) > 1;
+	return is_fraction(cls, p) && largest_value(v) > 1;
 }
 
 static int limit_to_one(struct value *v, struct arena *arena)
@@ -57,18 +57,18 @@ static int out_of_memory(const struct notes *t)
 	return error_set(t->error, ENOMEM, "out of memory");
 }
 
-int over_one_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		   enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v)
+int over_one_limit_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+			 enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v)
 {
-	double most = largest_value(v);
-	if (!over_one(cls, p, v))
+	double largest = largest_value(v);
+	if (!over_one_applies(cls, p, v))
 		return 0;
 	if (limit_to_one(v, arena))
 		return out_of_memory(t);
-	const char *type = xml_attribute(owner, "type");
-	return note(t, owner, type, p->name,
-		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", el->file, el->line,
-		    owner->name, type, element_spelling(el, p->name), most);
+	const char *type = xml_attribute_value(owner, "type");
+	return note_add(t, owner, type, p->name,
+			"%s:%d: <%.64s type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", el->file, el->line,
+			owner->name, type, element_written_name(el, p->name), largest);
 }
 
 /* Textures made of colours, or of other textures. What a `scale` texture makes of its colours is limited where it is
@@ -79,13 +79,14 @@ static bool is_pattern(const char *type)
 }
 
 /* Refuses a colour of a texture, but only once, however many materials use the texture. */
-static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p, double most)
+static int refuse_colour(const struct notes *t, const struct scene_node *texture, const struct property *p,
+			 double largest)
 {
 	error_set(t->error, ERANGE, "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1, which no reflectance can be%s",
-		  texture->file, p->line, texture->type, p->name, most, OVER_ONE_HINT);
+		  texture->file, p->line, texture->type, p->name, largest, OVER_ONE_HINT);
 	for (uint32_t i = 0; i < t->report->problem_count; i++)
 		if (strcmp(t->report->problems[i], t->error->text) == 0)
-			return REPORT_TOLD;
+			return REPORT_ALREADY_REPORTED;
 	return -ERANGE;
 }
 
@@ -93,14 +94,14 @@ static int refuse_colour(const struct notes *t, const struct scene_node *texture
 static int limit_colour(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
 			const struct scene_node *texture, const struct property *p, struct value *v)
 {
-	double most = largest_value(v);
+	double largest = largest_value(v);
 	if (!lenient)
-		return refuse_colour(t, texture, p, most);
+		return refuse_colour(t, texture, p, largest);
 	if (limit_to_one(v, arena))
 		return out_of_memory(t);
-	return note(t, el, texture->type, p->name,
-		    "%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", texture->file,
-		    p->line, texture->type, p->name, most);
+	return note_add(t, el, texture->type, p->name,
+			"%s:%d: <texture type=\"%.64s\">: %s=%g is above 1 and counts as 1 (lenient)", texture->file,
+			p->line, texture->type, p->name, largest);
 }
 
 static int limit_pattern(const struct notes *t, bool lenient, struct arena *arena, const struct xml_element *el,
@@ -108,7 +109,7 @@ static int limit_pattern(const struct notes *t, bool lenient, struct arena *aren
 {
 	static const char *const names[] = {"color0", "color1"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-		const struct property *p = node_find(*texture, names[i]);
+		const struct property *p = node_find_property(*texture, names[i]);
 		if (!p)
 			continue;
 		struct value v = p->value;
@@ -123,23 +124,23 @@ static int limit_pattern(const struct notes *t, bool lenient, struct arena *aren
 			return r;
 		if (v.type == VALUE_NODE && v.as.node == p->value.as.node)
 			continue;
-		*texture = node_with(*texture, names[i], v, arena);
+		*texture = node_with_property(*texture, names[i], v, arena);
 		if (!*texture)
 			return out_of_memory(t);
 	}
 	return 0;
 }
 
-int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
-		     struct arena *arena, struct xml_element *el, const struct scene_node **texture)
+int over_one_limit_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
+			   struct arena *arena, struct xml_element *el, const struct scene_node **texture)
 {
-	if (!is_share(cls, p) || !is_pattern((*texture)->type))
+	if (!is_fraction(cls, p) || !is_pattern((*texture)->type))
 		return 0;
-	if (!el->limited) {
+	if (!el->limited_node) {
 		int r = limit_pattern(t, lenient, arena, el, texture);
-		el->limited = r ? NULL : *texture;
+		el->limited_node = r ? NULL : *texture;
 		return r;
 	}
-	*texture = el->limited;
+	*texture = el->limited_node;
 	return 0;
 }

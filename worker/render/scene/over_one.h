@@ -13,16 +13,17 @@
 #define OVER_ONE_HINT "; --lenient counts it as 1"
 
 /* Returns whether the value of p, a parameter of a plug-in of class cls, is wrong only in being above 1. */
-bool over_one(enum plugin_class cls, const struct param *p, const struct value *v);
+bool over_one_applies(enum plugin_class cls, const struct param *p, const struct value *v);
 
 /* Limits such a value, or each component of a colour or spectrum, to 1; other values stay. Returns 0 or -ENOMEM. */
-int over_one_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		   enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v);
+int over_one_limit_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+			 enum plugin_class cls, const struct param *p, struct arena *arena, struct value *v);
 
-/* Like over_one_value(), for the colours of a texture, made from `el`, that is the value of p. *texture becomes a
+/* Like over_one_limit_value(), for the colours of a texture, made from `el`, that is the value of p. *texture becomes a
  * copy, which all such parameters share: another plug-in may use the original's numbers as heights. Images never have
- * values above 1. Without `lenient` such a colour is refused. Returns 0, -ENOMEM, -ERANGE or REPORT_TOLD. */
-int over_one_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
-		     struct arena *arena, struct xml_element *el, const struct scene_node **texture);
+ * values above 1. Without `lenient` such a colour is refused. Returns 0, -ENOMEM, -ERANGE or REPORT_ALREADY_REPORTED.
+ */
+int over_one_limit_texture(const struct notes *t, enum plugin_class cls, const struct param *p, bool lenient,
+			   struct arena *arena, struct xml_element *el, const struct scene_node **texture);
 
 #endif

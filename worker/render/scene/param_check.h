@@ -13,18 +13,18 @@
  * -ERANGE for a value outside the range. */
 int param_check(const struct xml_element *el, const struct param *p, struct value *v, struct error *e);
 
-/* For parameters with VALUE_CLIPPED, which Mitsuba limits to their range: moves a number, or each component of a
+/* For parameters with VALUE_CLAMPED, which Mitsuba limits to their range: moves a number, or each component of a
  * colour, that is outside the range of p to the nearer end, with a note. Spectra stay as they are. Returns 0 or
  * -ENOMEM. */
 int clip_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 	       const struct param *p, struct value *v);
 
 /* Refuses a property that an object is given a second time. Returns -EINVAL. */
-int given_twice(const struct xml_element *el, const struct property *before, struct error *e);
+int refuse_second_value(const struct xml_element *el, const struct property *previous, struct error *e);
 
 /* For files of 0.6: sets *before to the value that counts in Mitsuba 0.6, with a note. Returns -EINVAL if two names
  * of 0.6 that mean the same parameter are given. */
-int given_again(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
-		struct property *before, struct value v);
+int resolve_second_value(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
+			 struct property *previous, struct value v);
 
 #endif

@@ -19,84 +19,84 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 {
 	char text[REPORT_TEXT_MAX];
 	va_list ap;
-	int used = snprintf(text, sizeof text, "%s:%d: <%s type=\"%.64s\">: ", n->file, n->line,
-			    plugin_class_name(n->cls), n->type);
+	int length = snprintf(text, sizeof text, "%s:%d: <%s type=\"%.64s\">: ", n->file, n->line,
+			      plugin_class_name(n->cls), n->type);
 	va_start(ap, format);
-	vsnprintf(text + used, sizeof text - (size_t)used, format, ap);
+	vsnprintf(text + length, sizeof text - (size_t)length, format, ap);
 	va_end(ap);
-	return report_text(r, n->file, text, text, e);
+	return report_note_text(r, n->file, text, text, e);
 }
 
 /* Notes a max_depth above the limit. A scene without max_depth must expect some limit, which is not noted. */
-static int on_depth(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_depth(struct report *r, const struct scene_node *n, struct error *e)
 {
 	int64_t depth = node_int(n, "max_depth", -1);
-	if (depth <= SCENE_MAX_DEPTH)
+	if (depth <= SCENE_DEPTH_MAX)
 		return 0;
 	return remark(r, n, e, "max_depth %lld becomes %d: light of longer paths is missing", (long long)depth,
-		      SCENE_MAX_DEPTH);
+		      SCENE_DEPTH_MAX);
 }
 
 /* Notes that an integrator which shows a part of the light, or something other than light, gives another image here. */
-static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	const struct scene_node *inner = integrators_inner(n);
+	const struct scene_node *inner = integrator_inner(n);
 	int rc = 0;
-	while (inner && integrators_show_other(inner))
-		inner = integrators_inner(inner);
-	const char *how = strcmp(n->type, "stokes") == 0 ? ", without its polarization" : "";
+	while (inner && integrator_shows_other(inner))
+		inner = integrator_inner(inner);
+	const char *suffix = strcmp(n->type, "stokes") == 0 ? ", without its polarization" : "";
 	char hint[128];
 	struct spelling s = {.wanted = inner ? inner->type : n->type};
-	integrators_offer(&s);
+	integrator_offer_types(&s);
 	spelling_hint(&s, hint, sizeof hint);
-	if (inner && !integrators_are_known(inner))
+	if (inner && !integrator_is_known(inner))
 		rc = remark(r, n, e,
 			    "the `%s` inside it is not known: the image shows all light, on surfaces and in media%s%s",
-			    inner->type, how, hint);
-	else if (integrators_show_other(n) && inner)
-		rc = remark(r, n, e, "rendered as the `%s` inside it%s", inner->type, how);
-	else if (integrators_show_other(n))
-		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", how);
-	else if (!integrators_are_known(n))
+			    inner->type, suffix, hint);
+	else if (integrator_shows_other(n) && inner)
+		rc = remark(r, n, e, "rendered as the `%s` inside it%s", inner->type, suffix);
+	else if (integrator_shows_other(n))
+		rc = remark(r, n, e, "the image shows all light, on surfaces and in media%s", suffix);
+	else if (!integrator_is_known(n))
 		rc = remark(r, n, e, "is not known: the image shows all light, on surfaces and in media%s", hint);
 	int64_t depth = node_int(n, "max_depth", SCENE_DIRECT_DEPTH);
 	if (!rc && depth_is_direct(n->type) && (depth < 0 || depth >= SCENE_DIRECT_DEPTH))
 		rc = remark(r, n, e, "the image shows light that is scattered once%s; --max-depth shows more",
 			    depth == SCENE_DIRECT_DEPTH ? "" : ", whatever max_depth says");
-	if (!rc && depth_is_prb(n->type) && !node_find(n, "max_depth"))
+	if (!rc && depth_is_prb(n->type) && !node_find_property(n, "max_depth"))
 		rc = remark(r, n, e, "max_depth is %d, its default in Mitsuba; --max-depth shows more",
 			    SCENE_PRB_DEPTH);
-	return rc ? rc : on_depth(r, n, e);
+	return rc ? rc : remark_on_depth(r, n, e);
 }
 
 /* Returns whether a path of one edge can hit the emitter: not if it is a point or shines in a single direction. */
-static bool is_seen(const struct scene_node *n)
+static bool can_be_seen(const struct scene_node *n)
 {
 	static const char *const unseen[] = {"point", "spot", "projector", "directional"};
 	for (size_t i = 0; i < sizeof unseen / sizeof *unseen; i++)
 		if (n->cls == PLUGIN_EMITTER && strcmp(n->type, unseen[i]) == 0)
 			return false;
-	return n->shines;
+	return n->emits_light;
 }
 
-static int on_one_edge(struct report *r, const struct scene_node *integrator, struct error *e)
+static int remark_on_one_edge(struct report *r, const struct scene_node *integrator, struct error *e)
 {
-	if (!integrator || integrators_depth(integrator) != 1)
+	if (!integrator || integrator_depth(integrator) != 1)
 		return 0;
 	return remark(r, integrator, e,
 		      "max_depth 1 shows emitters themselves, and the scene has none that can be seen: the image is "
 		      "black; --max-depth 2 shows surfaces that they light");
 }
 
-static int on_hidden(struct report *r, const struct scene_node *integrator, const struct scene_node *lamp,
-		     struct error *e)
+static int remark_on_hidden_emitter(struct report *r, const struct scene_node *integrator,
+				    const struct scene_node *emitter, struct error *e)
 {
 	bool hides = false;
-	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
+	for (const struct scene_node *n = integrator; n; n = integrator_inner(n))
 		hides |= node_bool(n, "hide_emitters", false);
-	if (!hides || !lamp)
+	if (!hides || !emitter)
 		return 0;
-	return remark(r, lamp, e,
+	return remark(r, emitter, e,
 		      "hide_emitters hides its light from the camera but not the shape itself; newer versions of "
 		      "Mitsuba 3 show what is behind");
 }
@@ -108,9 +108,9 @@ static bool has_medium(const struct scene_node *n)
 }
 
 /* A BSDF is easily forgotten, and the medium is then never seen. In 0.6 light passes through such a shape. */
-static int on_boundary(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
+static int remark_on_boundary(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
-	if (!dialect_3 || !node_ref(n, "interior") || n->shines || node_child(n, PLUGIN_BSDF, 0))
+	if (!dialect_3 || !node_ref(n, "interior") || n->emits_light || node_child(n, PLUGIN_BSDF, 0))
 		return 0;
 	return remark(
 		r, n, e,
@@ -118,10 +118,10 @@ static int on_boundary(struct report *r, const struct scene_node *n, bool dialec
 		"lets light through");
 }
 
-/* Notes that Mitsuba's integrator shows no media. Whether the image has them depends on the setting `media`. */
-static int on_media(struct report *r, const struct scene_node *integrator, struct error *e)
+/* Notes that Mitsuba's integrator shows no media. Whether the image has them depends on the setting `has_media`. */
+static int remark_on_media(struct report *r, const struct scene_node *integrator, struct error *e)
 {
-	const struct scene_node *n = integrators_without_media(integrator);
+	const struct scene_node *n = integrator_find_without_media(integrator);
 	if (!n)
 		return 0;
 	return remark(r, n, e,
@@ -130,24 +130,24 @@ static int on_media(struct report *r, const struct scene_node *integrator, struc
 		      n->type);
 }
 
-static int on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
+static int remark_on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
 	mat4 to_world = node_transform(n, "to_world");
-	if (strcmp(n->type, "envmap") == 0 && !mat4_keeps_angles(&to_world))
+	if (strcmp(n->type, "envmap") == 0 && !mat4_is_conformal(&to_world))
 		return remark(r, n, e,
 			      "its to_world stretches the image; Mitsuba distorts it differently, because it does not "
 			      "normalize the transformed directions");
-	const struct property *texture = strcmp(n->type, "spot") == 0 ? node_find(n, "texture") : NULL;
+	const struct property *texture = strcmp(n->type, "spot") == 0 ? node_find_property(n, "texture") : NULL;
 	if (!dialect_3 && texture && texture->value.type != VALUE_NODE)
 		return remark(r, n, e, "`texture` has no effect unless it is a texture, as in Mitsuba 0.6");
-	bool sun = strcmp(n->type, "sun") == 0;
-	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
-	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))
+	bool is_sun = strcmp(n->type, "sun") == 0;
+	if (!dialect_3 && (is_sun || strcmp(n->type, "sky") == 0) &&
+	    (node_find_property(n, "sun_scale") || node_find_property(n, "sky_scale")))
 		return remark(
 			r, n, e,
 			"only `scale` counts here, as in Mitsuba 0.6: `sunScale` and `skyScale` belong to `sunsky`");
-	bool both = strcmp(n->type, "sunsky") == 0 || strcmp(n->type, "timed_sunsky") == 0;
-	if (!dialect_3 || (!sun && !both))
+	bool is_sun_and_sky = strcmp(n->type, "sunsky") == 0 || strcmp(n->type, "timed_sunsky") == 0;
+	if (!dialect_3 || (!is_sun && !is_sun_and_sky))
 		return 0;
 	return remark(
 		r, n, e,
@@ -157,7 +157,7 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 
 /* Mitsuba has two tables for most metals; `doubled` lists those of which only the first is here. Of Na, Ni and V
  * Mitsuba has only one table, under the second name. */
-static int on_metal(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_metal(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const doubled[] = {"Be", "Cu", "Cu2O", "CuO",  "Hg", "HgTe", "Ir",  "K",   "Li", "Mo",
 					      "Nb", "Rh", "SiC",  "SnTe", "Ta", "Te",	"TiC", "TiN", "VC", "VN"};
@@ -169,7 +169,7 @@ static int on_metal(struct report *r, const struct scene_node *n, struct error *
 }
 
 /* Notes how a rolling shutter is understood, if the shutter is open for some time. */
-static int on_sensor(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_sensor(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(node_string(n, "rolling_shutter_type", "none"), "none") == 0 ||
 	    !(node_float(n, "shutter_open", 0) < node_float(n, "shutter_close", 0)))
@@ -182,104 +182,104 @@ static int on_sensor(struct report *r, const struct scene_node *n, struct error 
 
 /* Notes filters that depend on how much of the texture a pixel covers: once for all textures. `ewa` is not noted,
  * because it is Mitsuba 0.6's default. */
-static int on_filter(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_filter(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const wide[] = {"trilinear", "anisotropic"};
+	static const char *const area_filters[] = {"trilinear", "anisotropic"};
 	const char *filter = node_string(n, "filter_type", "");
 	char text[REPORT_TEXT_MAX];
-	if (!text_is_among(filter, wide, sizeof wide / sizeof *wide))
+	if (!text_is_among(filter, area_filters, sizeof area_filters / sizeof *area_filters))
 		return 0;
 	snprintf(text, sizeof text,
 		 "%s:%d: <texture type=\"bitmap\">: filter_type `%s` is read as `bilinear`: the samples of a pixel are "
 		 "averaged instead, which blurs less",
 		 n->file, n->line, filter);
-	return report_text(r, n->file, filter, text, e);
+	return report_note_text(r, n->file, filter, text, e);
 }
 
 /* Notes a `scale` with both a value and a texture. Mitsuba 0.6 scales whichever it reads last, which is the texture
  * inside. */
-static int on_texture(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_texture(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(n->type, "bitmap") == 0)
-		return on_filter(r, n, e);
-	if (strcmp(n->type, "scale") != 0 || !node_find(n, "value") || !node_child(n, PLUGIN_TEXTURE, 0))
+		return remark_on_filter(r, n, e);
+	if (strcmp(n->type, "scale") != 0 || !node_find_property(n, "value") || !node_child(n, PLUGIN_TEXTURE, 0))
 		return 0;
 	return remark(r, n, e, "`value` has no effect: the texture inside is scaled, as in Mitsuba 0.6");
 }
 
 /* Notes groups without shapes: once for all of a type. Where something was refused it may be what they lack. */
-static int on_shape(struct report *r, const struct scene_node *n, struct error *e)
+static int remark_on_shape(struct report *r, const struct scene_node *n, struct error *e)
 {
 	char text[REPORT_TEXT_MAX];
-	bool group = strcmp(n->type, "merge") == 0 || strcmp(n->type, "shapegroup") == 0;
-	if (!group || n->child_count > 0 || r->problem_count > 0)
+	bool is_group = strcmp(n->type, "merge") == 0 || strcmp(n->type, "shapegroup") == 0;
+	if (!is_group || n->child_count > 0 || r->problem_count > 0)
 		return 0;
 	snprintf(text, sizeof text, "%s:%d: <shape type=\"%s\"> holds no shape: nothing of it is seen", n->file,
 		 n->line, n->type);
-	return report_text(r, n->file, n->type, text, e);
+	return report_note_text(r, n->file, n->type, text, e);
 }
 
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)
 {
 	switch (n->cls) {
 	case PLUGIN_BSDF:
-		return on_metal(r, n, e);
+		return remark_on_metal(r, n, e);
 	case PLUGIN_SENSOR:
-		return on_sensor(r, n, e);
+		return remark_on_sensor(r, n, e);
 	case PLUGIN_SHAPE:
-		return on_shape(r, n, e);
+		return remark_on_shape(r, n, e);
 	case PLUGIN_TEXTURE:
-		return on_texture(r, n, e);
+		return remark_on_texture(r, n, e);
 	default:
 		return 0;
 	}
 }
 
 /* Notes that a scene with a camera has no emitter: not of a line, since there is none to point at. */
-static int on_darkness(struct report *r, const struct scene_node *camera, struct error *e)
+static int remark_on_darkness(struct report *r, const struct scene_node *camera, struct error *e)
 {
 	char text[REPORT_TEXT_MAX];
 	snprintf(text, sizeof text, "%s: the scene has no emitter: the image is black", camera->file);
-	return report_text(r, camera->file, text, text, e);
+	return report_note_text(r, camera->file, text, text, e);
 }
 
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
 		     struct error *e)
 {
-	const struct scene_node *camera = NULL, *integrator = NULL, *lamp = NULL;
-	bool light = false, seen = false, media = false;
-	uint32_t sensors = 0;
+	const struct scene_node *camera = NULL, *integrator = NULL, *emitter = NULL;
+	bool has_light = false, has_visible_emitter = false, has_media = false;
+	uint32_t sensor_count = 0;
 	int rc = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
 		char place[NODE_PLACE_MAX];
-		light |= n->shines;
-		seen |= is_seen(n);
-		media |= has_medium(n);
-		lamp = !lamp && n->cls == PLUGIN_SHAPE && n->shines ? n : lamp;
+		has_light |= n->emits_light;
+		has_visible_emitter |= can_be_seen(n);
+		has_media |= has_medium(n);
+		emitter = !emitter && n->cls == PLUGIN_SHAPE && n->emits_light ? n : emitter;
 		integrator = n->cls == PLUGIN_INTEGRATOR ? n : integrator;
 		if (n->cls == PLUGIN_INTEGRATOR)
-			rc = on_integrator(r, n, e);
+			rc = remark_on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_SHAPE)
-			rc = on_boundary(r, n, dialect_3, e);
+			rc = remark_on_boundary(r, n, dialect_3, e);
 		else if (n->cls == PLUGIN_EMITTER)
-			rc = on_emitter(r, n, dialect_3, e);
+			rc = remark_on_emitter(r, n, dialect_3, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
 			rc = remark(r, n, e, "sensor %u%s%.64s%s; without --sensor the first, in %s, is rendered",
-				    ++sensors, n->id ? " (\"" : "", n->id ? n->id : "", n->id ? "\")" : "",
+				    ++sensor_count, n->id ? " (\"" : "", n->id ? n->id : "", n->id ? "\")" : "",
 				    node_place(camera, place));
 		else if (n->cls == PLUGIN_SENSOR) {
 			camera = n;
-			sensors = 1;
+			sensor_count = 1;
 		}
 	}
-	if (!rc && media)
-		rc = on_media(r, integrator, e);
+	if (!rc && has_media)
+		rc = remark_on_media(r, integrator, e);
 	if (!rc && dialect_3)
-		rc = on_hidden(r, integrator, lamp, e);
-	if (!rc && light && !seen)
-		rc = on_one_edge(r, integrator, e);
-	if (!rc && !light && camera && r->problem_count == 0)
-		rc = on_darkness(r, camera, e);
+		rc = remark_on_hidden_emitter(r, integrator, emitter, e);
+	if (!rc && has_light && !has_visible_emitter)
+		rc = remark_on_one_edge(r, integrator, e);
+	if (!rc && !has_light && camera && r->problem_count == 0)
+		rc = remark_on_darkness(r, camera, e);
 	return rc;
 }

@@ -20,10 +20,10 @@ __attribute__((format(printf, 5, 0))) int report_note(struct report *r, const ch
 {
 	char text[REPORT_TEXT_MAX];
 	vsnprintf(text, sizeof text, format, ap);
-	return report_text(r, file, key, text, e);
+	return report_note_text(r, file, key, text, e);
 }
 
-bool report_has(const struct report *r, const char *key)
+bool report_has_note(const struct report *r, const char *key)
 {
 	size_t length = strlen(key);
 	for (uint32_t i = 0; i < r->note_count; i++)
@@ -35,27 +35,28 @@ bool report_has(const struct report *r, const char *key)
 	return false;
 }
 
-int report_extend(struct report *r, uint32_t note, const char *key, const char *text, struct error *e)
+int report_extend_note(struct report *r, uint32_t note, const char *key, const char *text, struct error *e)
 {
-	size_t before = strlen(r->note_keys[note]), added = strlen(key);
-	char *keys = arena_alloc(r->arena, before + added + 2, 1), *copy = keys ? arena_strdup(r->arena, text) : NULL;
+	size_t old_length = strlen(r->note_keys[note]), key_length = strlen(key);
+	char *keys = arena_alloc(r->arena, old_length + key_length + 2, 1),
+	     *copy = keys ? arena_strdup(r->arena, text) : NULL;
 	if (!copy)
 		return error_set(e, ENOMEM, "out of memory");
-	memcpy(keys, r->note_keys[note], before);
-	keys[before] = '\n';
-	memcpy(keys + before + 1, key, added + 1);
+	memcpy(keys, r->note_keys[note], old_length);
+	keys[old_length] = '\n';
+	memcpy(keys + old_length + 1, key, key_length + 1);
 	text_clean(copy);
 	r->note_keys[note] = keys;
 	r->notes[note] = copy;
 	return 0;
 }
 
-int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e)
+int report_note_text(struct report *r, const char *file, const char *key, const char *message, struct error *e)
 {
 	char text[REPORT_TEXT_MAX];
-	if (r->note_count == REPORT_NOTES_MAX || report_has(r, key))
+	if (r->note_count == REPORT_NOTES_MAX || report_has_note(r, key))
 		return 0;
-	snprintf(text, sizeof text, "%s", said);
+	snprintf(text, sizeof text, "%s", message);
 	text_clean(text);
 	if (r->note_count == REPORT_NOTES_MAX - 1)
 		snprintf(text, sizeof text, "%s: more things are ignored than are listed here", file);
@@ -69,16 +70,16 @@ int report_text(struct report *r, const char *file, const char *key, const char 
 
 int report_problem(struct report *r, int code, struct error *e)
 {
-	if (code == 0 || code == REPORT_TOLD)
+	if (code == 0 || code == REPORT_ALREADY_REPORTED)
 		return 0;
 	if (code == -ENOMEM || code == REPORT_FULL)
 		return code;
 	const char *text = arena_strdup(r->arena, e->text);
 	if (!text)
 		return error_set(e, ENOMEM, "out of memory");
-	if (!r->code) {
-		r->code = code;
-		r->first = *e;
+	if (!r->first_code) {
+		r->first_code = code;
+		r->first_error = *e;
 	}
 	r->problems[r->problem_count++] = text;
 	return r->problem_count < REPORT_PROBLEMS_MAX ? 0 : REPORT_FULL;

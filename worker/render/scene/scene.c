@@ -2,8 +2,8 @@
 /*
  * Turns the tree of XML elements (or glTF read as such) into a tree of typed nodes, using the tables of the plug-ins.
  *
- * Happy path: read_all parses the file. make_scene lists all ids and walks over the top level, and maker.c makes a node
- * of each object there, with everything inside it. list_assets collects the names of all files.
+ * Happy path: read_description parses the file. make_scene lists all ids and walks over the top level, and maker.c
+ * makes a node of each object there, with everything inside it. list_assets collects the names of all files.
  *
  * Failures: a problem is reported with file and line and reading goes on, so that one run finds all problems
  * (report.h). scene_read fails with the first problem; scene_read_all returns all of them. -ENOMEM ends the reading.
@@ -36,61 +36,62 @@ static int make_object(struct maker *m, struct xml_element *el, const struct sce
 {
 	int r = maker_node(m, el, out);
 	if (!r)
-		r = nesting_count(&m->objects, el, m->error);
+		r = nesting_add_to_scene(&m->object_count, el, m->error);
 	uint32_t count = 1;
-	if (!r && batch_is(*out))
-		r = batch_spread(*out, m->arena, out, &count, m->error);
+	if (!r && node_is_batch(*out))
+		r = batch_expand(*out, m->arena, out, &count, m->error);
 	m->scene->object_count += r ? 0 : count;
 	return r;
 }
 
-static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
+static int read_top_level(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
 
 static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
 {
-	int r = el->unset ? REPORT_TOLD : element_check(el, "filename", true, m->error);
-	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
+	int r = el->is_unset ? REPORT_ALREADY_REPORTED : element_check_contents(el, "filename", true, m->error);
+	return r ? r : read_top_level(m, strcmp(el->first_child->name, "scene") == 0 ? el->first_child : el, objects);
 }
 
 /* Returns whether a value directly in <scene>, in 3.x, has no meaning: it is not a spectrum that others refer to,
  * nor a plug-in's parameter in the wrong place. In 0.6 no such value has a meaning. */
 static bool is_foreign_value(const struct maker *m, const struct xml_element *el)
 {
-	const char *name = xml_attribute(el, "name");
-	return name && !id_table_names(el) && !plugin_any_has(m->decls, name);
+	const char *name = xml_attribute_value(el, "name");
+	return name && !id_table_can_name(el) && !plugin_any_has_param(m->decls, name);
 }
 
 /* Reads an element that is directly in <scene>, or the only one of a file included there. */
 static int read_top_element(struct maker *m, struct xml_element *el, const struct scene_node **objects)
 {
 	enum plugin_class cls;
-	if (el->ignored)
-		return note_foreign(&m->notes, el);
-	if (plugin_is_guide(el->name, xml_attribute(el, "type")))
+	if (el->is_ignored)
+		return note_ignored_element(&m->notes, el);
+	if (plugin_is_sampling_hint(el->name, xml_attribute_value(el, "type")))
 		return note_guide(&m->notes, el);
 	if (plugin_class_find(el->name, &cls))
 		return make_object(m, el, &objects[m->scene->object_count]);
 	if (strcmp(el->name, "include") == 0)
 		return read_include(m, el, objects);
 	if (strcmp(el->name, "default") == 0)
-		return element_check(el, "name|value", false, m->error);
+		return element_check_contents(el, "name|value", false, m->error);
 	if (strcmp(el->name, "path") == 0)
-		return element_check(el, "value", false, m->error);
-	if (value_is_element(el->name) && (el->snake || is_foreign_value(m, el)))
-		return note_foreign(&m->notes, el);
-	if (el->unset)
+		return element_check_contents(el, "value", false, m->error);
+	if (value_is_element(el->name) && (el->is_camel_case || is_foreign_value(m, el)))
+		return note_ignored_element(&m->notes, el);
+	if (el->is_unset)
 		return 0;
 	struct value unused;
-	if (id_table_names(el) && value_is_element(el->name)) /* a spectrum: each reference to it makes a copy */
-		return value_read(el, m->assets_from, m->arena, &unused, m->error);
-	return strcmp(el->name, "alias") == 0 ? 0 : maker_foreign(m, el);
+	if (id_table_can_name(el) && value_is_element(el->name)) /* a spectrum: each reference to it makes a copy */
+		return value_read(el, m->asset_source, m->arena, &unused, m->error);
+	return strcmp(el->name, "alias") == 0 ? 0 : maker_reject_element(m, el);
 }
 
-static int read_top(struct maker *m, const struct xml_element *around, const struct scene_node **objects)
+static int read_top_level(struct maker *m, const struct xml_element *container, const struct scene_node **objects)
 {
-	int r = strcmp(around->name, "scene") == 0 ? element_check(around, "version", true, m->error) : 0;
+	int r = strcmp(container->name, "scene") == 0 ? element_check_contents(container, "version", true, m->error)
+						      : 0;
 	r = report_problem(&m->report, r, m->error);
-	for (struct xml_element *el = around->first; el && !r; el = el->next)
+	for (struct xml_element *el = container->first_child; el && !r; el = el->next_sibling)
 		r = report_problem(&m->report, read_top_element(m, el, objects), m->error);
 	return r;
 }
@@ -98,7 +99,7 @@ static int read_top(struct maker *m, const struct xml_element *around, const str
 static int list_assets(struct maker *m)
 {
 	for (uint32_t i = 0; i < m->tree->include_count; i++) {
-		int r = maker_add_asset(m, m->tree->includes[i], NULL);
+		int r = maker_add_asset(m, m->tree->included_files[i], NULL);
 		if (r)
 			return r;
 	}
@@ -110,10 +111,10 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
-static bool has_child(const struct xml_element *around, const char *name)
+static bool has_descendant(const struct xml_element *container, const char *name)
 {
-	for (const struct xml_element *el = around->first; el; el = el->next)
-		if (!el->ignored && (strcmp(el->name, name) == 0 || has_child(el, name)))
+	for (const struct xml_element *el = container->first_child; el; el = el->next_sibling)
+		if (!el->is_ignored && (strcmp(el->name, name) == 0 || has_descendant(el, name)))
 			return true;
 	return false;
 }
@@ -122,19 +123,20 @@ static bool has_child(const struct xml_element *around, const char *name)
  * so that any model can be seen. */
 static bool make_daylight(struct xml_element *scene, struct arena *arena)
 {
-	struct xml_element *light = element_make(scene, "emitter", scene->file, scene->line, arena), *place, *turn;
+	struct xml_element *light = element_make(scene, "emitter", scene->file, scene->line, arena), *transform,
+			   *rotation;
 	if (!light)
 		return false;
-	element_put(light, "type", "sunsky");
-	if (!element_value(light, "float", "scale", "2", arena) ||
-	    !element_value(light, "boolean", "extend", "true", arena) ||
-	    !element_value(light, "float", "sun_radius_scale", "15", arena) ||
-	    !(place = element_make(light, "transform", scene->file, scene->line, arena)) ||
-	    !(turn = element_make(place, "rotate", scene->file, scene->line, arena)))
+	element_add_attribute(light, "type", "sunsky");
+	if (!element_add_parameter(light, "float", "scale", "2", arena) ||
+	    !element_add_parameter(light, "boolean", "extend", "true", arena) ||
+	    !element_add_parameter(light, "float", "sun_radius_scale", "15", arena) ||
+	    !(transform = element_make(light, "transform", scene->file, scene->line, arena)) ||
+	    !(rotation = element_make(transform, "rotate", scene->file, scene->line, arena)))
 		return false;
-	element_put(place, "name", "to_world");
-	element_put(turn, "y", "1");
-	element_put(turn, "angle", "-120");
+	element_add_attribute(transform, "name", "to_world");
+	element_add_attribute(rotation, "y", "1");
+	element_add_attribute(rotation, "angle", "-120");
 	return true;
 }
 
@@ -142,23 +144,26 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
  * with a note. Adds nothing if decls has no sunsky. Returns false if out of memory. */
 static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decls, struct arena *arena)
 {
-	if (t->dialect_3 || t->holes || has_child(t->root, "emitter") || !has_child(t->root, "shape") ||
-	    t->note_count >= XML_NOTES_MAX || !plugin_find(decls, PLUGIN_EMITTER, "sunsky"))
+	if (t->is_dialect_3 || t->has_missing_files || has_descendant(t->root, "emitter") ||
+	    !has_descendant(t->root, "shape") || t->note_count >= XML_NOTES_MAX ||
+	    !plugin_find(decls, PLUGIN_EMITTER, "sunsky"))
 		return true;
 	t->notes[t->note_count++] = "has no emitter: sun and sky are added, as by Mitsuba 0.6";
 	t->element_count++;
 	return make_daylight(t->root, arena);
 }
 
-/* Notes, in one sentence, all shapes that `lenient` leaves out because their transforms have no inverse. */
-static int note_flat(const struct maker *m)
+/* Notes, in one sentence, all shapes that `is_lenient` leaves out because their transforms have no inverse. */
+static int note_flat_shapes(const struct maker *m)
 {
-	const struct xml_element *first = m->first_flat;
+	const struct xml_element *first = m->first_flat_shape;
 	return !first ? 0
-		      : note(&m->notes, first, "", "flat",
-			     "%u shape%s that to_world flattens (it has no inverse) %s left out (lenient; first: the %.64s in %s:%d)",
-			     m->flat_shapes, m->flat_shapes == 1 ? "" : "s", m->flat_shapes == 1 ? "is" : "are",
-			     xml_attribute(first, "type"), first->file, first->line);
+		      : note_add(
+				&m->notes, first, "", "flat",
+				"%u shape%s that to_world flattens (it has no inverse) %s left out (lenient; first: the %.64s in %s:%d)",
+				m->flat_shape_count, m->flat_shape_count == 1 ? "" : "s",
+				m->flat_shape_count == 1 ? "is" : "are", xml_attribute_value(first, "type"),
+				first->file, first->line);
 }
 
 static int make_scene(struct maker *m)
@@ -169,31 +174,31 @@ static int make_scene(struct maker *m)
 						    : NULL;
 	if (!objects)
 		return maker_out_of_memory(m);
-	s->dialect_3 = m->tree->dialect_3;
-	s->black_backs = m->tree->black_backs;
+	s->is_dialect_3 = m->tree->is_dialect_3;
+	s->has_black_backs = m->tree->has_black_backs;
 	s->objects = objects;
-	texture_names_settle(m->decls, m->tree->root);
-	upgrade_unreleased(m->tree->root);
-	int r = relief_files_settle(m->tree->root, m->arena, m->error);
+	texture_names_normalize(m->decls, m->tree->root);
+	upgrade_prerelease_names(m->tree->root);
+	int r = relief_files_to_textures(m->tree->root, m->arena, m->error);
 	if (!r)
-		r = id_table_make(&m->ids, m->tree, m->arena, &m->report, m->error);
+		r = id_table_build(&m->ids, m->tree, m->arena, &m->report, m->error);
 	if (!r)
-		r = texture_names_follow(m->tree->root, &m->ids, m->arena, m->error);
-	if (!r && m->lenient)
-		r = subsurface_settle(m);
+		r = texture_names_resolve_references(m->tree->root, &m->ids, m->arena, m->error);
+	if (!r && m->is_lenient)
+		r = subsurface_replace_dipoles(m);
 	if (!r)
-		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, m->arena, &m->report, m->error);
+		r = obj_materials_split(m->tree, &m->ids, m->asset_source, &m->assets, m->arena, &m->report, m->error);
 	if (!r)
-		r = read_top(m, m->tree->root, objects);
+		r = read_top_level(m, m->tree->root, objects);
 	for (uint32_t i = 0; i < s->object_count; i++)
-		s->without_media |=
-			objects[i]->cls == PLUGIN_INTEGRATOR && integrators_without_media(objects[i]) != NULL;
+		s->lacks_media |=
+			objects[i]->cls == PLUGIN_INTEGRATOR && integrator_find_without_media(objects[i]) != NULL;
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
-		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
+		r = note_add(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
-		r = note_flat(m);
-	if (!r && !m->tree->holes)
-		r = remarks_on_scene(objects, s->object_count, s->dialect_3, &m->report, m->error);
+		r = note_flat_shapes(m);
+	if (!r && !m->tree->has_missing_files)
+		r = remarks_on_scene(objects, s->object_count, s->is_dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 
@@ -210,17 +215,17 @@ static int report_missing(struct maker *m)
 }
 
 /* Reads as much as possible; problems are collected in s->problems. */
-static int read_all(struct scene *s, const struct asset_source *assets, const char *name,
-		    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
-		    bool lenient, struct maker *m)
+static int read_description(struct scene *s, const struct asset_source *assets, const char *name,
+			    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+			    bool lenient, struct maker *m)
 {
 	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
 	*m = (struct maker){.scene = s,
 			    .arena = &s->arena,
-			    .assets_from = assets,
+			    .asset_source = assets,
 			    .decls = decls,
 			    .error = m->error,
-			    .lenient = lenient};
+			    .is_lenient = lenient};
 	m->notes = (struct notes){.report = &m->report, .error = m->error};
 	m->tree = arena_alloc(m->arena, 1, sizeof *m->tree);
 	s->file = arena_strdup(&s->arena, name);
@@ -228,17 +233,17 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 	if (r)
 		return r;
 	m->name = name;
-	if (gltf_is(name))
+	if (gltf_is_file_name(name))
 		r = define_count ? error_set(m->error, EINVAL, "%s: a glTF file has no names to define", name)
 				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
 	else
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
-	int told = report_missing(m); /* also if reading ended early */
-	if (told)
-		r = told;
+	int missing_rc = report_missing(m); /* also if reading ended early */
+	if (missing_rc)
+		r = missing_rc;
 	else if (r)
 		r = report_problem(&m->report, r, m->error);
-	else if (!m->tree->blind && (r = make_scene(m)) == REPORT_FULL)
+	else if (!m->tree->has_unset_path && (r = make_scene(m)) == REPORT_FULL)
 		r = 0;
 	s->notes = m->report.notes;
 	s->note_count = m->report.note_count;
@@ -254,14 +259,14 @@ int scene_read_all(struct scene *s, const struct asset_source *assets, const cha
 		   bool lenient, struct error *e)
 {
 	struct maker m = {.error = e};
-	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
+	int r = read_description(s, assets, name, decls, defines, define_count, lenient, &m);
 	if (r)
 		scene_fini(s);
 	return r;
 }
 
 /* Returns the number of files that cannot be opened; they are not problems of the description itself. */
-static uint32_t count_missing(const struct scene *s, const struct asset_source *assets)
+static uint32_t count_missing_files(const struct scene *s, const struct asset_source *assets)
 {
 	uint32_t missing = 0;
 	for (uint32_t i = 0; i < s->asset_count; i++) {
@@ -275,7 +280,7 @@ static uint32_t count_missing(const struct scene *s, const struct asset_source *
 	return missing;
 }
 
-static void say_more(uint32_t more, int code, struct error *e)
+static void append_problem_count(uint32_t more, int code, struct error *e)
 {
 	struct error first;
 	if (!e || more == 0)
@@ -284,26 +289,26 @@ static void say_more(uint32_t more, int code, struct error *e)
 	error_set(e, -code, "%.900s (and at least %u more: hslt-scene check lists all)", first.text, more);
 }
 
-int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e)
+int scene_append_missing_count(const struct scene *s, const struct asset_source *assets, int code, struct error *e)
 {
-	uint32_t missing = code == -ENOENT ? count_missing(s, assets) : 0;
-	say_more(missing ? missing - 1 : 0, code, e);
+	uint32_t missing = code == -ENOENT ? count_missing_files(s, assets) : 0;
+	append_problem_count(missing ? missing - 1 : 0, code, e);
 	return code;
 }
 
-static int read_whole(struct scene *s, const struct asset_source *assets, const char *name,
-		      const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
-		      bool lenient, struct error *e)
+static int read_or_fail(struct scene *s, const struct asset_source *assets, const char *name,
+			const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+			bool lenient, struct error *e)
 {
 	struct error unused;
 	struct maker m = {.error = e ? e : &unused};
-	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
+	int r = read_description(s, assets, name, decls, defines, define_count, lenient, &m);
 	if (!r && s->problem_count > 0) {
-		r = m.report.code;
-		uint32_t more = s->problem_count - 1 + count_missing(s, assets);
+		r = m.report.first_code;
+		uint32_t more = s->problem_count - 1 + count_missing_files(s, assets);
 		if (e)
-			*e = m.report.first;
-		say_more(more, r, e);
+			*e = m.report.first_error;
+		append_problem_count(more, r, e);
 	}
 	if (r)
 		scene_fini(s);
@@ -313,14 +318,14 @@ static int read_whole(struct scene *s, const struct asset_source *assets, const 
 int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
 	       const struct scene_define *defines, size_t define_count, struct error *e)
 {
-	return read_whole(s, assets, name, decls, defines, define_count, false, e);
+	return read_or_fail(s, assets, name, decls, defines, define_count, false, e);
 }
 
 int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
 		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		       struct error *e)
 {
-	return read_whole(s, assets, name, decls, defines, define_count, true, e);
+	return read_or_fail(s, assets, name, decls, defines, define_count, true, e);
 }
 
 void scene_fini(struct scene *s)

@@ -18,10 +18,10 @@
 
 struct scene {
 	struct arena arena;
-	const char *file;   /* as it was opened */
-	bool dialect_3;	    /* version >= 2: Mitsuba 3 rules */
-	bool black_backs;   /* backs of opaque one-sided materials are black; the setting `backs` overrides it */
-	bool without_media; /* Mitsuba's image has no media; the setting `media` overrides it */
+	const char *file;     /* as it was opened */
+	bool is_dialect_3;    /* version >= 2: Mitsuba 3 rules */
+	bool has_black_backs; /* backs of opaque one-sided materials are black; the setting `backs` overrides it */
+	bool lacks_media;     /* Mitsuba's image has no media; the setting `media` overrides it */
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top-level objects, in file order */
 	uint32_t asset_count;
@@ -49,7 +49,7 @@ int scene_read_lenient(struct scene *s, const struct asset_source *assets, const
 
 /* Returns code, the failure of building a scene that was read. If it is -ENOENT, for a missing file, adds to *e how
  * many others cannot be opened either. */
-int scene_missing(const struct scene *s, const struct asset_source *assets, int code, struct error *e);
+int scene_append_missing_count(const struct scene *s, const struct asset_source *assets, int code, struct error *e);
 
 /* Like scene_read(), or with `lenient` like scene_read_lenient(), but errors in the scene are not a failure: it is
  * read as far as possible, and s->problems lists them all. If there are any, the scene must not be rendered. Returns 0

@@ -19,7 +19,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FILM_PIXELS_MAX = PLAN_MAX_FILM, RADIUS_MAX = 64 };
+enum { FILM_PIXELS_MAX = PLAN_FILM_PIXELS_MAX, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* as in Mitsuba */
 #define KC_MAX 1e6
 
@@ -34,20 +34,20 @@ enum { ROULETTE_DEPTH = 5 }; /* as in Mitsuba */
 	}
 /* For the perspective cameras. Whatever jitter and cone_scale say, samples are spread over the whole pixel and
  * textures are not filtered. */
-#define CAMERA_PARAMS                                                                                   \
-	{"to_world", UNDERSTOOD(VALUE_PLACE)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                \
-		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},      \
-		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, \
-		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS,                              \
-		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                              \
-		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)}, {"jitter", IGNORED},         \
-		{"cone_scale", IGNORED},                                                                \
-	{                                                                                               \
-		"srf", REFUSED                                                                          \
+#define CAMERA_PARAMS                                                                                     \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM_OR_ANIMATION)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)}, \
+		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},        \
+		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},   \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS,                                \
+		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                \
+		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)}, {"jitter", IGNORED},           \
+		{"cone_scale", IGNORED},                                                                  \
+	{                                                                                                 \
+		"srf", REFUSED                                                                            \
 	}
 
 /* For the orthographic cameras. */
-#define FAR_PARAMS                                                                              \
+#define ORTHOGRAPHIC_PARAMS                                                                     \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},  \
 		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS, {"jitter", IGNORED}, \
 		{"cone_scale", IGNORED},                                                        \
@@ -56,12 +56,12 @@ enum { ROULETTE_DEPTH = 5 }; /* as in Mitsuba */
 	}
 
 static const struct param film_params[] = {
-	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
-	{"height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
-	{"crop_offset_x", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
-	{"crop_offset_y", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
-	{"crop_width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
-	{"crop_height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"width", RANGE(VALUE_INT, 1, PLAN_SIDE_MAX)},
+	{"height", RANGE(VALUE_INT, 1, PLAN_SIDE_MAX)},
+	{"crop_offset_x", RANGE(VALUE_INT, 0, PLAN_SIDE_MAX)},
+	{"crop_offset_y", RANGE(VALUE_INT, 0, PLAN_SIDE_MAX)},
+	{"crop_width", RANGE(VALUE_INT, 1, PLAN_SIDE_MAX)},
+	{"crop_height", RANGE(VALUE_INT, 1, PLAN_SIDE_MAX)},
 	{"size", REFUSED},
 	{"filename", IGNORED},
 	{"file_format", IGNORED},
@@ -95,15 +95,15 @@ const struct plugin_decl setting_decls[] = {
 	 PARAMS(CAMERA_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
 		{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)}),
 	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "orthographic", PARAMS(FAR_PARAMS, {"focus_distance", IGNORED}), CAMERA_HOLDS,
+	{PLUGIN_SENSOR, "orthographic", PARAMS(ORTHOGRAPHIC_PARAMS, {"focus_distance", IGNORED}), CAMERA_HOLDS,
 	 PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "telecentric",
-	 PARAMS(FAR_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+	 PARAMS(ORTHOGRAPHIC_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
 		{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)}),
 	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
 	/* Exporters write clipping planes and a focus for all cameras; this one has neither. */
 	{PLUGIN_SENSOR, "spherical",
-	 PARAMS({"to_world", UNDERSTOOD(VALUE_PLACE)}, {"near_clip", IGNORED}, {"far_clip", IGNORED},
+	 PARAMS({"to_world", UNDERSTOOD(VALUE_TRANSFORM_OR_ANIMATION)}, {"near_clip", IGNORED}, {"far_clip", IGNORED},
 		{"focus_distance", IGNORED}, SHUTTER_PARAMS, {"srf", REFUSED}),
 	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "perspective_rdist",
@@ -121,9 +121,9 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	/* Mitsuba has no `radius` of `gaussian`, nor in 3.x of `box`. */
 	PLUGIN(RFILTER, "box", {"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}),
-	PLUGIN(RFILTER, "tent", {"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)}),
+	PLUGIN(RFILTER, "tent", {"radius", RANGE(VALUE_FLOAT | VALUE_DIALECT_3_ONLY, 0.25, RADIUS_MAX)}),
 	PLUGIN(RFILTER, "gaussian", {"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
-	       {"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)}),
+	       {"radius", RANGE(VALUE_FLOAT | VALUE_DIALECT_3_ONLY, 0.25, RADIUS_MAX)}),
 	PLUGIN(RFILTER, "mitchell", {"b", RANGE(VALUE_FLOAT, -1, 1)}, {"B", RANGE(VALUE_FLOAT, -1, 1)},
 	       {"c", RANGE(VALUE_FLOAT, -1, 1)}, {"C", RANGE(VALUE_FLOAT, -1, 1)}),
 	{PLUGIN_RFILTER, "catmullrom", NULL, 0, PARAM_UNDERSTOOD},
@@ -179,21 +179,22 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 		     struct error *e)
 {
 	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
-	bool one = is_mfilm(film);
-	out->width = film ? (uint32_t)node_int(film, "width", one ? 1 : SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
-	out->height = film ? (uint32_t)node_int(film, "height", one ? 1 : SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
+	bool is_one_pixel = is_mfilm(film);
+	out->width = film ? (uint32_t)node_int(film, "width", is_one_pixel ? 1 : SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
+	out->height =
+		film ? (uint32_t)node_int(film, "height", is_one_pixel ? 1 : SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
 	if (width && !height) /* keeps the film's aspect ratio */
 		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
-					     PLAN_MAX_SIZE + 1.0);
+					     PLAN_SIDE_MAX + 1.0);
 	if (width)
 		out->width = width;
 	if (height)
 		out->height = height;
-	if (out->width > PLAN_MAX_SIZE || out->height > PLAN_MAX_SIZE ||
+	if (out->width > PLAN_SIDE_MAX || out->height > PLAN_SIDE_MAX ||
 	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
 		return node_error(film ? film : sensor, e, ERANGE,
 				  "a film of %u x %u pixels; at most %d a side and %d in all, %d of them in one render",
-				  out->width, out->height, PLAN_MAX_SIZE, FILM_PIXELS_MAX, PLAN_MAX_PIXELS);
+				  out->width, out->height, PLAN_SIDE_MAX, FILM_PIXELS_MAX, PLAN_PIXELS_MAX);
 	return film && !width && !height ? read_crop(film, out, e) : 0;
 }
 
@@ -235,29 +236,29 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 {
 	uint32_t count;
 	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, 1, &count);
-	out->max_depth = SCENE_MAX_DEPTH;
+	out->max_depth = SCENE_DEPTH_MAX;
 	out->roulette_depth = ROULETTE_DEPTH;
 	if (!integrator)
 		return 0;
 	if (count > 1)
 		return node_error(integrator, e, EINVAL, "a second integrator in the scene");
 	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
-	int64_t depth = integrators_depth(integrator), roulette = ROULETTE_DEPTH;
-	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
+	int64_t depth = integrator_depth(integrator), roulette = ROULETTE_DEPTH;
+	for (const struct scene_node *n = integrator; n; n = integrator_inner(n))
 		roulette = node_int(n, "rr_depth", roulette);
-	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
+	for (const struct scene_node *n = integrator; n; n = integrator_inner(n))
 		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE,
 				  "a depth of 0 shows nothing; 1 shows emitters seen directly, -1 is no limit");
-	if (depth > 0 && depth < SCENE_MAX_DEPTH)
+	if (depth > 0 && depth < SCENE_DEPTH_MAX)
 		out->max_depth = (uint32_t)depth;
 	out->roulette_depth = (uint32_t)roulette;
 	return 0;
 }
 
 /* Reads the size of an orthographic film: it is as wide as the line from -1 to 1 is after to_world. */
-static int read_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+static int read_film_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	mat4 m = node_transform(sensor, "to_world");
 	double x = vec3_length((vec3){m.m[0][0], m.m[1][0], m.m[2][0]}),
@@ -271,11 +272,11 @@ static int read_scale(const struct scene_node *sensor, struct scene_settings *ou
 
 static int read_fov(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
-	bool far = strcmp(sensor->type, "orthographic") == 0 || strcmp(sensor->type, "telecentric") == 0;
-	if (far || out->projection == PROJECTION_SPHERE)
+	bool is_orthographic = strcmp(sensor->type, "orthographic") == 0 || strcmp(sensor->type, "telecentric") == 0;
+	if (is_orthographic || out->projection == PROJECTION_SPHERE)
 		snprintf(out->fov_axis, sizeof out->fov_axis, "x");
-	if (far)
-		return read_scale(sensor, out, e);
+	if (is_orthographic)
+		return read_film_scale(sensor, out, e);
 	return out->projection == PROJECTION_SPHERE ? 0 : fov_read(sensor, &out->fov, out->fov_axis, e);
 }
 
@@ -286,18 +287,18 @@ static int read_projection(const struct scene_node *sensor, struct scene_setting
 	if (strcmp(sensor->type, "perspective_rdist") != 0)
 		return 0;
 	const char *kc = node_string(sensor, "kc", "");
-	int count = number_list(kc, out->kc, 2);
+	int count = number_parse_list(kc, out->distortion, 2);
 	if (count != 0 && count != 2)
 		return node_error(sensor, e, EINVAL, "kc=\"%.64s\" is not two numbers", kc);
 	for (int i = 0; i < count; i++)
-		if (!(fabs(out->kc[i]) <= KC_MAX))
+		if (!(fabs(out->distortion[i]) <= KC_MAX))
 			return node_error(sensor, e, ERANGE, "kc=\"%.64s\" is outside [-%g, %g]", kc, KC_MAX, KC_MAX);
-	if (out->kc[0] != 0 || out->kc[1] != 0)
+	if (out->distortion[0] != 0 || out->distortion[1] != 0)
 		out->projection = PROJECTION_DISTORTED;
 	return 0;
 }
 
-bool scene_settings_upright(mat4 m, mat4 *out)
+bool scene_settings_orthonormalize(mat4 m, mat4 *out)
 {
 	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
 	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
@@ -307,35 +308,35 @@ bool scene_settings_upright(mat4 m, mat4 *out)
 	double skew = fmax(fabs(vec3_dot(x, y)), fmax(fabs(vec3_dot(y, z)), fabs(vec3_dot(z, x))));
 	if (!vec3_is_finite(x) || !vec3_is_finite(y) || !vec3_is_finite(z) || !(skew < 1e-3))
 		return false;
-	double hand = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
+	double handedness = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
-	y = vec3_scale(hand, vec3_cross(z, x));
+	y = vec3_scale(handedness, vec3_cross(z, x));
 	*out = (mat4){
 		{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
 	return true;
 }
 
 /* Determines where the camera is when the shutter opens. */
-static int read_place(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+static int read_to_world(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	const struct animation *a = node_animation(sensor);
 	mat4 m = node_transform(sensor, "to_world");
 	if (a) {
 		struct motion motion;
-		struct motion_key *room = mem_alloc(a->count, sizeof *room);
-		if (!room)
+		struct motion_key *keys = mem_alloc(a->count, sizeof *keys);
+		if (!keys)
 			return error_set(e, ENOMEM, "out of memory");
-		out->moves = motion_make(&motion, a, out->shutter_open, out->shutter_close, room);
-		m = motion_at(&motion, 0);
-		mem_free(room);
+		out->is_moving = motion_make(&motion, a, out->shutter_open, out->shutter_close, keys);
+		m = motion_transform_at(&motion, 0);
+		mem_free(keys);
 	}
-	return scene_settings_upright(m, &out->to_world)
+	return scene_settings_orthonormalize(m, &out->to_world)
 		       ? 0
 		       : node_error(sensor, e, EINVAL,
 				    "to_world may only rotate, translate, mirror and scale a camera");
 }
 
-static int read_roll(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+static int read_rolling_shutter(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	static const char *const types[] = {[ROLL_NONE] = "none",
 					    [ROLL_TOP] = "top",
@@ -343,18 +344,18 @@ static int read_roll(const struct scene_node *sensor, struct scene_settings *out
 					    [ROLL_LEFT] = "left",
 					    [ROLL_RIGHT] = "right"};
 	const char *type = node_string(sensor, "rolling_shutter_type", types[ROLL_NONE]);
-	out->roll = ROLL_NONE;
-	while (strcmp(types[out->roll], type) != 0)
-		out->roll++;
-	if (out->roll == ROLL_NONE)
+	out->rolling_shutter = ROLL_NONE;
+	while (strcmp(types[out->rolling_shutter], type) != 0)
+		out->rolling_shutter++;
+	if (out->rolling_shutter == ROLL_NONE)
 		return 0;
-	if (!node_find(sensor, "rolling_shutter_duration"))
+	if (!node_find_property(sensor, "rolling_shutter_duration"))
 		return node_error(sensor, e, EINVAL, "a rolling shutter needs a rolling_shutter_duration");
-	out->roll_exposure = node_float(sensor, "rolling_shutter_duration", 0);
-	return out->roll_exposure >= 0 && out->roll_exposure <= 1
+	out->line_exposure = node_float(sensor, "rolling_shutter_duration", 0);
+	return out->line_exposure >= 0 && out->line_exposure <= 1
 		       ? 0
 		       : node_error(sensor, e, ERANGE, "rolling_shutter_duration=%g is outside [0, 1]",
-				    out->roll_exposure);
+				    out->line_exposure);
 }
 
 static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
@@ -368,39 +369,41 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	if (!(out->shutter_open <= out->shutter_close))
 		return node_error(sensor, e, EINVAL, "shutter_open=%g is after shutter_close=%g", out->shutter_open,
 				  out->shutter_close);
-	int r = read_roll(sensor, out, e);
+	int r = read_rolling_shutter(sensor, out, e);
 	if (!r)
-		r = read_place(sensor, out, e);
+		r = read_to_world(sensor, out, e);
 	if (r)
 		return r;
 	if (!(out->near_clip < out->far_clip))
 		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
 				  out->far_clip);
-	bool thin = strcmp(sensor->type, "thinlens") == 0;
-	if (!thin && strcmp(sensor->type, "telecentric") != 0)
+	bool is_thinlens = strcmp(sensor->type, "thinlens") == 0;
+	if (!is_thinlens && strcmp(sensor->type, "telecentric") != 0)
 		return 0;
-	if (thin && !node_find(sensor, "aperture_radius"))
+	if (is_thinlens && !node_find_property(sensor, "aperture_radius"))
 		return node_error(sensor, e, EINVAL, "a thinlens needs an aperture_radius");
 	out->aperture_radius = node_float(sensor, "aperture_radius", 0);
 	out->focus_distance = node_float(sensor, "focus_distance", out->far_clip);
 	return 0;
 }
 
-#define STAND_IN_FOV 45.0
+#define DEFAULT_SENSOR_FOV 45.0
 
-/* The sensor of a scene that has none; scene_settings_place() gives its position. */
-static const struct property stand_in_properties[] = {{"fov", 0, {.type = VALUE_FLOAT, .as.number = STAND_IN_FOV}}};
-static const struct scene_node stand_in = {.cls = PLUGIN_SENSOR,
-					   .type = "perspective",
-					   .file = "no sensor in the file",
-					   .decl = setting_decls,
-					   .property_count = 1,
-					   .properties = stand_in_properties};
+/* The sensor of a scene that has none; scene_settings_place_default_sensor() gives its position. */
+static const struct property default_sensor_properties[] = {
+	{"fov", 0, {.type = VALUE_FLOAT, .as.number = DEFAULT_SENSOR_FOV}}};
+static const struct scene_node default_sensor = {.cls = PLUGIN_SENSOR,
+						 .type = "perspective",
+						 .file = "no sensor in the file",
+						 .decl = setting_decls,
+						 .property_count = 1,
+						 .properties = default_sensor_properties};
 
-int scene_settings_place(struct scene_settings *s, const char *file, vec3 low, vec3 high, struct error *e)
+int scene_settings_place_default_sensor(struct scene_settings *s, const char *file, vec3 low, vec3 high,
+					struct error *e)
 {
 	double size = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z)),
-	       distance = size / (2 * tan(STAND_IN_FOV / 2 / 57.295779513082320877));
+	       distance = size / (2 * tan(DEFAULT_SENSOR_FOV / 2 / 57.295779513082320877));
 	if (!(size > 0))
 		return error_set(e, EINVAL,
 				 "%.256s: has no <sensor>, and no shape to place one in front of; it looks like a file "
@@ -413,23 +416,23 @@ int scene_settings_place(struct scene_settings *s, const char *file, vec3 low, v
 	return 0;
 }
 
-const struct scene_node *scene_sensor(const struct scene *s, uint32_t which)
+const struct scene_node *scene_sensor(const struct scene *s, uint32_t number)
 {
-	uint32_t sensors;
-	return find_object(s, PLUGIN_SENSOR, which, &sensors);
+	uint32_t sensor_count;
+	return find_object(s, PLUGIN_SENSOR, number, &sensor_count);
 }
 
-int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t which,
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor_number,
 			struct scene_settings *out, struct error *e)
 {
 	*out = (struct scene_settings){0};
-	uint32_t sensors;
-	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, which, &sensors);
-	if (!sensor && (sensors || which > 1))
-		return error_set(e, EINVAL, "there is no sensor %u: the scene has %u", which, sensors);
-	out->unplaced = !sensor;
+	uint32_t sensor_count;
+	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, sensor_number, &sensor_count);
+	if (!sensor && (sensor_count || sensor_number > 1))
+		return error_set(e, EINVAL, "there is no sensor %u: the scene has %u", sensor_number, sensor_count);
+	out->is_unplaced = !sensor;
 	if (!sensor)
-		sensor = &stand_in;
+		sensor = &default_sensor;
 	const struct scene_node *sampler = node_child(sensor, PLUGIN_SAMPLER, 0);
 	out->spp = sampler ? (uint64_t)node_int(sampler, "sample_count", 0) : 0;
 	int r = read_film(sensor, width, height, out, e);

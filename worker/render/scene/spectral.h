@@ -20,7 +20,7 @@ bool spectral_is_type(const char *type); /* of a <spectrum type="..."> */
 /* Returns the i-th such type and the names of the parameters that it may contain, "a|b"; NULL after the last. */
 const char *spectral_type_at(size_t i, const char **names);
 /* Returns the i-th attribute that defines a <spectrum>, and what its value means; NULL after the last. */
-const char *spectral_form_at(size_t i, const char **holds);
+const char *spectral_form_at(size_t i, const char **meaning);
 /* Reads a <spectrum>; *out may also become an rgb colour (three numbers in 0.6, type="srgb" and "rgb"). */
 int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
 		  struct value *out, struct error *e);

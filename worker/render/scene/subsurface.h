@@ -14,13 +14,13 @@
 double subsurface_reflectance(double albedo, double eta);
 /* Returns the diffuse reflectance below the boundary of a `plastic` for which `reflectance` of the light that has
  * entered leaves again. */
-double subsurface_base(double reflectance, double eta);
+double subsurface_base_reflectance(double reflectance, double eta);
 
 /* Returns the i-th of Mitsuba 0.6's models and what a lenient reader makes of it; NULL after the last. */
-const char *subsurface_at(size_t i, const char **becomes);
+const char *subsurface_model_at(size_t i, const char **replacement);
 
 /* Replaces each dipole below a `plastic` or `roughplastic` by a diffuse base of that BSDF, with a note. Other
  * subsurfaces stay. Returns 0 or -ENOMEM. */
-int subsurface_settle(struct maker *m);
+int subsurface_replace_dipoles(struct maker *m);
 
 #endif

@@ -7,22 +7,22 @@
 #include <string.h>
 #include <strings.h>
 
-void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root)
+void texture_names_normalize(const struct plugin_decl *decls, struct xml_element *root)
 {
-	const char *type = root->snake ? NULL : xml_attribute(root, "type");
+	const char *type = root->is_camel_case ? NULL : xml_attribute_value(root, "type");
 	if (type && strcmp(root->name, "spectrum") == 0 && plugin_find(decls, PLUGIN_TEXTURE, type))
 		root->name = "texture";
 	else if (type && strcmp(root->name, "texture") == 0 && spectral_is_type(type))
 		root->name = "spectrum";
-	for (struct xml_element *c = root->first; c; c = c->next)
-		texture_names_settle(decls, c);
+	for (struct xml_element *c = root->first_child; c; c = c->next_sibling)
+		texture_names_normalize(decls, c);
 }
 
 /* Turns a <ref> into a copy of the spectrum, under the name, if any, that the <ref> has. */
-static int become_spectrum(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena,
-			   struct error *e)
+static int replace_by_spectrum(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena,
+			       struct error *e)
 {
-	const char *name = xml_attribute(ref, "name");
+	const char *name = xml_attribute_value(ref, "name");
 	struct xml_attribute *a = arena_alloc(arena, spectrum->attribute_count + 1, sizeof *a);
 	if (!a)
 		return xml_error(ref, e, ENOMEM, "out of memory");
@@ -35,64 +35,66 @@ static int become_spectrum(struct xml_element *ref, const struct xml_element *sp
 	ref->name = spectrum->name;
 	ref->attributes = a;
 	ref->attribute_count = n;
-	ref->first = spectrum->first;
-	ref->last = spectrum->last;
+	ref->first_child = spectrum->first_child;
+	ref->last_child = spectrum->last_child;
 	return 0;
 }
 
 /* Returns the number of bytes that are read again for each <ref>. */
-static uint64_t bytes_of(const struct xml_element *spectrum)
+static uint64_t spectrum_bytes(const struct xml_element *spectrum)
 {
 	uint64_t n = 0;
-	for (const struct xml_element *c = spectrum->first; c; c = c->next, n += sizeof *c)
+	for (const struct xml_element *c = spectrum->first_child; c; c = c->next_sibling, n += sizeof *c)
 		for (uint32_t i = 0; i < c->attribute_count; i++)
 			n += strlen(c->attributes[i].value);
 	return n;
 }
 
-static int follow(struct xml_element *el, struct id_table *ids, struct arena *arena, uint64_t *bytes, struct error *e)
+static int resolve_references(struct xml_element *el, struct id_table *ids, struct arena *arena, uint64_t *bytes,
+			      struct error *e)
 {
 	if (strcmp(el->name, "spectrum") == 0) /* contains values only; one with a <ref> is refused later */
 		return 0;
-	const char *id = strcmp(el->name, "ref") == 0 && !el->ignored ? xml_attribute(el, "id") : NULL;
-	const struct xml_element *target = id ? id_table_look(ids, id) : NULL;
+	const char *id = strcmp(el->name, "ref") == 0 && !el->is_ignored ? xml_attribute_value(el, "id") : NULL;
+	const struct xml_element *target = id ? id_table_lookup(ids, id) : NULL;
 	if (target && strcmp(target->name, "spectrum") == 0) {
-		*bytes += bytes_of(target);
-		if (*bytes > XML_FILES_BYTES)
+		*bytes += spectrum_bytes(target);
+		if (*bytes > XML_TOTAL_BYTES_MAX)
 			return xml_error(el, e, E2BIG, "spectra have more than %d MB when all references are followed",
-					 XML_FILES_BYTES >> 20);
-		return become_spectrum(el, target, arena, e);
+					 XML_TOTAL_BYTES_MAX >> 20);
+		return replace_by_spectrum(el, target, arena, e);
 	}
 	int r = 0;
-	for (struct xml_element *c = el->first; c && !r; c = c->next)
-		r = follow(c, ids, arena, bytes, e);
+	for (struct xml_element *c = el->first_child; c && !r; c = c->next_sibling)
+		r = resolve_references(c, ids, arena, bytes, e);
 	return r;
 }
 
-int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e)
+int texture_names_resolve_references(struct xml_element *root, struct id_table *ids, struct arena *arena,
+				     struct error *e)
 {
 	uint64_t bytes = 0;
-	return follow(root, ids, arena, &bytes, e);
+	return resolve_references(root, ids, arena, &bytes, e);
 }
 
 /* ---- pictures that bump and normal maps name themselves */
 
 static bool is_relief(const struct xml_element *el)
 {
-	const char *type = strcmp(el->name, "bsdf") == 0 ? xml_attribute(el, "type") : NULL;
+	const char *type = strcmp(el->name, "bsdf") == 0 ? xml_attribute_value(el, "type") : NULL;
 	return type && (strcasecmp(type, "bumpmap") == 0 || strcasecmp(type, "normalmap") == 0);
 }
 
 static bool is_filename(const struct xml_element *el)
 {
-	const char *name = strcmp(el->name, "string") == 0 && !el->ignored ? xml_attribute(el, "name") : NULL;
+	const char *name = strcmp(el->name, "string") == 0 && !el->is_ignored ? xml_attribute_value(el, "name") : NULL;
 	return name && strcmp(name, "filename") == 0;
 }
 
 /* Turns the file name into a raw texture: normals and heights are numbers, not colours. */
-static int become_texture(struct xml_element *el, struct arena *arena, struct error *e)
+static int replace_by_texture(struct xml_element *el, struct arena *arena, struct error *e)
 {
-	const char *file = xml_attribute(el, "value");
+	const char *file = xml_attribute_value(el, "value");
 	struct xml_attribute *type = arena_alloc(arena, 1, sizeof *type);
 	if (!file)
 		return 0; /* refused by its reader */
@@ -102,18 +104,19 @@ static int become_texture(struct xml_element *el, struct arena *arena, struct er
 	el->name = "texture";
 	el->attributes = type;
 	el->attribute_count = 1;
-	bool made = element_value(el, "string", "filename", file, arena) &&
-		    element_value(el, "boolean", "raw", "true", arena);
+	bool made = element_add_parameter(el, "string", "filename", file, arena) &&
+		    element_add_parameter(el, "boolean", "raw", "true", arena);
 	if (made)
-		el->first->unset = el->unset;
+		el->first_child->is_unset = el->is_unset;
 	return made ? 0 : xml_error(el, e, ENOMEM, "out of memory");
 }
 
-int relief_files_settle(struct xml_element *root, struct arena *arena, struct error *e)
+int relief_files_to_textures(struct xml_element *root, struct arena *arena, struct error *e)
 {
-	bool relief = is_relief(root);
+	bool in_relief = is_relief(root);
 	int r = 0;
-	for (struct xml_element *c = root->first; c && !r; c = c->next)
-		r = relief && is_filename(c) ? become_texture(c, arena, e) : relief_files_settle(c, arena, e);
+	for (struct xml_element *c = root->first_child; c && !r; c = c->next_sibling)
+		r = in_relief && is_filename(c) ? replace_by_texture(c, arena, e)
+						: relief_files_to_textures(c, arena, e);
 	return r;
 }

@@ -18,7 +18,7 @@
 #include <string.h>
 
 /* Allowed error of the last row: matrices inverted in float by scripts have such errors there. */
-#define AFFINE_SLACK 1e-6
+#define AFFINE_TOLERANCE 1e-6
 
 /* Refuses numbers whose size would keep squares of areas from being represented. */
 static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
@@ -30,11 +30,11 @@ static int check_number(const struct xml_element *el, const char *attribute, dou
 
 static int read_triple(const struct xml_element *el, const char *attribute, vec3 *out, struct error *e)
 {
-	const char *text = xml_attribute(el, attribute);
+	const char *text = xml_attribute_value(el, attribute);
 	double v[3];
 	if (!text)
-		return element_needs(el, attribute, e);
-	if (number_list(text, v, 3) != 3)
+		return element_refuse_missing_attribute(el, attribute, e);
+	if (number_parse_list(text, v, 3) != 3)
 		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not three numbers", attribute, text);
 	for (int i = 0; i < 3; i++) {
 		int r = check_number(el, attribute, v[i], e);
@@ -45,29 +45,29 @@ static int read_triple(const struct xml_element *el, const char *attribute, vec3
 	return 0;
 }
 
-int transform_read_vec3(const struct xml_element *el, double missing, bool one_for_all, vec3 *out, struct error *e)
+int transform_read_vec3(const struct xml_element *el, double fallback, bool allow_single, vec3 *out, struct error *e)
 {
 	static const char *const axes[3] = {"x", "y", "z"};
 	double v[3];
-	const char *text = xml_attribute(el, "value");
-	bool any = false;
+	const char *text = xml_attribute_value(el, "value");
+	bool has_component = false;
 	for (int i = 0; i < 3; i++) {
-		const char *component = xml_attribute(el, axes[i]);
-		v[i] = missing;
-		any |= component != NULL;
+		const char *component = xml_attribute_value(el, axes[i]);
+		v[i] = fallback;
+		has_component |= component != NULL;
 		if (component && !number_parse(component, &v[i]))
 			return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a (finite) number", axes[i], component);
 	}
-	if (any == (text != NULL))
+	if (has_component == (text != NULL))
 		return xml_error(el, e, EINVAL, "needs either x, y, z or value");
 	if (text) {
-		int n = number_list(text, v, 3);
-		bool one = one_for_all || !el->snake; /* in 3.x also for positions and directions */
-		if (n == 1 && one)
+		int n = number_parse_list(text, v, 3);
+		bool single_allowed = allow_single || !el->is_camel_case; /* in 3.x also for positions and directions */
+		if (n == 1 && single_allowed)
 			v[1] = v[2] = v[0];
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "value=\"%.64s\" is not three numbers%s", text,
-					 one ? " or one" : "");
+					 single_allowed ? " or one" : "");
 	}
 	for (int i = 0; i < 3; i++) {
 		int r = check_number(el, text ? "value" : axes[i], v[i], e);
@@ -101,7 +101,7 @@ static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
 	int r = transform_read_vec3(el, 0, false, &axis, e);
 	if (r)
 		return r;
-	const char *angle = xml_attribute(el, "angle");
+	const char *angle = xml_attribute_value(el, "angle");
 	if (!angle || !number_parse(angle, &degrees))
 		return xml_error(el, e, EINVAL, "needs an angle in degrees");
 	r = check_number(el, "angle", degrees, e);
@@ -129,9 +129,9 @@ static bool is_in_range(const mat4 *m)
 
 /* Returns the default for `up`: in each version of Mitsuba, the first axis that its own function makes perpendicular
  * to the view. */
-static vec3 any_up(const struct xml_element *el, vec3 view)
+static vec3 default_up(const struct xml_element *el, vec3 view)
 {
-	if (!el->snake)
+	if (!el->is_camel_case)
 		return frame_around(view).s;
 	vec3 side = fabs(view.x) > fabs(view.y) ? (vec3){view.z, 0, -view.x} : (vec3){0, view.z, -view.y};
 	return vec3_cross(vec3_normalize(side), view);
@@ -143,13 +143,13 @@ static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
 	int r = read_triple(el, "origin", &origin, e);
 	if (!r)
 		r = read_triple(el, "target", &target, e);
-	bool has_up = xml_attribute(el, "up") != NULL;
+	bool has_up = xml_attribute_value(el, "up") != NULL;
 	if (!r && has_up)
 		r = read_triple(el, "up", &up, e);
 	if (r)
 		return r;
 	if (!has_up || (up.x == 0 && up.y == 0 && up.z == 0))
-		up = any_up(el, vec3_normalize(vec3_sub(target, origin)));
+		up = default_up(el, vec3_normalize(vec3_sub(target, origin)));
 	*m = mat4_look_at(origin, target, up);
 	if (!is_in_range(m))
 		return xml_error(el, e, EINVAL, "origin and target are equal, or up is parallel to the view");
@@ -158,9 +158,9 @@ static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
 
 static int read_matrix(const struct xml_element *el, mat4 *m, struct error *e)
 {
-	const char *text = xml_attribute(el, "value");
+	const char *text = xml_attribute_value(el, "value");
 	double v[16];
-	int n = text ? number_list(text, v, 16) : -1;
+	int n = text ? number_parse_list(text, v, 16) : -1;
 	if (n != 16 && n != 9)
 		return xml_error(el, e, EINVAL, "needs value=\"...\" with 16 or 9 numbers, row by row");
 	*m = mat4_identity();
@@ -171,12 +171,12 @@ static int read_matrix(const struct xml_element *el, mat4 *m, struct error *e)
 			return r;
 		m->m[i / side][i % side] = v[i];
 	}
-	bool affine = true;
+	bool is_affine = true;
 	for (int i = 0; i < 4; i++) {
-		affine &= fabs(m->m[3][i] - (i == 3)) <= AFFINE_SLACK;
+		is_affine &= fabs(m->m[3][i] - (i == 3)) <= AFFINE_TOLERANCE;
 		m->m[3][i] = i == 3;
 	}
-	if (!affine)
+	if (!is_affine)
 		return xml_error(el, e, EINVAL, "the last row must be 0 0 0 1: only affine transforms are supported");
 	return 0;
 }
@@ -214,21 +214,21 @@ static int read_step(const struct xml_element *el, mat4 *out, struct error *e)
 		return xml_error(el, e, EINVAL,
 				 "is not a transform%s (supported: translate, rotate, scale, lookat, matrix)",
 				 spelling_hint(&s, hint, sizeof hint));
-	int r = element_check(el, step->attributes, false, e);
+	int r = element_check_contents(el, step->attributes, false, e);
 	return r ? r : step->read(el, out, e);
 }
 
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 {
 	mat4 m = mat4_identity();
-	for (const struct xml_element *c = el->first; c; c = c->next) {
-		if (c->ignored)
+	for (const struct xml_element *c = el->first_child; c; c = c->next_sibling) {
+		if (c->is_ignored)
 			continue;
-		mat4 one;
-		int r = read_step(c, &one, e);
+		mat4 step_matrix;
+		int r = read_step(c, &step_matrix, e);
 		if (r)
 			return r;
-		m = mat4_mul(one, m);
+		m = mat4_mul(step_matrix, m);
 		if (!is_in_range(&m))
 			return xml_error(c, e, ERANGE, "the transform is out of range: an element is outside [%g, %g]",
 					 -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
@@ -238,14 +238,16 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 }
 
 /* Reports the problems of all steps, except for the known one. */
-static int report_steps(const struct xml_element *el, const struct error *known, struct report *report, struct error *e)
+static int report_steps(const struct xml_element *el, const struct error *reported, struct report *report,
+			struct error *e)
 {
 	int r = 0;
-	for (const struct xml_element *c = el->first; c && !r; c = c->next) {
+	for (const struct xml_element *c = el->first_child; c && !r; c = c->next_sibling) {
 		mat4 unused;
 		if (strcmp(c->name, "transform") == 0) /* of an animation */
-			r = report_steps(c, known, report, e);
-		else if (!c->ignored && !c->unset && read_step(c, &unused, e) && strcmp(e->text, known->text) != 0)
+			r = report_steps(c, reported, report, e);
+		else if (!c->is_ignored && !c->is_unset && read_step(c, &unused, e) &&
+			 strcmp(e->text, reported->text) != 0)
 			r = report_problem(report, -EINVAL, e);
 	}
 	return r;
@@ -260,5 +262,5 @@ int transform_report(const struct xml_element *el, int failure, struct report *r
 	int r = report_problem(report, failure, e);
 	if (!r)
 		r = report_steps(el, &first, report, e);
-	return r ? r : REPORT_TOLD;
+	return r ? r : REPORT_ALREADY_REPORTED;
 }

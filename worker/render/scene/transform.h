@@ -10,12 +10,12 @@
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e);
 
 /* Handles the failure in *e of reading the value el: if el is a <transform> or an <animation> with a wrong element,
- * reports it, and the problems of all other elements. Returns REPORT_TOLD, or what report_problem() returns; any other
- * failure is returned unchanged. */
+ * reports it, and the problems of all other elements. Returns REPORT_ALREADY_REPORTED, or what report_problem()
+ * returns; any other failure is returned unchanged. */
 int transform_report(const struct xml_element *el, int failure, struct report *report, struct error *e);
 
-/* Reads x=, y=, z= (`missing` where absent) or value="x, y, z"; one_for_all: value="s" stands for three equal
+/* Reads x=, y=, z= (`fallback` where absent) or value="x, y, z"; allow_single: value="s" stands for three equal
  * numbers. */
-int transform_read_vec3(const struct xml_element *el, double missing, bool one_for_all, vec3 *out, struct error *e);
+int transform_read_vec3(const struct xml_element *el, double fallback, bool allow_single, vec3 *out, struct error *e);
 
 #endif

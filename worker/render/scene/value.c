@@ -16,16 +16,16 @@
 #include <string.h>
 #include <strings.h>
 
-static int need_value(const struct xml_element *el, const char **text, struct error *e)
+static int require_value(const struct xml_element *el, const char **text, struct error *e)
 {
-	*text = xml_attribute(el, "value");
-	return *text ? 0 : element_needs(el, "value", e);
+	*text = xml_attribute_value(el, "value");
+	return *text ? 0 : element_refuse_missing_attribute(el, "value", e);
 }
 
 static int read_bool(const struct xml_element *el, struct value *out, struct error *e)
 {
 	const char *text;
-	int r = need_value(el, &text, e);
+	int r = require_value(el, &text, e);
 	if (r)
 		return r;
 	out->as.boolean = strcasecmp(text, "true") == 0; /* Python writes True */
@@ -43,7 +43,7 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 static int read_int(const struct xml_element *el, struct value *out, struct error *e)
 {
 	const char *text;
-	int r = need_value(el, &text, e);
+	int r = require_value(el, &text, e);
 	if (!r && !number_parse_int(text, &out->as.integer) && number_parse(text, &(double){0}) &&
 	    !strpbrk(text, ".eE"))
 		return xml_error(el, e, ERANGE, "`%.64s` is too large", text);
@@ -55,7 +55,7 @@ static int read_int(const struct xml_element *el, struct value *out, struct erro
 static int read_float(const struct xml_element *el, struct value *out, struct error *e)
 {
 	const char *text;
-	int r = need_value(el, &text, e);
+	int r = require_value(el, &text, e);
 	if (!r && !number_parse(text, &out->as.number))
 		return xml_error(el, e, EINVAL, "`%.64s` is not a (finite) number", text);
 	return r;
@@ -74,23 +74,23 @@ static bool parse_hex(const char *text, double rgb[3])
 static int read_rgb(const struct xml_element *el, struct value *out, struct error *e)
 {
 	const char *text;
-	int r = need_value(el, &text, e);
+	int r = require_value(el, &text, e);
 	if (r)
 		return r;
 	double *rgb = out->as.rgb;
-	bool srgb = strcmp(el->name, "srgb") == 0;
+	bool is_srgb = strcmp(el->name, "srgb") == 0;
 	/* 0.6 reads #rrggbb also in <rgb>, as linear; 3.x does not. */
-	if (!(text[0] == '#' && (srgb || el->snake) && parse_hex(text, rgb))) {
-		int n = number_list(text, rgb, 3);
+	if (!(text[0] == '#' && (is_srgb || el->is_camel_case) && parse_hex(text, rgb))) {
+		int n = number_parse_list(text, rgb, 3);
 		if (n == 1)
 			rgb[1] = rgb[2] = rgb[0];
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "`%.64s` is neither three numbers nor one%s", text,
-					 srgb		  ? " nor #rrggbb"
+					 is_srgb	  ? " nor #rrggbb"
 					 : text[0] == '#' ? "; #rrggbb is for <srgb>"
 							  : "");
 	}
-	for (int i = 0; i < 3 && srgb; i++)
+	for (int i = 0; i < 3 && is_srgb; i++)
 		rgb[i] = srgb_to_linear(rgb[i]);
 	return 0;
 }
@@ -99,19 +99,19 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
  * place is refused. */
 static int check_intent(const struct xml_element *el, struct error *e)
 {
-	const char *intent = xml_attribute(el, "intent");
-	bool light = el->parent && strcmp(el->parent->name, "emitter") == 0;
-	if (intent && strcmp(intent, light ? "illuminant" : "reflectance") != 0)
+	const char *intent = xml_attribute_value(el, "intent");
+	bool in_emitter = el->parent && strcmp(el->parent->name, "emitter") == 0;
+	if (intent && strcmp(intent, in_emitter ? "illuminant" : "reflectance") != 0)
 		return xml_error(el, e, EINVAL, "intent=\"%.64s\" is not supported; here it is \"%s\"", intent,
-				 light ? "illuminant" : "reflectance");
+				 in_emitter ? "illuminant" : "reflectance");
 	return 0;
 }
 
-static const struct kind {
+static const struct value_kind {
 	const char *element;
 	enum value_type type;
 	const char *attributes;
-	bool children;
+	bool allows_children;
 } kinds[] = {
 	{"boolean", VALUE_BOOL, "name|value", false},
 	{"integer", VALUE_INT, "name|value", false},
@@ -129,7 +129,7 @@ static const struct kind {
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
-static const struct kind *find_kind(const char *name)
+static const struct value_kind *find_kind(const char *name)
 {
 	for (int i = 0; i < KINDS; i++)
 		if (strcmp(kinds[i].element, name) == 0)
@@ -162,12 +162,12 @@ const char *value_element_at(size_t i, const char **attributes)
 int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
 	       struct error *e)
 {
-	const struct kind *k = find_kind(el->name);
+	const struct value_kind *k = find_kind(el->name);
 	if (!k || !k->type)
 		return xml_error(el, e, EINVAL,
 				 "is not supported; supported: boolean, integer, float, string, point, vector, "
 				 "rgb, srgb, spectrum, blackbody, transform");
-	int r = element_check(el, k->attributes, k->children, e);
+	int r = element_check_contents(el, k->attributes, k->allows_children, e);
 	if (!r)
 		r = check_intent(el, e);
 	if (r)
@@ -181,7 +181,7 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 	case VALUE_FLOAT:
 		return read_float(el, out, e);
 	case VALUE_STRING:
-		return need_value(el, &out->as.string, e);
+		return require_value(el, &out->as.string, e);
 	case VALUE_POINT:
 		return transform_read_vec3(el, 0, false, &out->as.point, e);
 	case VALUE_RGB:
@@ -194,7 +194,7 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 	}
 }
 
-void value_type_names(unsigned types, char *text, size_t size)
+void value_list_type_names(unsigned types, char *text, size_t size)
 {
 	static const struct {
 		unsigned type;
@@ -205,7 +205,7 @@ void value_type_names(unsigned types, char *text, size_t size)
 	text[0] = 0;
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (types & names[i].type)
-			spelling_list(text, size, names[i].name);
+			spelling_append_to_list(text, size, names[i].name);
 }
 
 const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count)

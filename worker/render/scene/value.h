@@ -21,7 +21,7 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 	       struct error *e);
 
 /* Lists the names of the types, any combination of bits, for messages: "float", "rgb" ... */
-void value_type_names(unsigned types, char *text, size_t size);
+void value_list_type_names(unsigned types, char *text, size_t size);
 
 /* Returns all numbers of a value, in *v or in scratch: three for a point or rgb, none for types without numbers
  * (transforms are checked in transform.h). */

@@ -14,24 +14,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct render_setting list[] = {
+static const struct render_setting setting_table[] = {
 #define SETTING(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...) \
 	{.name = name_,                                                                             \
 	 .summary = summary_,                                                                       \
 	 .kind = kind_,                                                                             \
-	 .place = place_,                                                                           \
-	 .standard = standard_,                                                                     \
-	 .least = least_,                                                                           \
-	 .greatest = greatest_,                                                                     \
+	 .scope = place_,                                                                           \
+	 .default_value = standard_,                                                                \
+	 .min = least_,                                                                             \
+	 .max = greatest_,                                                                          \
 	 .choices = choices_,                                                                       \
 	 .sweep = {__VA_ARGS__}},
 #include "worker/render/settings/setting_list.h"
 #undef SETTING
 };
 
-enum { SETTING_COUNT = sizeof list / sizeof *list, VALUE_BYTES = 24 };
+enum { SETTING_COUNT = sizeof setting_table / sizeof *setting_table, VALUE_BYTES = 24 };
 
-static const size_t offset[SETTING_COUNT] = {
+static const size_t setting_offset[SETTING_COUNT] = {
 #define SETTING(field, ...) offsetof(struct accuracy_settings, field),
 #include "worker/render/settings/setting_list.h"
 #undef SETTING
@@ -45,72 +45,73 @@ const struct accuracy_settings accuracy_settings_default = {
 
 const struct render_setting *render_setting_at(size_t index)
 {
-	return index < SETTING_COUNT ? &list[index] : NULL;
+	return index < SETTING_COUNT ? &setting_table[index] : NULL;
 }
 
-static double value_of(const struct accuracy_settings *k, size_t index)
+static double get_value(const struct accuracy_settings *k, size_t index)
 {
 	double value;
-	memcpy(&value, (const char *)k + offset[index], sizeof value);
+	memcpy(&value, (const char *)k + setting_offset[index], sizeof value);
 	return value;
 }
 
 static void set_value(struct accuracy_settings *k, size_t index, double value)
 {
-	memcpy((char *)k + offset[index], &value, sizeof value);
+	memcpy((char *)k + setting_offset[index], &value, sizeof value);
 }
 
-/* Copies the choice at index `place`, or, if place is -1, the choice worth `value`. Returns false if there is none. */
-static bool choice_at(const char *choices, int place, double value, char *text, size_t size)
+/* Copies the choice at index `index`, or, if place is -1, the choice worth `value`. Returns false if there is none. */
+static bool copy_choice(const char *choices, int index, double value, char *text, size_t size)
 {
-	const char *at = choices;
-	for (int i = 0; *at; i++) {
-		size_t n = strcspn(at, " ");
-		double worth = *at >= '0' && *at <= '9' ? strtod(at, NULL) : i;
-		if (place == i || (place < 0 && worth == value)) {
-			text_copy(text, n + 1 < size ? n + 1 : size, at);
+	const char *choice = choices;
+	for (int i = 0; *choice; i++) {
+		size_t n = strcspn(choice, " ");
+		double choice_value = *choice >= '0' && *choice <= '9' ? strtod(choice, NULL) : i;
+		if (index == i || (index < 0 && choice_value == value)) {
+			text_copy(text, n + 1 < size ? n + 1 : size, choice);
 			return true;
 		}
-		at += n;
-		at += *at == ' ';
+		choice += n;
+		choice += *choice == ' ';
 	}
 	return false;
 }
 
-void accuracy_settings_value(const struct accuracy_settings *k, size_t index, char *text, size_t size)
+void accuracy_settings_print_value(const struct accuracy_settings *k, size_t index, char *text, size_t size)
 {
 	struct text t = {text, size};
-	double value = value_of(k, index);
-	if (list[index].kind != SETTING_CHOICE || !choice_at(list[index].choices, -1, value, text, size))
-		text_put(&t, "%.6g", value);
+	double value = get_value(k, index);
+	if (setting_table[index].kind != SETTING_CHOICE ||
+	    !copy_choice(setting_table[index].choices, -1, value, text, size))
+		text_appendf(&t, "%.6g", value);
 }
 
-void render_setting_range(const struct render_setting *k, char *text, size_t size)
+void render_setting_print_range(const struct render_setting *k, char *text, size_t size)
 {
 	struct text t = {text, size};
 	char choice[VALUE_BYTES], next[VALUE_BYTES];
 	if (k->kind != SETTING_CHOICE) {
-		text_put(&t, "%g to %g", k->least, k->greatest);
+		text_appendf(&t, "%g to %g", k->min, k->max);
 		return;
 	}
-	for (int i = 0; choice_at(k->choices, i, 0, choice, sizeof choice); i++)
-		text_put(&t, "%s%s",
-			 i == 0						      ? ""
-			 : choice_at(k->choices, i + 1, 0, next, sizeof next) ? ", "
-									      : " or ",
-			 choice);
+	for (int i = 0; copy_choice(k->choices, i, 0, choice, sizeof choice); i++)
+		text_appendf(&t, "%s%s",
+			     i == 0						    ? ""
+			     : copy_choice(k->choices, i + 1, 0, next, sizeof next) ? ", "
+										    : " or ",
+			     choice);
 }
 
-static int name_error(const char *name, struct error *e)
+static int unknown_name_error(const char *name, struct error *e)
 {
 	struct spelling s = {.wanted = name};
-	char hint[80], known[256] = "";
+	char hint[80], names[256] = "";
 	for (size_t i = 0; i < SETTING_COUNT; i++) {
-		spelling_offer(&s, list[i].name);
-		spelling_list(known, sizeof known, list[i].name);
+		spelling_offer(&s, setting_table[i].name);
+		spelling_append_to_list(names, sizeof names, setting_table[i].name);
 	}
 	return error_set(e, EINVAL, "no setting is called '%s'%s; there are %s", name,
-			 spelling_hint(&s, hint, sizeof hint), known);
+			 spelling_hint(&s, hint, sizeof hint), names);
 }
 
 /* Returns a hint about a setting that is written without a value; "" if only the value is missing. */
@@ -118,18 +119,18 @@ static const char *name_hint(const char *name, char *text, size_t size)
 {
 	struct spelling s = {.wanted = name};
 	for (size_t i = 0; i < SETTING_COUNT; i++)
-		spelling_offer(&s, list[i].name);
+		spelling_offer(&s, setting_table[i].name);
 	if (s.best && s.distance == 0)
 		s.best = NULL;
 	return spelling_hint(&s, text, size);
 }
 
-static int find(const char *name, size_t *index, struct error *e)
+static int find_setting(const char *name, size_t *index, struct error *e)
 {
 	for (*index = 0; *index < SETTING_COUNT; ++*index)
-		if (strcmp(list[*index].name, name) == 0)
+		if (strcmp(setting_table[*index].name, name) == 0)
 			return 0;
-	return name_error(name, e);
+	return unknown_name_error(name, e);
 }
 
 /* Returns "; did you mean `double`?" for an unknown choice; otherwise "". */
@@ -137,7 +138,7 @@ static const char *value_hint(const struct render_setting *k, const char *wanted
 {
 	char choice[VALUE_BYTES];
 	struct spelling s = {.wanted = wanted};
-	for (int i = 0; k->kind == SETTING_CHOICE && choice_at(k->choices, i, 0, choice, sizeof choice); i++)
+	for (int i = 0; k->kind == SETTING_CHOICE && copy_choice(k->choices, i, 0, choice, sizeof choice); i++)
 		spelling_offer(&s, choice);
 	return spelling_hint(&s, text, size);
 }
@@ -148,7 +149,7 @@ static bool parse_value(const struct render_setting *k, const char *text, double
 {
 	char *end, choice[VALUE_BYTES], digits[VALUE_BYTES];
 	if (k->kind == SETTING_CHOICE) {
-		for (int i = 0; choice_at(k->choices, i, 0, choice, sizeof choice); i++)
+		for (int i = 0; copy_choice(k->choices, i, 0, choice, sizeof choice); i++)
 			if (strcmp(choice, text) == 0) {
 				*value = choice[0] >= '0' && choice[0] <= '9' ? strtod(choice, NULL) : i;
 				return true;
@@ -156,12 +157,12 @@ static bool parse_value(const struct render_setting *k, const char *text, double
 		return false;
 	}
 	double x = strtod(text, &end);
-	if (!((*text >= '0' && *text <= '9') || *text == '.') || *end || !(x >= k->least && x <= k->greatest))
+	if (!((*text >= '0' && *text <= '9') || *text == '.') || *end || !(x >= k->min && x <= k->max))
 		return false;
-	if (k->kind == SETTING_WHOLE && x != floor(x))
+	if (k->kind == SETTING_INTEGER && x != floor(x))
 		return false;
 	struct text t = {digits, sizeof digits};
-	text_put(&t, "%.6g", x);
+	text_appendf(&t, "%.6g", x);
 	*value = strtod(digits, NULL);
 	return true;
 }
@@ -179,14 +180,14 @@ static int read_entry(const char *text, size_t length, struct accuracy_settings 
 	*equals = 0;
 	size_t index;
 	double value;
-	int rc = find(entry, &index, e);
+	int rc = find_setting(entry, &index, e);
 	if (rc)
 		return rc;
-	if (!parse_value(&list[index], equals + 1, &value)) {
-		render_setting_range(&list[index], range, sizeof range);
+	if (!parse_value(&setting_table[index], equals + 1, &value)) {
+		render_setting_print_range(&setting_table[index], range, sizeof range);
 		return error_set(e, EINVAL, "%s is%s %s, not '%s'%s", entry,
-				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1,
-				 value_hint(&list[index], equals + 1, hint, sizeof hint));
+				 setting_table[index].kind == SETTING_INTEGER ? " a whole number from" : "", range,
+				 equals + 1, value_hint(&setting_table[index], equals + 1, hint, sizeof hint));
 	}
 	set_value(out, index, value);
 	return 0;
@@ -197,13 +198,13 @@ int accuracy_settings_read(const char *text, struct accuracy_settings *out, stru
 	*out = accuracy_settings_default;
 	if (!text || !*text)
 		return 0;
-	for (const char *at = text;; at++) {
-		size_t n = strcspn(at, ",");
-		int rc = read_entry(at, n, out, e);
+	for (const char *entry = text;; entry++) {
+		size_t n = strcspn(entry, ",");
+		int rc = read_entry(entry, n, out, e);
 		if (rc)
 			return rc;
-		at += n;
-		if (!*at)
+		entry += n;
+		if (!*entry)
 			return 0;
 	}
 }
@@ -214,14 +215,14 @@ void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_A
 	memset(text, 0, PLAN_ACCURACY_MAX);
 	for (size_t i = 0; i < SETTING_COUNT; i++) {
 		char value[VALUE_BYTES];
-		if (value_of(k, i) == list[i].standard)
+		if (get_value(k, i) == setting_table[i].default_value)
 			continue;
-		accuracy_settings_value(k, i, value, sizeof value);
-		text_put(&t, "%s%s=%s", *text ? "," : "", list[i].name, value);
+		accuracy_settings_print_value(k, i, value, sizeof value);
+		text_appendf(&t, "%s%s=%s", *text ? "," : "", setting_table[i].name, value);
 	}
 }
 
-int render_settings_canonical(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e)
+int accuracy_settings_canonicalize(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e)
 {
 	struct accuracy_settings k;
 	int rc = accuracy_settings_read(text, &k, e);

@@ -11,10 +11,10 @@
 #include "common/base/error.h"
 #include "common/plan/plan.h"
 
-enum setting_kind { SETTING_REAL, SETTING_WHOLE, SETTING_CHOICE };
+enum setting_kind { SETTING_REAL, SETTING_INTEGER, SETTING_CHOICE };
 
 /* What a setting affects. */
-enum setting_place {
+enum setting_scope {
 	SETTING_WORLD,	/* the world as it is built */
 	SETTING_PATHS,	/* every path */
 	SETTING_CHAINS, /* the proposals of chains of whole paths */
@@ -25,8 +25,8 @@ enum { SETTING_SWEEP_MAX = 8 };
 struct render_setting {
 	const char *name, *summary;
 	enum setting_kind kind;
-	enum setting_place place;
-	double standard, least, greatest; /* standard is the default */
+	enum setting_scope scope;
+	double default_value, min, max; /* standard is the default */
 	/* For SETTING_CHOICE: the choices, separated by spaces. A numeric choice has that number as its value, any
 	 * other its index from 0 on. */
 	const char *choices;
@@ -56,11 +56,11 @@ int accuracy_settings_read(const char *text, struct accuracy_settings *out, stru
 /* Write the canonical text, as in a plan: the settings that differ from the default, in the order of the list, padded
  * with zero bytes. A canonical text is returned unchanged. */
 void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_ACCURACY_MAX]);
-int render_settings_canonical(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e);
+int accuracy_settings_canonicalize(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e);
 
 /* Writes the value of the setting with that index as --set takes it. */
-void accuracy_settings_value(const struct accuracy_settings *k, size_t index, char *text, size_t size);
+void accuracy_settings_print_value(const struct accuracy_settings *k, size_t index, char *text, size_t size);
 /* Writes "1e-09 to 1", or "double or single". */
-void render_setting_range(const struct render_setting *k, char *text, size_t size);
+void render_setting_print_range(const struct render_setting *k, char *text, size_t size);
 
 #endif

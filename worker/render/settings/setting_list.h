@@ -5,8 +5,8 @@
 SETTING(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,
 	"Residual at which a walk has reached its half vectors, relative to the lobe or the step, whichever is smaller",
 	"0.1", "0.01", "0.001", "0.0001", "1e-05", "1e-06", "1e-08")
-SETTING(iterations, "iterations", SETTING_WHOLE, SETTING_CHAINS, 15, 1, 1000, NULL, "Newton steps before a walk fails",
-	"2", "3", "4", "6", "10", "15", "30")
+SETTING(iterations, "iterations", SETTING_INTEGER, SETTING_CHAINS, 15, 1, 1000, NULL,
+	"Newton steps before a walk fails", "2", "3", "4", "6", "10", "15", "30")
 SETTING(least_step, "least-step", SETTING_REAL, SETTING_CHAINS, 0.3, 1e-9, 1, NULL,
 	"Fraction of a Newton step below which a diverging walk fails", "1", "0.3", "0.1", "0.03", "0.001", "1e-05")
 SETTING(reverse_tolerance, "reverse-tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 0.5, NULL,
@@ -40,5 +40,5 @@ SETTING(media, "media", SETTING_CHOICE, SETTING_WORLD, SETTING_MEDIA_AUTO, SETTI
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
 	"Whether unsupported features are left out or replaced by the nearest supported ones, with a note for each",
 	NULL)
-SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,
+SETTING(sensor, "sensor", SETTING_INTEGER, SETTING_WORLD, 1, 1, 1000, NULL,
 	"Which of the scene's sensors is used, counted from 1", NULL)

@@ -14,24 +14,24 @@ enum { ATTRIBUTE_GROUPS_MAX = 64 };
 
 struct attribute_group {
 	char name[ATTRIBUTE_NAME_MAX]; /* begins with `vertex_` or `face_` */
-	uint32_t channels;	       /* bit k: channel k has been found */
+	uint32_t channel_mask;	       /* bit k: channel k has been found */
 };
 
 struct attribute_groups {
-	const char *kind; /* "vertex_" or "face_" */
+	const char *prefix; /* "vertex_" or "face_" */
 	uint32_t count;
-	int scheme; /* scheme of the last group's endings if the group may continue, otherwise -1 */
-	struct attribute_group of[ATTRIBUTE_GROUPS_MAX];
+	int suffix_scheme; /* scheme of the last group's endings if the group may continue, otherwise -1 */
+	struct attribute_group groups[ATTRIBUTE_GROUPS_MAX];
 };
 
-/* Returns an empty set of groups. kind: "vertex_" or "face_". */
-struct attribute_groups attribute_groups_none(const char *kind);
+/* Returns an empty set of groups. prefix: "vertex_" or "face_". */
+struct attribute_groups attribute_groups_make(const char *prefix);
 
 /* Adds a property; *group: the attribute that it belongs to; *channel: its channel of the attribute. Returns false if
  * there are too many groups. */
 bool attribute_groups_add(struct attribute_groups *g, const char *property, uint32_t *group, uint32_t *channel);
 
 /* Returns the number of channels, or 0 if the group is not an attribute, such as a colour with two channels. */
-uint32_t attribute_group_channels(const struct attribute_group *g);
+uint32_t attribute_group_channel_count(const struct attribute_group *g);
 
 #endif

@@ -13,7 +13,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 {
 	struct curve_points points;
 	int rc = curve_file_read(n, assets, SPLINE_POINTS, &points, e);
-	return rc ? rc : curve_shape_take(n, &points, true, arena, out, e);
+	return rc ? rc : curve_shape_build(n, &points, true, arena, out, e);
 }
 
 SHAPE_OPS(bsplinecurve, {"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS);

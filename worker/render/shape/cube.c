@@ -22,11 +22,11 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	for (uint32_t f = 0; f < 6; f++) {
 		const struct face *face = &faces[f];
 		for (uint32_t i = 0; i < 4; i++) {
-			const double *c = quad_corner[i];
+			const double *c = mesh_quad_corners[i];
 			vec3 p = vec3_madd(vec3_madd(face->n, 2 * c[0] - 1, face->u), 2 * c[1] - 1, face->v);
 			mesh_set_vertex(m, 4 * f + i, p, face->n, c[0], c[1]);
 		}
-		quad_set(m, 2 * f, 4 * f);
+		mesh_set_quad(m, 2 * f, 4 * f);
 	}
 	return 0;
 }

@@ -16,22 +16,22 @@ enum { CHAIN_POINTS_MAX = 1 << 28 };
 /* Tolerances in units of the radius. */
 static const double chain_tolerance = 0.05, tube_tolerance = 0.02;
 
-/* Returns the number of pieces before curve i; for i = c->curves, of all pieces. */
+/* Returns the number of pieces before curve i; for i = c->curve_count, of all pieces. */
 static uint32_t pieces_before(const struct curve *c, uint32_t i)
 {
-	return c->first[i] - (c->spline ? SPLINE_POINTS - 1 : 1) * i;
+	return c->first_point[i] - (c->is_spline ? SPLINE_POINTS - 1 : 1) * i;
 }
 
 static int add_rings(const struct curve *c, uint32_t i, struct list *rings, double tolerance)
 {
-	double step = 1.0 / pieces_before(c, c->curves), v = step * pieces_before(c, i);
-	const double(*points)[4] = c->point + c->first[i];
-	uint32_t count = c->first[i + 1] - c->first[i];
-	return c->spline ? spline_add(rings, points, count, tolerance, v, step)
-			 : tube_add_chain(rings, points, count, v, step);
+	double step = 1.0 / pieces_before(c, c->curve_count), v = step * pieces_before(c, i);
+	const double(*points)[4] = c->point + c->first_point[i];
+	uint32_t count = c->first_point[i + 1] - c->first_point[i];
+	return c->is_spline ? spline_add_rings(rings, points, count, tolerance, v, step)
+			    : tube_add_chain(rings, points, count, v, step);
 }
 
-static int add_point(struct list *points, const struct chain_point *p)
+static int add_chain_point(struct list *points, const struct chain_point *p)
 {
 	struct chain_point *new = list_push(points);
 	if (!new)
@@ -40,72 +40,73 @@ static int add_point(struct list *points, const struct chain_point *p)
 	return 0;
 }
 
-static int linear_chain(const struct curve *c, uint32_t i, struct list *points)
+static int make_linear_chain(const struct curve *c, uint32_t i, struct list *points)
 {
-	double pieces = pieces_before(c, c->curves);
+	double pieces = pieces_before(c, c->curve_count);
 	int rc = 0;
-	for (uint32_t k = c->first[i]; k < c->first[i + 1] && !rc; k++)
-		rc = add_point(points, &(struct chain_point){
-					       mesh_load(c->point[k]), {0, 0, 0}, c->point[k][3], (k - i) / pieces});
+	for (uint32_t k = c->first_point[i]; k < c->first_point[i + 1] && !rc; k++)
+		rc = add_chain_point(
+			points,
+			&(struct chain_point){vec3_load(c->point[k]), {0, 0, 0}, c->point[k][3], (k - i) / pieces});
 	return rc;
 }
 
-static int spline_chain(const struct curve *c, uint32_t i, struct list *points)
+static int make_spline_chain(const struct curve *c, uint32_t i, struct list *points)
 {
-	struct list rings = {.size = sizeof(struct tube_ring)};
+	struct list rings = {.item_size = sizeof(struct tube_ring)};
 	int rc = add_rings(c, i, &rings, chain_tolerance);
 	const struct tube_ring *r = rings.items;
 	for (size_t k = 0; k < rings.count && !rc; k++)
-		rc = add_point(points, &(struct chain_point){r[k].center, r[k].axis, r[k].radius, r[k].v});
-	list_free(&rings);
+		rc = add_chain_point(points, &(struct chain_point){r[k].center, r[k].axis, r[k].radius, r[k].v});
+	list_fini(&rings);
 	return rc;
 }
 
-int curve_chain(const struct curve *c, uint32_t i, struct list *points)
+int curve_make_chain(const struct curve *c, uint32_t i, struct list *points)
 {
 	points->count = 0;
 	liveness_tick();
-	return c->spline ? spline_chain(c, i, points) : linear_chain(c, i, points);
+	return c->is_spline ? make_spline_chain(c, i, points) : make_linear_chain(c, i, points);
 }
 
-static void grow(struct curve *c, const struct chain_point *p)
+static void extend_bounds(struct curve *c, const struct chain_point *p)
 {
 	double r = p->radius;
 	vec3 q = p->center;
 	c->low = (vec3){fmin(c->low.x, q.x - r), fmin(c->low.y, q.y - r), fmin(c->low.z, q.z - r)};
 	c->high = (vec3){fmax(c->high.x, q.x + r), fmax(c->high.y, q.y + r), fmax(c->high.z, q.z + r)};
-	c->thickest = fmax(c->thickest, r);
+	c->max_radius = fmax(c->max_radius, r);
 }
 
 int curve_measure(struct curve *c)
 {
-	struct list points = {.size = sizeof(struct chain_point)};
+	struct list points = {.item_size = sizeof(struct chain_point)};
 	uint64_t sum = 0;
 	int rc = 0;
 	c->low = (vec3){INFINITY, INFINITY, INFINITY};
 	c->high = vec3_neg(c->low);
-	c->thickest = 0;
-	for (uint32_t i = 0; i < c->curves && !rc; i++) {
-		rc = curve_chain(c, i, &points);
+	c->max_radius = 0;
+	for (uint32_t i = 0; i < c->curve_count && !rc; i++) {
+		rc = curve_make_chain(c, i, &points);
 		for (size_t k = 0; k < points.count && !rc; k++)
-			grow(c, (const struct chain_point *)points.items + k);
+			extend_bounds(c, (const struct chain_point *)points.items + k);
 		sum += points.count;
 		if (!rc && sum > CHAIN_POINTS_MAX)
 			rc = -EFBIG;
 	}
-	c->chain_points = (uint32_t)sum;
-	list_free(&points);
+	c->chain_point_count = (uint32_t)sum;
+	list_fini(&points);
 	return rc;
 }
 
-int curve_mesh(const struct curve *c, struct arena *arena, struct mesh *out)
+int curve_make_mesh(const struct curve *c, struct arena *arena, struct mesh *out)
 {
-	struct list rings = {.size = sizeof(struct tube_ring)};
+	struct list rings = {.item_size = sizeof(struct tube_ring)};
 	int rc = 0;
-	for (uint32_t i = 0; i < c->curves && !rc; i++)
+	for (uint32_t i = 0; i < c->curve_count && !rc; i++)
 		rc = add_rings(c, i, &rings, tube_tolerance);
 	if (!rc)
-		rc = tube_mesh(&rings, arena, out);
-	list_free(&rings);
+		rc = tube_make_mesh(&rings, arena, out);
+	list_fini(&rings);
 	return rc;
 }

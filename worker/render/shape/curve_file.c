@@ -22,73 +22,74 @@ enum { POINTS_MAX = 1 << 27 };
 
 struct curve_reader {
 	const struct scene_node *node;
-	const char *name;
+	const char *file_name;
 	mat4 to_world;
-	double radius;	 /* of all points; negative: each line has its own */
-	uint32_t least;	 /* least number of points of a curve */
-	bool drop_short; /* curves with fewer points are left out */
-	bool begun;	 /* a curve has been begun */
+	double radius;	     /* of all points; negative: each line has its own */
+	uint32_t min_points; /* least number of points of a curve */
+	bool drop_short;     /* curves with fewer points are left out */
+	bool in_curve;	     /* a curve has been begun */
 	struct curve_points *out;
 	struct error *error;
 };
 
 void curve_points_free(struct curve_points *p)
 {
-	list_free(&p->points);
-	list_free(&p->firsts);
+	list_fini(&p->point_list);
+	list_fini(&p->first_point_list);
 }
 
 static int out_of_memory(const struct curve_reader *r)
 {
-	return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
+	return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->file_name);
 }
 
-static int add_start(struct curve_reader *r)
+static int add_curve_start(struct curve_reader *r)
 {
-	uint32_t *first = list_push(&r->out->firsts);
+	uint32_t *first = list_push(&r->out->first_point_list);
 	if (!first)
 		return out_of_memory(r);
-	*first = (uint32_t)r->out->points.count;
+	*first = (uint32_t)r->out->point_list.count;
 	return 0;
 }
 
 static int add_point(struct curve_reader *r, const double p[4], int line)
 {
-	struct list *points = &r->out->points;
-	int rc = r->begun ? 0 : add_start(r);
+	struct list *points = &r->out->point_list;
+	int rc = r->in_curve ? 0 : add_curve_start(r);
 	if (rc)
 		return rc;
 	if (points->count >= POINTS_MAX)
-		return node_error(r->node, r->error, EFBIG, "%s: more than %d control points", r->name, POINTS_MAX);
-	vec3 at = mat4_point(&r->to_world, mesh_load(p));
-	const double sizes[] = {p[0], p[1], p[2], p[3], at.x, at.y, at.z};
-	bool good = p[3] >= 0;
-	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
-		good = good && fabs(sizes[i]) <= MESH_COORDINATE_MAX;
-	if (!good)
-		return node_error(r->node, r->error, ERANGE, "%s:%d: control point (%g, %g, %g) of radius %g", r->name,
-				  line, p[0], p[1], p[2], p[3]);
+		return node_error(r->node, r->error, EFBIG, "%s: more than %d control points", r->file_name,
+				  POINTS_MAX);
+	vec3 world_position = mat4_point(&r->to_world, vec3_load(p));
+	const double coordinates[] = {p[0], p[1], p[2], p[3], world_position.x, world_position.y, world_position.z};
+	bool in_range = p[3] >= 0;
+	for (size_t i = 0; i < sizeof coordinates / sizeof *coordinates; i++)
+		in_range = in_range && fabs(coordinates[i]) <= MESH_COORDINATE_MAX;
+	if (!in_range)
+		return node_error(r->node, r->error, ERANGE, "%s:%d: control point (%g, %g, %g) of radius %g",
+				  r->file_name, line, p[0], p[1], p[2], p[3]);
 	double *new = list_push(points);
 	if (!new)
 		return out_of_memory(r);
-	mesh_store(new, at);
+	vec3_store(new, world_position);
 	new[3] = p[3];
-	r->begun = true;
+	r->in_curve = true;
 	return 0;
 }
 
 static int end_curve(struct curve_reader *r, int line)
 {
-	struct list *points = &r->out->points, *firsts = &r->out->firsts;
-	if (!r->begun)
+	struct list *points = &r->out->point_list, *firsts = &r->out->first_point_list;
+	if (!r->in_curve)
 		return 0;
-	r->begun = false;
+	r->in_curve = false;
 	uint32_t first = ((const uint32_t *)firsts->items)[firsts->count - 1], count = (uint32_t)points->count - first;
-	if (count >= r->least)
+	if (count >= r->min_points)
 		return 0;
 	if (!r->drop_short)
 		return node_error(r->node, r->error, EINVAL, "%s:%d: a curve of %u control point%s; it needs %u",
-				  r->name, line, count, count == 1 ? "" : "s", r->least);
+				  r->file_name, line, count, count == 1 ? "" : "s", r->min_points);
 	points->count = first;
 	firsts->count--;
 	return 0;
@@ -96,19 +97,19 @@ static int end_curve(struct curve_reader *r, int line)
 
 static int read_line(struct curve_reader *r, const struct text_line *l)
 {
-	enum { NUMBERS = 4 };
+	enum { POINT_NUMBERS = 4 };
 	const char *p = l->word, *end = l->rest + l->rest_length;
-	double v[NUMBERS] = {0, 0, 0, r->radius};
+	double v[POINT_NUMBERS] = {0, 0, 0, r->radius};
 	if (l->word_length == 0)
 		return end_curve(r, l->number);
-	int count = r->radius < 0 ? NUMBERS : NUMBERS - 1;
+	int count = r->radius < 0 ? POINT_NUMBERS : POINT_NUMBERS - 1;
 	for (int i = 0; i < count; i++) {
 		while (p < end && number_is_blank(*p))
 			p++;
 		p = number_scan_printed(p, end, &v[i]);
 		if (!p)
-			return node_error(r->node, r->error, EINVAL, "%s:%d: a control point has %d numbers", r->name,
-					  l->number, count);
+			return node_error(r->node, r->error, EINVAL, "%s:%d: a control point has %d numbers",
+					  r->file_name, l->number, count);
 	}
 	return add_point(r, v, l->number);
 }
@@ -125,16 +126,16 @@ static int read_text(struct curve_reader *r, const struct asset *a)
 	return rc ? rc : end_curve(r, lines.number);
 }
 
-static const char binary_name[] = "BINARY_HAIR";
-enum { BINARY_NAME = sizeof binary_name - 1, BINARY_HEAD = BINARY_NAME + 4 };
+static const char binary_magic[] = "BINARY_HAIR";
+enum { BINARY_MAGIC_SIZE = sizeof binary_magic - 1, BINARY_HEADER_SIZE = BINARY_MAGIC_SIZE + 4 };
 
 static int read_binary(struct curve_reader *r, const struct asset *a)
 {
-	const unsigned char *p = (const unsigned char *)a->bytes + BINARY_HEAD,
+	const unsigned char *p = (const unsigned char *)a->bytes + BINARY_HEADER_SIZE,
 			    *end = (const unsigned char *)a->bytes + a->size;
-	uint32_t left = get32((const unsigned char *)a->bytes + BINARY_NAME);
+	uint32_t remaining = get32((const unsigned char *)a->bytes + BINARY_MAGIC_SIZE);
 	int rc = 0;
-	while (left > 0 && !rc) {
+	while (remaining > 0 && !rc) {
 		double v[4] = {0, 0, 0, r->radius};
 		liveness_tick();
 		if (end - p >= 4 && isinf(get_float(p))) {
@@ -143,12 +144,12 @@ static int read_binary(struct curve_reader *r, const struct asset *a)
 			continue;
 		}
 		if (end - p < 12)
-			return node_error(r->node, r->error, EINVAL, "%s: ends before its last %u vertices", r->name,
-					  left);
+			return node_error(r->node, r->error, EINVAL, "%s: ends before its last %u vertices",
+					  r->file_name, remaining);
 		for (int k = 0; k < 3; k++, p += 4)
 			v[k] = (double)get_float(p);
 		rc = add_point(r, v, 0);
-		left--;
+		remaining--;
 	}
 	return rc ? rc : end_curve(r, 0);
 }
@@ -157,35 +158,38 @@ static int read_file(struct curve_reader *r, const struct asset_source *assets)
 {
 	struct asset a;
 	struct curve_points *out = r->out;
-	*out = (struct curve_points){.points = {.size = sizeof *out->point}, .firsts = {.size = sizeof *out->first}};
-	r->name = node_string(r->node, "filename", "");
+	*out = (struct curve_points){.point_list = {.item_size = sizeof *out->point},
+				     .first_point_list = {.item_size = sizeof *out->first_point}};
+	r->file_name = node_string(r->node, "filename", "");
 	r->to_world = node_transform(r->node, "to_world");
-	int rc = mesh_open(r->node, assets, &a, r->error);
+	int rc = mesh_open_file(r->node, assets, &a, r->error);
 	if (rc)
 		return rc;
-	bool binary = r->radius >= 0 && a.size >= BINARY_HEAD && memcmp(a.bytes, binary_name, BINARY_NAME) == 0;
+	bool binary =
+		r->radius >= 0 && a.size >= BINARY_HEADER_SIZE && memcmp(a.bytes, binary_magic, BINARY_MAGIC_SIZE) == 0;
 	rc = binary ? read_binary(r, &a) : read_text(r, &a);
 	assets->close(assets->user, &a);
-	out->curves = (uint32_t)out->firsts.count;
-	if (!rc && out->curves == 0)
-		rc = node_error(r->node, r->error, EINVAL, "%s: has no curve", r->name);
+	out->curve_count = (uint32_t)out->first_point_list.count;
+	if (!rc && out->curve_count == 0)
+		rc = node_error(r->node, r->error, EINVAL, "%s: has no curve", r->file_name);
 	if (!rc)
-		rc = add_start(r); /* the end of the last curve */
+		rc = add_curve_start(r); /* the end of the last curve */
 	if (rc) {
 		curve_points_free(out);
 		return rc;
 	}
-	out->point = out->points.items;
-	out->first = out->firsts.items;
-	out->count = (uint32_t)out->points.count;
+	out->point = out->point_list.items;
+	out->first_point = out->first_point_list.items;
+	out->point_count = (uint32_t)out->point_list.count;
 	return 0;
 }
 
-int curve_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t least,
+int curve_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t min_points,
 		    struct curve_points *out, struct error *e)
 {
-	return read_file(&(struct curve_reader){.node = n, .radius = -1, .least = least, .out = out, .error = e},
-			 assets);
+	return read_file(
+		&(struct curve_reader){.node = n, .radius = -1, .min_points = min_points, .out = out, .error = e},
+		assets);
 }
 
 int curve_file_read_hair(const struct scene_node *n, const struct asset_source *assets, double radius,
@@ -193,6 +197,6 @@ int curve_file_read_hair(const struct scene_node *n, const struct asset_source *
 {
 	return read_file(
 		&(struct curve_reader){
-			.node = n, .radius = radius, .least = 2, .drop_short = true, .out = out, .error = e},
+			.node = n, .radius = radius, .min_points = 2, .drop_short = true, .out = out, .error = e},
 		assets);
 }

@@ -8,7 +8,7 @@
 
 /* Copies the points to the arena as the geometry of shape n, and frees them, also on error. Returns 0, -EFBIG or
  * -ENOMEM. */
-int curve_shape_take(const struct scene_node *n, struct curve_points *points, bool spline, struct arena *arena,
-		     struct shape_geometry *out, struct error *e);
+int curve_shape_build(const struct scene_node *n, struct curve_points *points, bool spline, struct arena *arena,
+		      struct shape_geometry *out, struct error *e);
 
 #endif

@@ -7,9 +7,9 @@
 
 #include <float.h>
 
-static vec3 point_of(const struct scene_node *n, const char *name, vec3 fallback)
+static vec3 point_param(const struct scene_node *n, const char *name, vec3 fallback)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	return p ? p->value.as.point : fallback;
 }
 
@@ -18,7 +18,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 {
 	(void)assets;
 	struct mesh *m = &out->mesh;
-	vec3 p0 = point_of(n, "p0", (vec3){0, 0, 0}), p1 = point_of(n, "p1", (vec3){0, 0, 1}), axis = vec3_sub(p1, p0);
+	vec3 p0 = point_param(n, "p0", (vec3){0, 0, 0}), p1 = point_param(n, "p1", (vec3){0, 0, 1}),
+	     axis = vec3_sub(p1, p0);
 	double length = vec3_length(axis), radius = node_float(n, "radius", 1) * round_radius();
 	if (!(length > 0) || !(length <= MESH_COORDINATE_MAX))
 		return node_error(n, e, EINVAL, "a cylinder from (%g, %g, %g) to (%g, %g, %g)", p0.x, p0.y, p0.z, p1.x,

@@ -12,9 +12,9 @@
 		"max_smooth_angle", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 180, NULL \
 	}
 /* The parameters of every shape. */
-#define SHAPE_PARAMS                                                                        \
-	{"to_world", UNDERSTOOD(VALUE_PLACE)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)},    \
-		{"interior", UNDERSTOOD(VALUE_NODE)}, {"exterior", UNDERSTOOD(VALUE_NODE)}, \
+#define SHAPE_PARAMS                                                                                      \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM_OR_ANIMATION)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, \
+		{"interior", UNDERSTOOD(VALUE_NODE)}, {"exterior", UNDERSTOOD(VALUE_NODE)},               \
 		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS
 
 #endif

@@ -8,17 +8,17 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	(void)assets;
-	enum { RIM = ROUND_SEGMENTS + 1 };
+	enum { RIM_VERTICES = ROUND_SEGMENTS + 1 };
 	struct mesh *m = &out->mesh;
-	if (!mesh_alloc(m, RIM + ROUND_SEGMENTS, ROUND_SEGMENTS, true, true, arena))
+	if (!mesh_alloc(m, RIM_VERTICES + ROUND_SEGMENTS, ROUND_SEGMENTS, true, true, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
 	const vec3 up = {0, 0, 1};
 	double radius = round_radius();
-	for (uint32_t i = 0; i < RIM; i++)
+	for (uint32_t i = 0; i < RIM_VERTICES; i++)
 		mesh_set_vertex(m, i, vec3_scale(radius, round_direction(i)), up, 1, (double)i / ROUND_SEGMENTS);
 	for (uint32_t i = 0; i < ROUND_SEGMENTS; i++) {
-		mesh_set_vertex(m, RIM + i, (vec3){0, 0, 0}, up, 0, (i + 0.5) / ROUND_SEGMENTS);
-		m->index[i][0] = RIM + i;
+		mesh_set_vertex(m, RIM_VERTICES + i, (vec3){0, 0, 0}, up, 0, (i + 0.5) / ROUND_SEGMENTS);
+		m->index[i][0] = RIM_VERTICES + i;
 		m->index[i][1] = i;
 		m->index[i][2] = i + 1;
 	}

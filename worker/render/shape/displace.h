@@ -49,7 +49,7 @@ struct displacement {
 
 /* Replaces g by the displaced mesh, which has normals; errors name n. Returns 0, -E2BIG if there would be more than
  * MESH_TRIANGLES_MAX triangles, -EINVAL if texture coordinates are missing, -ERANGE or -ENOMEM. */
-int displace(struct shape_geometry *g, const struct displacement *d, struct arena *arena, const struct scene_node *n,
-	     struct error *e);
+int displace_geometry(struct shape_geometry *g, const struct displacement *d, struct arena *arena,
+		      const struct scene_node *n, struct error *e);
 
 #endif

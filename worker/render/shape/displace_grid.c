@@ -8,7 +8,7 @@ struct position {
 	uint32_t vertex;
 };
 
-static int compare_places(const struct position *a, const struct position *b)
+static int compare_coordinates(const struct position *a, const struct position *b)
 {
 	for (int k = 0; k < 3; k++)
 		if (a->p[k] != b->p[k])
@@ -19,7 +19,7 @@ static int compare_places(const struct position *a, const struct position *b)
 static int compare_positions(const void *a, const void *b)
 {
 	const struct position *x = a, *y = b;
-	int order = compare_places(x, y);
+	int order = compare_coordinates(x, y);
 	return order ? order : x->vertex < y->vertex ? -1 : x->vertex > y->vertex;
 }
 
@@ -36,24 +36,24 @@ static bool weld_positions(struct displace_grid *g, const struct mesh *base, str
 	}
 	qsort(sorted, n, sizeof *sorted, compare_positions);
 	for (uint32_t i = 0; i < n; i++) {
-		g->base_places += i == 0 || compare_places(&sorted[i - 1], &sorted[i]) != 0;
-		g->place[sorted[i].vertex] = g->base_places - 1;
+		g->base_place_count += i == 0 || compare_coordinates(&sorted[i - 1], &sorted[i]) != 0;
+		g->place[sorted[i].vertex] = g->base_place_count - 1;
 	}
 	return true;
 }
 
 /* The edge of a triangle's side: its two places in ascending order, then the vertices there. */
 struct edge {
-	uint32_t end[4];
+	uint32_t ends[4];
 	uint32_t side;
-	bool backwards;
+	bool is_reversed;
 };
 
 static int compare_ends(const struct edge *a, const struct edge *b, int count)
 {
 	for (int k = 0; k < count; k++)
-		if (a->end[k] != b->end[k])
-			return a->end[k] < b->end[k] ? -1 : 1;
+		if (a->ends[k] != b->ends[k])
+			return a->ends[k] < b->ends[k] ? -1 : 1;
 	return 0;
 }
 
@@ -79,49 +79,53 @@ static bool number_edges(struct displace_grid *g, const struct mesh *base, struc
 	}
 	qsort(sorted, n, sizeof *sorted, compare_edges);
 	for (size_t s = 0; s < n; s++) {
-		g->place_edges += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 2) != 0;
-		g->vertex_edges += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 4) != 0;
-		g->side[sorted[s].side] =
-			(struct displace_side){g->vertex_edges - 1, g->place_edges - 1, sorted[s].backwards};
+		g->place_edge_count += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 2) != 0;
+		g->vertex_edge_count += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 4) != 0;
+		g->side[sorted[s].side] = (struct displace_side){g->vertex_edge_count - 1, g->place_edge_count - 1,
+								 sorted[s].is_reversed};
 	}
 	return true;
 }
 
 bool displace_grid_init(struct displace_grid *g, const struct mesh *base, uint32_t parts, struct arena *arena)
 {
-	*g = (struct displace_grid){
-		.parts = parts, .base_vertices = base->vertex_count, .index = (const uint32_t(*)[3])base->index};
+	*g = (struct displace_grid){.parts_per_edge = parts,
+				    .base_vertex_count = base->vertex_count,
+				    .index = (const uint32_t(*)[3])base->index};
 	if (!weld_positions(g, base, arena) || (parts > 1 && !number_edges(g, base, arena)))
 		return false;
-	uint64_t inner = parts - 1, inside = parts > 2 ? inner * (parts - 2) / 2 : 0;
-	g->border = base->vertex_count + g->vertex_edges * inner;
-	g->vertices = g->border + base->triangle_count * inside;
-	g->places = g->base_places + g->place_edges * inner;
+	uint64_t points_per_edge = parts - 1, points_per_triangle = parts > 2 ? points_per_edge * (parts - 2) / 2 : 0;
+	g->border_vertex_count = base->vertex_count + g->vertex_edge_count * points_per_edge;
+	g->vertex_count = g->border_vertex_count + base->triangle_count * points_per_triangle;
+	g->place_count = g->base_place_count + g->place_edge_count * points_per_edge;
 	return true;
 }
 
-static struct displace_point on_side(const struct displace_grid *g, uint32_t triangle, uint32_t k, uint32_t step)
+static struct displace_point point_on_side(const struct displace_grid *g, uint32_t triangle, uint32_t k, uint32_t step)
 {
 	const struct displace_side *s = &g->side[3 * (size_t)triangle + k];
-	uint32_t inner = g->parts - 1, at = (s->backwards ? g->parts - step : step) - 1;
-	return (struct displace_point){g->base_vertices + s->vertices * inner + at,
-				       g->base_places + s->places * inner + at, false};
+	uint32_t inner = g->parts_per_edge - 1, offset = (s->is_reversed ? g->parts_per_edge - step : step) - 1;
+	return (struct displace_point){g->base_vertex_count + s->vertex_edge * inner + offset,
+				       g->base_place_count + s->place_edge * inner + offset, false};
 }
 
-struct displace_point displace_grid_at(const struct displace_grid *g, uint32_t triangle, uint32_t i, uint32_t j)
+struct displace_point displace_grid_point(const struct displace_grid *g, uint32_t triangle, uint32_t i, uint32_t j)
 {
-	uint32_t n = g->parts, corner = i == n ? 1 : j == n ? 2 : 0;
+	uint32_t n = g->parts_per_edge, corner = i == n ? 1 : j == n ? 2 : 0;
 	if (corner || i + j == 0) {
 		uint32_t v = g->index[triangle][corner];
 		return (struct displace_point){v, g->place[v], false};
 	}
 	if (j == 0)
-		return on_side(g, triangle, 0, i);
+		return point_on_side(g, triangle, 0, i);
 	if (i + j == n)
-		return on_side(g, triangle, 1, j);
+		return point_on_side(g, triangle, 1, j);
 	if (i == 0)
-		return on_side(g, triangle, 2, n - j);
+		return point_on_side(g, triangle, 2, n - j);
 	/* Row i has n - 1 - i points inside the triangle; those of earlier rows come first. */
-	uint64_t before = (uint64_t)(i - 1) * (2 * n - 2 - i) / 2, inside = (uint64_t)(n - 1) * (n - 2) / 2;
-	return (struct displace_point){(uint32_t)(g->border + triangle * inside + before + j - 1), 0, true};
+	uint64_t points_in_earlier_rows = (uint64_t)(i - 1) * (2 * n - 2 - i) / 2,
+		 points_per_triangle = (uint64_t)(n - 1) * (n - 2) / 2;
+	return (struct displace_point){
+		(uint32_t)(g->border_vertex_count + triangle * points_per_triangle + points_in_earlier_rows + j - 1), 0,
+		true};
 }

@@ -18,22 +18,22 @@
 
 #include <string.h>
 
-enum number_type { F32, U8, U16, U32, TYPES };
+enum number_type { F32, U8, U16, U32, NUMBER_TYPES };
 static const struct {
 	const char *name;
 	size_t size;
-} types[TYPES] = {{"f32", 4}, {"u8", 1}, {"u16", 2}, {"u32", 4}};
+} number_types[NUMBER_TYPES] = {{"f32", 4}, {"u8", 1}, {"u16", 2}, {"u32", 4}};
 
 /* An array of vectors in a buffer. */
 struct accessor {
-	const unsigned char *at;
+	const unsigned char *data;
 	uint64_t stride, count;
 	enum number_type type;
 };
 
 /* Reads the description of an array. Returns 0, 1 if the property is absent, or a negative error code. */
 static int read_accessor(struct accessor *a, const struct scene_node *n, const char *name, unsigned components,
-			 unsigned allowed, const struct asset_range *buffer, struct error *e)
+			 unsigned allowed_types, const struct asset_range *buffer, struct error *e)
 {
 	const char *text = node_string(n, name, NULL);
 	if (!text)
@@ -45,14 +45,14 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 		p = p && *p == ' ' && x[i] >= 0 ? p + 1 : NULL;
 	}
 	unsigned t = 0;
-	while (p && t < TYPES && strcmp(p, types[t].name) != 0)
+	while (p && t < NUMBER_TYPES && strcmp(p, number_types[t].name) != 0)
 		t++;
-	if (!p || t == TYPES || !(allowed >> t & 1))
+	if (!p || t == NUMBER_TYPES || !(allowed_types >> t & 1))
 		return node_error(
 			n, e, EINVAL,
 			"`%s` has to be \"first stride count type\": offsets in bytes, a number of elements, and %s",
-			name, allowed == 1u << F32 ? "f32" : "a type");
-	uint64_t size = types[t].size * components, first = (uint64_t)x[0], stride = (uint64_t)x[1],
+			name, allowed_types == 1u << F32 ? "f32" : "a type");
+	uint64_t size = number_types[t].size * components, first = (uint64_t)x[0], stride = (uint64_t)x[1],
 		 count = (uint64_t)x[2];
 	if (count > UINT32_MAX || (stride < size && count > 1) || stride > buffer->size || first > buffer->size ||
 	    (count > 0 && (buffer->size - first < size || (count - 1) * stride > buffer->size - first - size)))
@@ -61,15 +61,15 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 	return 0;
 }
 
-static uint32_t index_component(const struct accessor *a, uint64_t i, unsigned component)
+static uint32_t component_bits(const struct accessor *a, uint64_t i, unsigned component)
 {
-	const unsigned char *p = a->at + i * a->stride + types[a->type].size * component;
-	return (uint32_t)get_bytes(p, (int)types[a->type].size);
+	const unsigned char *p = a->data + i * a->stride + number_types[a->type].size * component;
+	return (uint32_t)get_bytes(p, (int)number_types[a->type].size);
 }
 
 static double read_number(const struct accessor *a, uint64_t i, unsigned component)
 {
-	uint32_t bits = index_component(a, i, component);
+	uint32_t bits = component_bits(a, i, component);
 	float x;
 	if (a->type != F32)
 		return bits / (a->type == U8 ? 255.0 : 65535.0);
@@ -77,15 +77,15 @@ static double read_number(const struct accessor *a, uint64_t i, unsigned compone
 	return (double)x;
 }
 
-enum mode { TRIANGLES, STRIP, FAN };
+enum primitive_mode { TRIANGLES, STRIP, FAN };
 
-static uint64_t triangles_of(enum mode mode, uint64_t corners)
+static uint64_t mode_triangle_count(enum primitive_mode mode, uint64_t corners)
 {
 	return mode == TRIANGLES ? corners / 3 : corners > 2 ? corners - 2 : 0;
 }
 
 /* Returns the position of corner k of triangle t among the indices; in strips, every second triangle is reversed. */
-static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
+static uint64_t mode_corner(enum primitive_mode mode, uint64_t t, unsigned k)
 {
 	if (mode == TRIANGLES)
 		return 3 * t + k;
@@ -96,12 +96,12 @@ static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
 
 static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct accessor *position,
 		     const struct accessor *normal, const struct accessor *texcoord, const struct accessor *index,
-		     enum mode mode, struct error *e)
+		     enum primitive_mode mode, struct error *e)
 {
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		for (unsigned k = 0; k < 3; k++)
 			m->position[i][k] = read_number(position, i, k);
-		if (!vec3_is_finite(mesh_load(m->position[i])))
+		if (!vec3_is_finite(vec3_load(m->position[i])))
 			return node_error(n, e, EINVAL, "vertex %u is not finite", i);
 		if (m->normal)
 			mesh_set_normal(m, i,
@@ -116,8 +116,8 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 	}
 	for (uint32_t t = 0; t < m->triangle_count; t++)
 		for (unsigned k = 0; k < 3; k++) {
-			uint64_t c = corner_of(mode, t, k);
-			uint64_t v = index ? index_component(index, c, 0) : c;
+			uint64_t c = mode_corner(mode, t, k);
+			uint64_t v = index ? component_bits(index, c, 0) : c;
 			if (v >= m->vertex_count)
 				return node_error(n, e, EINVAL, "index %llu is out of range; there are %u vertices",
 						  (unsigned long long)v, m->vertex_count);
@@ -130,18 +130,18 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
 			 unsigned components, const struct asset_range *buffer, struct arena *arena, struct error *e)
 {
-	struct accessor from;
-	int rc = read_accessor(&from, n, name, components, 1u << F32 | 1u << U8 | 1u << U16, buffer, e);
+	struct accessor source;
+	int rc = read_accessor(&source, n, name, components, 1u << F32 | 1u << U8 | 1u << U16, buffer, e);
 	if (rc)
 		return rc < 0 ? rc : 0;
-	if (from.count != m->vertex_count)
+	if (source.count != m->vertex_count)
 		return node_error(n, e, EINVAL, "`%s` has another number of entries than `position`", name);
 	struct attribute *a = mesh_add_attribute(m, attribute, false, components, 3, arena);
 	if (!a)
 		return node_error(n, e, ENOMEM, "out of memory");
 	for (uint32_t i = 0; i < m->vertex_count; i++)
 		for (unsigned k = 0; k < components; k++)
-			mesh_set_attribute(a, i, k, read_number(&from, i, k));
+			mesh_set_attribute(a, i, k, read_number(&source, i, k));
 	return 0;
 }
 
@@ -149,21 +149,23 @@ static int make_mesh(const struct scene_node *n, const struct asset_range *buffe
 		     struct error *e)
 {
 	struct accessor position, normal, texcoord, index;
-	const unsigned floats = 1u << F32, shares = floats | 1u << U8 | 1u << U16,
-		       wholes = 1u << U8 | 1u << U16 | 1u << U32;
-	int rc = read_accessor(&position, n, "position", 3, floats, buffer, e);
+	const unsigned float_types = 1u << F32, normalized_types = float_types | 1u << U8 | 1u << U16,
+		       integer_types = 1u << U8 | 1u << U16 | 1u << U32;
+	int rc = read_accessor(&position, n, "position", 3, float_types, buffer, e);
 	if (rc > 0)
 		return node_error(n, e, EINVAL, "needs a `position`");
-	int no_normal = rc < 0 ? rc : read_accessor(&normal, n, "normal", 3, floats, buffer, e);
-	int no_uv = no_normal < 0 ? no_normal : read_accessor(&texcoord, n, "texcoord", 2, shares, buffer, e);
-	int no_index = no_uv < 0 ? no_uv : read_accessor(&index, n, "index", 1, wholes, buffer, e);
+	int no_normal = rc < 0 ? rc : read_accessor(&normal, n, "normal", 3, float_types, buffer, e);
+	int no_uv = no_normal < 0 ? no_normal : read_accessor(&texcoord, n, "texcoord", 2, normalized_types, buffer, e);
+	int no_index = no_uv < 0 ? no_uv : read_accessor(&index, n, "index", 1, integer_types, buffer, e);
 	if (no_index < 0)
 		return no_index;
 	if ((!no_normal && normal.count != position.count) || (!no_uv && texcoord.count != position.count))
 		return node_error(n, e, EINVAL, "the numbers of positions, normals and texture coordinates differ");
-	const char *said = node_string(n, "mode", "triangles");
-	enum mode mode = strcmp(said, "strip") == 0 ? STRIP : strcmp(said, "fan") == 0 ? FAN : TRIANGLES;
-	uint64_t corners = no_index ? position.count : index.count, triangles = triangles_of(mode, corners);
+	const char *mode_name = node_string(n, "mode", "triangles");
+	enum primitive_mode mode = strcmp(mode_name, "strip") == 0 ? STRIP
+				   : strcmp(mode_name, "fan") == 0 ? FAN
+								   : TRIANGLES;
+	uint64_t corners = no_index ? position.count : index.count, triangles = mode_triangle_count(mode, corners);
 	if (mode == TRIANGLES && corners % 3)
 		return node_error(n, e, EINVAL, "%llu corners are not a whole number of triangles",
 				  (unsigned long long)corners);

@@ -17,7 +17,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		return node_error(n, e, ENOTSUP, "\"reduction\" is only supported as 0: all hair is rendered");
 	double scale = vec3_length(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	int rc = curve_file_read_hair(n, assets, scale * node_float(n, "radius", 0.025), &points, e);
-	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
+	return rc ? rc : curve_shape_build(n, &points, false, arena, out, e);
 }
 
 SHAPE_OPS(hair, {"filename", UNDERSTOOD(VALUE_STRING)},

@@ -18,26 +18,26 @@
 
 #include <string.h>
 
-struct field {
-	struct image picture;
+struct height_field {
+	struct image image;
 	double scale;
 };
 
-static double height_at(const struct field *f, uint32_t x, uint32_t y)
+static double height_at(const struct height_field *f, uint32_t x, uint32_t y)
 {
-	const float *p = f->picture.pixels + ((size_t)y * f->picture.width + x) * f->picture.channels;
+	const float *p = f->image.pixels + ((size_t)y * f->image.width + x) * f->image.channels;
 	double z = (double)p[0];
-	if (f->picture.channels == 3)
+	if (f->image.channels == 3)
 		z = 0.212671 * (double)p[0] + 0.71516 * (double)p[1] + 0.072169 * (double)p[2];
 	return f->scale * z;
 }
 
 /* Returns the texture inside nested `scale` textures, and multiplies *scale by their factors. */
-static const struct scene_node *unscaled(const struct scene_node *texture, double *scale)
+static const struct scene_node *unwrap_scale(const struct scene_node *texture, double *scale)
 {
 	while (texture && strcmp(texture->type, "scale") == 0) {
-		const struct property *by = node_find(texture, "scale");
-		if (by && by->value.type != VALUE_FLOAT && by->value.type != VALUE_INT)
+		const struct property *factor = node_find_property(texture, "scale");
+		if (factor && factor->value.type != VALUE_FLOAT && factor->value.type != VALUE_INT)
 			break;
 		*scale *= node_float(texture, "scale", 1);
 		texture = node_child(texture, PLUGIN_TEXTURE, 0);
@@ -46,28 +46,28 @@ static const struct scene_node *unscaled(const struct scene_node *texture, doubl
 }
 
 /* Reads the image, which is decoded like colours unless the node says that it contains raw numbers. */
-static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
-			struct field *f, struct error *e)
+static int read_image(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		      struct height_field *f, struct error *e)
 {
-	const struct scene_node *texture = unscaled(node_child(n, PLUGIN_TEXTURE, 0), &f->scale),
-				*from = texture ? texture : n;
-	if ((texture != NULL) == (node_find(n, "filename") != NULL))
+	const struct scene_node *texture = unwrap_scale(node_child(n, PLUGIN_TEXTURE, 0), &f->scale),
+				*source = texture ? texture : n;
+	if ((texture != NULL) == (node_find_property(n, "filename") != NULL))
 		return node_error(n, e, EINVAL, "needs either a filename or a bitmap inside");
 	if (texture && strcmp(texture->type, "bitmap") != 0)
 		return node_error(texture, e, ENOTSUP, "the heights of a heightfield come from a bitmap");
-	enum image_channel channel = image_channel_named(node_string(from, "channel", "all"));
+	enum image_channel channel = image_channel_named(node_string(source, "channel", "all"));
 	struct asset a;
-	int r = mesh_open(from, assets, &a, e);
+	int r = mesh_open_file(source, assets, &a, e);
 	if (r)
 		return r;
 	struct error inner;
-	double gamma = node_float(from, "gamma", -1);
-	bool raw = node_bool(from, "raw", gamma > 0);
-	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, &f->picture, &inner);
+	double gamma = node_float(source, "gamma", -1);
+	bool raw = node_bool(source, "raw", gamma > 0);
+	r = image_decode(a.bytes, a.size, node_string(source, "filename", ""), raw, channel, arena, &f->image, &inner);
 	assets->close(assets->user, &a);
 	if (!r)
-		r = image_power(&f->picture, raw && gamma > 0 ? gamma : 1, &inner);
-	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
+		r = image_apply_power(&f->image, raw && gamma > 0 ? gamma : 1, &inner);
+	return r ? node_error(source, e, -r, "%s", inner.text) : 0;
 }
 
 static void add_normal(double *normal, double x, double y)
@@ -78,11 +78,11 @@ static void add_normal(double *normal, double x, double y)
 	normal[2] += 1 / length;
 }
 
-/* Computes the normals, first in units of pixels, then of the square, in which pixels are at distances of `across` and
- * `along`. */
-static void set_normals(const struct field *f, struct mesh *m, double across, double along)
+/* Computes the normals, first in units of pixels, then of the square, in which pixels are at distances of `step_x` and
+ * `step_y`. */
+static void set_normals(const struct height_field *f, struct mesh *m, double step_x, double step_y)
 {
-	uint32_t width = f->picture.width, height = f->picture.height;
+	uint32_t width = f->image.width, height = f->image.height;
 	for (uint32_t y = 0; y + 1 < height; y++)
 		for (uint32_t x = 0; x + 1 < width; x++) {
 			double(*n)[3] = m->normal + (size_t)y * width + x;
@@ -94,26 +94,27 @@ static void set_normals(const struct field *f, struct mesh *m, double across, do
 			add_normal(n[width + 1], z01 - z11, z10 - z11);
 		}
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 n = {m->normal[i][0] / across, m->normal[i][1] / along, m->normal[i][2]};
-		mesh_store(m->normal[i], mesh_unit(n));
+		vec3 n = {m->normal[i][0] / step_x, m->normal[i][1] / step_y, m->normal[i][2]};
+		vec3_store(m->normal[i], vec3_unit_or_zero(n));
 	}
 }
 
-static void set_triangles(const struct field *f, struct mesh *m)
+static void set_triangles(const struct height_field *f, struct mesh *m)
 {
-	uint32_t width = f->picture.width, height = f->picture.height, k = 0;
+	uint32_t width = f->image.width, height = f->image.height, k = 0;
 	for (uint32_t y = 0; y + 1 < height; y++)
 		for (uint32_t x = 0; x + 1 < width; x++) {
-			uint32_t at = y * width + x;
-			memcpy(m->index[k++], (uint32_t[3]){at + width, at, at + width + 1}, sizeof *m->index);
-			memcpy(m->index[k++], (uint32_t[3]){at + width + 1, at, at + 1}, sizeof *m->index);
+			uint32_t corner = y * width + x;
+			memcpy(m->index[k++], (uint32_t[3]){corner + width, corner, corner + width + 1},
+			       sizeof *m->index);
+			memcpy(m->index[k++], (uint32_t[3]){corner + width + 1, corner, corner + 1}, sizeof *m->index);
 		}
 }
 
-static int make_mesh(const struct field *f, bool smooth, const struct scene_node *n, struct arena *arena,
+static int make_mesh(const struct height_field *f, bool smooth, const struct scene_node *n, struct arena *arena,
 		     struct mesh *m, struct error *e)
 {
-	uint32_t width = f->picture.width, height = f->picture.height;
+	uint32_t width = f->image.width, height = f->image.height;
 	if (width < 2 || height < 2)
 		return node_error(n, e, EINVAL, "an image of %u x %u pixels is too small; heights need 2 x 2", width,
 				  height);
@@ -123,19 +124,19 @@ static int make_mesh(const struct field *f, bool smooth, const struct scene_node
 				  MESH_TRIANGLES_MAX);
 	if (!mesh_alloc(m, width * height, (uint32_t)triangles, smooth, true, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
-	double across = 2.0 / (width - 1), along = 2.0 / (height - 1);
+	double step_x = 2.0 / (width - 1), step_y = 2.0 / (height - 1);
 	for (uint32_t y = 0; y < height; y++) {
 		liveness_tick();
 		for (uint32_t x = 0; x < width; x++) {
 			uint32_t i = y * width + x;
-			mesh_store(m->position[i], (vec3){across * x - 1, along * y - 1, height_at(f, x, y)});
-			m->uv[i][0] = 0.5 * across * x;
-			m->uv[i][1] = 0.5 * along * y;
+			vec3_store(m->position[i], (vec3){step_x * x - 1, step_y * y - 1, height_at(f, x, y)});
+			m->uv[i][0] = 0.5 * step_x * x;
+			m->uv[i][1] = 0.5 * step_y * y;
 		}
 	}
 	set_triangles(f, m);
 	if (smooth)
-		set_normals(f, m, across, along);
+		set_normals(f, m, step_x, step_y);
 	return 0;
 }
 
@@ -143,9 +144,9 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	struct arena decoded = {0};
-	struct field f = {.scale = node_float(n, "scale", 1)};
+	struct height_field f = {.scale = node_float(n, "scale", 1)};
 	bool smooth = node_bool(n, "shading_normals", true);
-	int r = read_picture(n, assets, &decoded, &f, e);
+	int r = read_image(n, assets, &decoded, &f, e);
 	if (!r)
 		r = make_mesh(&f, smooth, n, arena, &out->mesh, e);
 	out->face_normals = !smooth;

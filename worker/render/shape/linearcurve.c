@@ -12,7 +12,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 {
 	struct curve_points points;
 	int rc = curve_file_read(n, assets, 2, &points, e);
-	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
+	return rc ? rc : curve_shape_build(n, &points, false, arena, out, e);
 }
 
 SHAPE_OPS(linearcurve, {"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS);

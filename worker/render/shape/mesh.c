@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-vec3 mesh_unit(vec3 v)
+vec3 vec3_unit_or_zero(vec3 v)
 {
 	if (!vec3_is_finite(v))
 		return (vec3){0, 0, 0};
@@ -14,11 +14,11 @@ vec3 mesh_unit(vec3 v)
 
 void mesh_set_normal(struct mesh *m, uint32_t i, vec3 normal)
 {
-	m->odd += !vec3_is_finite(normal);
-	mesh_store(m->normal[i], mesh_unit(normal));
+	m->invalid_normal_count += !vec3_is_finite(normal);
+	vec3_store(m->normal[i], vec3_unit_or_zero(normal));
 }
 
-int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e)
+int mesh_open_file(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL);
 	if (!name)
@@ -38,49 +38,49 @@ bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool norm
 	return m->position && m->index && (m->normal || !normals) && (m->uv || !uv);
 }
 
-struct attribute *mesh_add_attribute(struct mesh *m, const char *name, bool per_face, uint32_t channels, uint32_t room,
-				     struct arena *arena)
+struct attribute *mesh_add_attribute(struct mesh *m, const char *name, bool per_face, uint32_t channels,
+				     uint32_t capacity, struct arena *arena)
 {
 	size_t items = per_face ? m->triangle_count : m->vertex_count;
 	if (!m->attributes)
-		m->attributes = arena_alloc(arena, room, sizeof *m->attributes);
+		m->attributes = arena_alloc(arena, capacity, sizeof *m->attributes);
 	float *value = arena_alloc(arena, items * channels, sizeof *value);
 	if (!m->attributes || !value)
 		return NULL;
 	struct attribute *a = &m->attributes[m->attribute_count++];
-	*a = (struct attribute){.per_face = per_face, .channels = channels, .value = value};
+	*a = (struct attribute){.is_per_face = per_face, .channels = channels, .value = value};
 	snprintf(a->name, sizeof a->name, "%s", name);
 	return a;
 }
 
 void mesh_set_attribute(struct attribute *a, size_t item, uint32_t channel, double x)
 {
-	bool good = isfinite(x) && fabs(x) <= MESH_ATTRIBUTE_MAX;
-	a->damaged |= !good;
-	a->value[item * a->channels + channel] = good ? (float)x : 0;
+	bool in_range = isfinite(x) && fabs(x) <= MESH_ATTRIBUTE_MAX;
+	a->has_invalid_value |= !in_range;
+	a->value[item * a->channels + channel] = in_range ? (float)x : 0;
 }
 
-void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to)
+void mesh_copy_face_attributes(struct mesh *m, uint32_t source, uint32_t target)
 {
-	for (uint32_t i = 0; i < m->attribute_count && from != to; i++) {
+	for (uint32_t i = 0; i < m->attribute_count && source != target; i++) {
 		const struct attribute *a = &m->attributes[i];
-		if (a->per_face)
-			memcpy(a->value + (size_t)to * a->channels, a->value + (size_t)from * a->channels,
+		if (a->is_per_face)
+			memcpy(a->value + (size_t)target * a->channels, a->value + (size_t)source * a->channels,
 			       a->channels * sizeof *a->value);
 	}
 }
 
 void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v)
 {
-	mesh_store(m->position[i], p);
-	mesh_store(m->normal[i], n);
+	vec3_store(m->position[i], p);
+	vec3_store(m->normal[i], n);
 	m->uv[i][0] = u;
 	m->uv[i][1] = v;
 }
 
-const double quad_corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+const double mesh_quad_corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
 
-void quad_set(struct mesh *m, uint32_t triangle, uint32_t first)
+void mesh_set_quad(struct mesh *m, uint32_t triangle, uint32_t first)
 {
 	memcpy(m->index[triangle], (uint32_t[3]){first, first + 1, first + 2}, sizeof m->index[0]);
 	memcpy(m->index[triangle + 1], (uint32_t[3]){first, first + 2, first + 3}, sizeof m->index[0]);

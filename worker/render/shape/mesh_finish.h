@@ -5,11 +5,11 @@
 
 #include "worker/render/shape/mesh.h"
 
-struct mesh_finish {
+struct mesh_finish_options {
 	mat4 to_world;
 	bool flip_normals, face_normals;
-	double smooth_angle; /* degrees; normals are recomputed across edges less sharp than this (smooth.h); negative:
-				normals are kept */
+	double max_smooth_angle; /* degrees; normals are recomputed across edges less sharp than this (smooth.h);
+				negative: normals are kept */
 };
 
 /*
@@ -18,7 +18,7 @@ struct mesh_finish {
  * all normals. A transform that mirrors does not swap inside and outside. Triangles are wound counter-clockwise seen
  * from outside, which is the side of their vertices' normals. Returns 0 or a negative error code; errors name n.
  */
-int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
+int mesh_finish(struct mesh *m, const struct mesh_finish_options *f, struct arena *arena, uint64_t *dropped,
 		const struct scene_node *n, struct error *e);
 
 #endif

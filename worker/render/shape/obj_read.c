@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * obj_read opens an OBJ file and reads it line by line in one pass. Numbers, corners and triangles are added to lists
- * that grow by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material,
- * and with `g` it separates meshes. The cache keeps the file that was read last.
+ * obj_file_read opens an OBJ file and reads it line by line in one pass. Numbers, corners and triangles are added to
+ * lists that grow by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one
+ * material, and with `g` it separates meshes. The cache keeps the file that was read last.
  *
  * Reading fails, with the file and the line, if a number is invalid, or if an index refers to an element that the file
  * has not defined yet. It also fails if the file has neither vertices nor faces, or is larger than 4 GB. After an error
@@ -58,22 +58,23 @@ static bool at_end_of_line(struct reader *o)
 	return o->p >= o->end || *o->p == '\n' || *o->p == '#';
 }
 
-static int read_numbers(struct reader *o, const char *what, struct list *l, size_t least, size_t count)
+static int read_numbers(struct reader *o, const char *keyword, struct list *l, size_t required, size_t count)
 {
 	double *v = list_push(l);
 	if (!v)
 		return out_of_memory(o);
 	for (size_t i = 0; i < count; i++) {
 		v[i] = 0;
-		if (i >= least && at_end_of_line(o))
+		if (i >= required && at_end_of_line(o))
 			continue;
 		skip_blanks(o);
 		bool normal = l == &o->file->normals;
 		const char *rest = (normal ? number_scan_printed : number_scan)(o->p, o->end, &v[i]);
-		bool ends = rest && (rest == o->end || number_is_blank(*rest) || *rest == '\\' || *rest == '#');
-		if (!ends || (!(fabs(v[i]) <= MESH_COORDINATE_MAX) && !normal))
+		bool is_terminated =
+			rest && (rest == o->end || number_is_blank(*rest) || *rest == '\\' || *rest == '#');
+		if (!is_terminated || (!(fabs(v[i]) <= MESH_COORDINATE_MAX) && !normal))
 			return node_error(o->node, o->error, EINVAL, "%s:%d: `%s` needs %zu finite numbers", o->name,
-					  o->line, what, least);
+					  o->line, keyword, required);
 		o->p = rest;
 	}
 	return 0;
@@ -112,7 +113,7 @@ static int read_normal(struct reader *o)
 }
 
 /* Reads an index. Indices count from 1, or backwards from -1 for the last element. */
-static int read_index(struct reader *o, const char *what, size_t count, uint32_t *out)
+static int read_index(struct reader *o, const char *element, size_t count, uint32_t *out)
 {
 	int64_t i;
 	const char *rest = number_scan_int(o->p, o->end, &i);
@@ -123,13 +124,13 @@ static int read_index(struct reader *o, const char *what, size_t count, uint32_t
 	if (k < 1 || k > (int64_t)count)
 		return node_error(o->node, o->error, EINVAL,
 				  "%s:%d: %s %lld is out of range; there are %zu before this line", o->name, o->line,
-				  what, (long long)i, count);
+				  element, (long long)i, count);
 	*out = (uint32_t)k;
 	o->p = rest;
 	return 0;
 }
 
-static bool skip_char(struct reader *o, char c)
+static bool accept_char(struct reader *o, char c)
 {
 	if (o->p < o->end && *o->p == c) {
 		o->p++;
@@ -140,13 +141,13 @@ static bool skip_char(struct reader *o, char c)
 
 static int read_corner(struct reader *o)
 {
-	struct obj_corner c = {.at = (uint32_t)o->file->corners.count};
+	struct obj_corner c = {.index = (uint32_t)o->file->corners.count};
 	int r = read_index(o, "vertex", o->file->positions.count, &c.v);
-	if (!r && skip_char(o, '/')) {
-		bool slash = skip_char(o, '/');
+	if (!r && accept_char(o, '/')) {
+		bool slash = accept_char(o, '/');
 		if (!slash) {
 			r = read_index(o, "texture coordinate", o->file->uvs.count, &c.vt);
-			slash = !r && skip_char(o, '/');
+			slash = !r && accept_char(o, '/');
 		}
 		if (!r && slash)
 			r = read_index(o, "normal", o->file->normals.count, &c.vn);
@@ -163,19 +164,19 @@ static int read_corner(struct reader *o)
 	return 0;
 }
 
-/* Replaces the fan of triangles of the last face by those of the polygon. Polygons of more than POLYGON_MOST corners
- * stay fans. */
-static void cut_face(struct reader *o, uint32_t first, uint32_t n)
+/* Replaces the fan of triangles of the last face by those of the polygon. Polygons of more than POLYGON_CORNERS_MAX
+ * corners stay fans. */
+static void triangulate_face(struct reader *o, uint32_t first, uint32_t n)
 {
 	const double(*position)[3] = o->file->positions.items;
 	const struct obj_corner *c = (const struct obj_corner *)o->file->corners.items + first;
 	uint32_t(*t)[3] = (uint32_t(*)[3])o->file->triangles.items + (o->file->triangles.count - (n - 2));
 	struct polygon p;
-	if (n > POLYGON_MOST)
+	if (n > POLYGON_CORNERS_MAX)
 		return;
-	for (p.n = 0; p.n < n; p.n++)
-		p.corner[p.n] = mesh_load(position[c[p.n].v - 1]);
-	polygon_cut(&p, t);
+	for (p.corner_count = 0; p.corner_count < n; p.corner_count++)
+		p.corner[p.corner_count] = vec3_load(position[c[p.corner_count].v - 1]);
+	polygon_triangulate(&p, t);
 	for (uint32_t i = 0; i < n - 2; i++)
 		for (int k = 0; k < 3; k++)
 			t[i][k] += first;
@@ -225,7 +226,7 @@ static int read_face(struct reader *o)
 	if (n < 3)
 		return add_triangle(o, first, first + n - 1, first + n - 1);
 	if (n > 3)
-		cut_face(o, first, n);
+		triangulate_face(o, first, n);
 	return 0;
 }
 
@@ -234,7 +235,7 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 {
 	struct obj_file *f = o->file;
 	struct obj_run *last = f->runs.count ? (struct obj_run *)f->runs.items + (f->runs.count - 1) : NULL;
-	if (!last || last->triangle < f->triangles.count)
+	if (!last || last->first_triangle < f->triangles.count)
 		last = list_push(&f->runs);
 	if (!last)
 		return out_of_memory(o);
@@ -294,21 +295,22 @@ static int read_lines(struct reader *o)
 	return 0;
 }
 
-static void obj_free(struct obj_file *o)
+static void obj_file_free(struct obj_file *o)
 {
 	struct list *all[] = {&o->positions, &o->uvs,  &o->normals, &o->colours, &o->corners,
 			      &o->triangles, &o->runs, &o->names,   &o->meshes};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-		list_free(all[i]);
+		list_fini(all[i]);
 	*o = (struct obj_file){0};
 }
 
-/* Reads the file that the node names. If it returns 0, *o has to be released with obj_free. */
-static int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e)
+/* Reads the file that the node names. If it returns 0, *o has to be released with obj_file_free. */
+static int obj_file_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets,
+			 struct error *e)
 {
 	*o = (struct obj_file){0};
 	struct asset a;
-	int r = mesh_open(n, assets, &a, e);
+	int r = mesh_open_file(n, assets, &a, e);
 	if (r)
 		return r;
 	const char *bytes = (const char *)a.bytes;
@@ -318,20 +320,20 @@ static int obj_read(struct obj_file *o, const struct scene_node *n, const struct
 				.error = e,
 				.p = bytes,
 				.end = bytes + a.size};
-	o->positions.size = o->normals.size = o->colours.size = 3 * sizeof(double);
-	o->uvs.size = 2 * sizeof(double);
-	o->corners.size = sizeof(struct obj_corner);
-	o->triangles.size = 3 * sizeof(uint32_t);
-	o->runs.size = sizeof(struct obj_run);
-	o->names.size = 1;
-	o->meshes.size = sizeof(struct obj_mesh);
+	o->positions.item_size = o->normals.item_size = o->colours.item_size = 3 * sizeof(double);
+	o->uvs.item_size = 2 * sizeof(double);
+	o->corners.item_size = sizeof(struct obj_corner);
+	o->triangles.item_size = 3 * sizeof(uint32_t);
+	o->runs.item_size = sizeof(struct obj_run);
+	o->names.item_size = 1;
+	o->meshes.item_size = sizeof(struct obj_mesh);
 	if (a.size > UINT32_MAX)
 		r = node_error(n, e, EFBIG, "%s: larger than 4 GB", reader.name);
 	else if (!(r = begin_run(&reader, "", 0)))
 		r = read_lines(&reader);
 	assets->close(assets->user, &a);
 	if (r)
-		obj_free(o);
+		obj_file_free(o);
 	return r;
 }
 
@@ -341,20 +343,20 @@ int obj_cache_read(struct obj_cache *c, const struct scene_node *n, const struct
 	if (c->name && strcmp(c->name, name) == 0)
 		return 0;
 	obj_cache_fini(c);
-	int r = obj_read(&c->file, n, assets, e);
+	int r = obj_file_read(&c->file, n, assets, e);
 	if (r)
 		return r;
 	c->name = mem_strdup(name);
 	if (c->name)
 		return 0;
-	obj_free(&c->file);
+	obj_file_free(&c->file);
 	return node_error(n, e, ENOMEM, "%s: out of memory", name);
 }
 
 void obj_cache_fini(struct obj_cache *c)
 {
 	if (c->name)
-		obj_free(&c->file);
+		obj_file_free(&c->file);
 	mem_free(c->name);
 	c->name = NULL;
 }

@@ -11,20 +11,20 @@
 
 struct obj_corner {
 	uint32_t v, vt, vn; /* indices, from 1; 0: none */
-	uint32_t at;	    /* position in the list of corners */
+	uint32_t index;	    /* position in the list of corners */
 };
 
 /* The beginning of a run of faces with one material, which ends where the next run begins. */
 struct obj_run {
-	size_t name, name_length; /* of the material, in `names` */
-	size_t corner, triangle;  /* the first ones of the run */
+	size_t name_offset, name_length;     /* of the material, in `names` */
+	size_t first_corner, first_triangle; /* the first ones of the run */
 };
 
 /* The beginning of a mesh, which ends where the next one begins: the faces between two lines with `g` or `usemtl`,
  * which therefore have one material. `o` does not begin a mesh, as in Mitsuba 0.6. */
 struct obj_mesh {
-	size_t run;		 /* its run in `runs` */
-	size_t corner, triangle; /* the first ones of the mesh */
+	size_t run;			     /* its run in `runs` */
+	size_t first_corner, first_triangle; /* the first ones of the mesh */
 };
 
 struct obj_file {

@@ -8,16 +8,16 @@
 
 #include <stdint.h>
 
-enum { POLYGON_MOST = 1024 };
+enum { POLYGON_CORNERS_MAX = 1024 };
 
 struct polygon {
-	uint32_t n;
-	vec3 corner[POLYGON_MOST];
+	uint32_t corner_count;
+	vec3 corner[POLYGON_CORNERS_MAX];
 };
 
 /* Cuts a polygon of n >= 3 corners into n - 2 triangles t of corner numbers, with the orientation of the polygon: a fan
  * around the first corner if that covers it. The polygon may be concave, slightly bent, and have coinciding corners;
  * one that crosses itself gives n - 2 triangles, too. */
-void polygon_cut(const struct polygon *p, uint32_t (*t)[3]);
+void polygon_triangulate(const struct polygon *p, uint32_t (*t)[3]);
 
 #endif

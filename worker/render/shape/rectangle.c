@@ -11,10 +11,10 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	if (!mesh_alloc(m, 4, 2, true, true, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
 	for (uint32_t i = 0; i < 4; i++) {
-		double u = quad_corner[i][0], v = quad_corner[i][1];
+		double u = mesh_quad_corners[i][0], v = mesh_quad_corners[i][1];
 		mesh_set_vertex(m, i, (vec3){2 * u - 1, 2 * v - 1, 0}, (vec3){0, 0, 1}, u, v);
 	}
-	quad_set(m, 0, 0);
+	mesh_set_quad(m, 0, 0);
 	return 0;
 }
 

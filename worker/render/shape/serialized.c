@@ -22,19 +22,26 @@
 #define ZLIB_CONST
 #include <zlib.h>
 
-enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, VERSION_5 = 5, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
+enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, VERSION_5 = 5, NAME_BYTES_MAX = 1 << 16, CHUNK_ITEMS = 1024 };
 enum { ZLIB_RATIO = 1032 /* the most bytes that one byte of deflate can represent */ };
-enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
+enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, HAS_DOUBLES = 0x2000 };
 
 /* Flags and sizes of version 5. */
-enum { HAS_TANGENTS_5 = 2, HAS_UV_5 = 4, FLOATS = 0x1000, RECORD = 32, FACE_RECORD = 16, ATTRIBUTES_MAX = 64 };
+enum {
+	HAS_TANGENTS_5 = 2,
+	HAS_UV_5 = 4,
+	HAS_FLOATS = 0x1000,
+	VERTEX_RECORD_SIZE = 32,
+	FACE_RECORD_SIZE = 16,
+	ATTRIBUTES_MAX = 64
+};
 
 struct stream {
 	const struct scene_node *node;
 	const char *name;
 	struct error *error;
 	z_stream z;
-	uint64_t most; /* the most bytes that the stream can decompress to */
+	uint64_t max_bytes; /* the most bytes that the stream can decompress to */
 };
 
 static int file_error(const struct stream *s, const char *what)
@@ -58,15 +65,15 @@ static int read_stream(struct stream *s, void *out, size_t size)
 	return 0;
 }
 
-static int take_number(struct stream *s, int bytes, uint64_t *x)
+static int read_uint(struct stream *s, int size, uint64_t *x)
 {
 	unsigned char raw[8];
-	int r = read_stream(s, raw, (size_t)bytes);
-	*x = r ? 0 : get_bytes(raw, bytes);
+	int r = read_stream(s, raw, (size_t)size);
+	*x = r ? 0 : get_bytes(raw, size);
 	return r;
 }
 
-static int skip(struct stream *s, uint64_t size)
+static int skip_bytes(struct stream *s, uint64_t size)
 {
 	unsigned char raw[4096];
 	int r = 0;
@@ -78,7 +85,7 @@ static int skip(struct stream *s, uint64_t size)
 static int skip_name(struct stream *s)
 {
 	char c;
-	for (int i = 0; i < NAME_MAX_BYTES; i++) {
+	for (int i = 0; i < NAME_BYTES_MAX; i++) {
 		int r = read_stream(s, &c, 1);
 		if (r || c == 0)
 			return r;
@@ -87,13 +94,13 @@ static int skip_name(struct stream *s)
 }
 
 /* Reads count x width numbers. */
-static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint32_t count, int width, double *out)
+static int read_floats(struct stream *s, bool doubles, bool must_be_finite, uint32_t count, int width, double *out)
 {
 	unsigned char raw[CHUNK_ITEMS * 8];
 	int size = doubles ? 8 : 4;
-	uint64_t left = (uint64_t)count * (uint64_t)width;
-	while (left > 0) {
-		size_t n = left < CHUNK_ITEMS ? (size_t)left : CHUNK_ITEMS;
+	uint64_t remaining = (uint64_t)count * (uint64_t)width;
+	while (remaining > 0) {
+		size_t n = remaining < CHUNK_ITEMS ? (size_t)remaining : CHUNK_ITEMS;
 		int r = read_stream(s, raw, n * (size_t)size);
 		if (r)
 			return r;
@@ -110,18 +117,18 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 				return file_error(s, "a number that is not finite, or beyond 1e60");
 			out++;
 		}
-		left -= n;
+		remaining -= n;
 	}
 	return 0;
 }
 
-static int take_values(struct stream *s, bool doubles, uint32_t items, struct attribute *a)
+static int read_attribute_values(struct stream *s, bool doubles, uint32_t items, struct attribute *a)
 {
-	enum { AT_ONCE = 256 };
-	double x[ATTRIBUTE_CHANNELS_MAX * AT_ONCE];
+	enum { ITEMS_AT_ONCE = 256 };
+	double x[ATTRIBUTE_CHANNELS_MAX * ITEMS_AT_ONCE];
 	for (uint32_t done = 0; done < items;) {
-		uint32_t n = items - done < AT_ONCE ? items - done : AT_ONCE;
-		int r = take_reals(s, doubles, false, n, (int)a->channels, x);
+		uint32_t n = items - done < ITEMS_AT_ONCE ? items - done : ITEMS_AT_ONCE;
+		int r = read_floats(s, doubles, false, n, (int)a->channels, x);
 		if (r)
 			return r;
 		for (uint32_t i = 0; i < n * a->channels; i++)
@@ -132,19 +139,19 @@ static int take_values(struct stream *s, bool doubles, uint32_t items, struct at
 }
 
 /* Reads colours, which are linear, as the attribute that Mitsuba 3 calls vertex_color. */
-static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
+static int read_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
 {
 	struct attribute *a = mesh_add_attribute(m, "vertex_color", false, 3, 1, arena);
 	if (!a)
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	return take_values(s, doubles, m->vertex_count, a);
+	return read_attribute_values(s, doubles, m->vertex_count, a);
 }
 
 /* Reads triangles: three indices each, and in version 5 the index of a BSDF. */
-static int take_triangles(struct stream *s, int version, struct mesh *m)
+static int read_triangles(struct stream *s, int version, struct mesh *m)
 {
-	size_t size = version == VERSION_5 ? FACE_RECORD : 12;
-	unsigned char raw[CHUNK_ITEMS * FACE_RECORD];
+	size_t size = version == VERSION_5 ? FACE_RECORD_SIZE : 12;
+	unsigned char raw[CHUNK_ITEMS * FACE_RECORD_SIZE];
 	for (uint32_t done = 0; done < m->triangle_count;) {
 		uint32_t n = m->triangle_count - done < CHUNK_ITEMS ? m->triangle_count - done : CHUNK_ITEMS;
 		int r = read_stream(s, raw, n * size);
@@ -167,21 +174,21 @@ static int take_triangles(struct stream *s, int version, struct mesh *m)
 /* Reads to the end of the stream, where its checksum is. Undamaged data after the triangles is ignored. */
 static int check_end(struct stream *s)
 {
-	unsigned char beyond;
-	s->z.next_out = &beyond;
+	unsigned char extra;
+	s->z.next_out = &extra;
 	s->z.avail_out = 1;
 	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
 }
 
 /* Allocates count[0] vertices and count[1] triangles, after checking that the stream can contain them. Sizes are in
  * bytes. */
-static int make_room(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
-		     bool normals, bool uv, struct arena *arena, struct mesh *m)
+static int alloc_mesh(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
+		      bool normals, bool uv, struct arena *arena, struct mesh *m)
 {
 	if (count[0] == 0 && count[1] > 0)
 		return file_error(s, "the mesh has triangles, but no vertices");
-	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / vertex_size ||
-	    count[1] > s->most / triangle_size)
+	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->max_bytes / vertex_size ||
+	    count[1] > s->max_bytes / triangle_size)
 		return file_error(s, "more vertices or triangles than the file can contain");
 	if (!mesh_alloc(m, (uint32_t)count[0], (uint32_t)count[1], normals, uv, arena))
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
@@ -189,11 +196,11 @@ static int make_room(const struct stream *s, const uint64_t count[2], uint64_t v
 }
 
 /* Reads a length and a text of that length into out, terminated by 0. */
-static int take_text(struct stream *s, char *out, size_t room)
+static int read_string(struct stream *s, char *out, size_t capacity)
 {
 	uint64_t length = 0;
-	int r = take_number(s, 4, &length);
-	if (!r && length >= room)
+	int r = read_uint(s, 4, &length);
+	if (!r && length >= capacity)
 		return file_error(s, "a name that is too long");
 	if (!r)
 		r = read_stream(s, out, (size_t)length);
@@ -202,124 +209,125 @@ static int take_text(struct stream *s, char *out, size_t room)
 }
 
 /* Reads records of position, normal and texture coordinates; the numbers that a mesh does not use are ignored. */
-static int take_records(struct stream *s, struct mesh *m)
+static int read_vertex_records(struct stream *s, struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		double lane[8];
-		int r = take_reals(s, false, false, 1, 8, lane);
+		double record[8];
+		int r = read_floats(s, false, false, 1, 8, record);
 		if (r)
 			return r;
 		for (int k = 0; k < 8; k++)
-			if (!(fabs(lane[k]) <= MESH_COORDINATE_MAX) && (k < 3 || (k < 6 ? !!m->normal : !!m->uv)))
+			if (!(fabs(record[k]) <= MESH_COORDINATE_MAX) && (k < 3 || (k < 6 ? !!m->normal : !!m->uv)))
 				return file_error(s, "a number that is not finite, or beyond 1e60");
-		memcpy(m->position[i], lane, sizeof m->position[i]);
+		memcpy(m->position[i], record, sizeof m->position[i]);
 		if (m->normal)
-			memcpy(m->normal[i], lane + 3, sizeof m->normal[i]);
+			memcpy(m->normal[i], record + 3, sizeof m->normal[i]);
 		if (m->uv)
-			memcpy(m->uv[i], lane + 6, sizeof m->uv[i]);
+			memcpy(m->uv[i], record + 6, sizeof m->uv[i]);
 	}
 	return 0;
 }
 
 /* Reads an attribute. Those with coefficients of a spectral variant are not colours and are left out. */
-static int take_attribute(struct stream *s, struct mesh *m, uint32_t room, struct arena *arena)
+static int read_attribute(struct stream *s, struct mesh *m, uint32_t capacity, struct arena *arena)
 {
 	char name[ATTRIBUTE_NAME_MAX];
 	uint64_t coefficients, channels;
-	int r = take_text(s, name, sizeof name);
+	int r = read_string(s, name, sizeof name);
 	if (!r)
-		r = take_number(s, 1, &coefficients);
+		r = read_uint(s, 1, &coefficients);
 	if (!r)
-		r = take_number(s, 4, &channels);
+		r = read_uint(s, 4, &channels);
 	if (r)
 		return r;
 	bool per_face = strncmp(name, "face_", 5) == 0;
 	uint64_t items = per_face ? m->triangle_count : m->vertex_count;
 	if (!per_face && strncmp(name, "vertex_", 7) != 0)
 		return file_error(s, "an attribute that is neither of vertices nor of faces");
-	if (channels < 1 || channels > ATTRIBUTE_CHANNELS_MAX || items > s->most / (4 * channels))
+	if (channels < 1 || channels > ATTRIBUTE_CHANNELS_MAX || items > s->max_bytes / (4 * channels))
 		return file_error(s, "an attribute with more numbers than the file can contain");
 	if (coefficients & 1)
-		return skip(s, 4 * items * channels);
-	struct attribute *a = mesh_add_attribute(m, name, per_face, (uint32_t)channels, room, arena);
+		return skip_bytes(s, 4 * items * channels);
+	struct attribute *a = mesh_add_attribute(m, name, per_face, (uint32_t)channels, capacity, arena);
 	if (!a)
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	return take_values(s, false, (uint32_t)items, a);
+	return read_attribute_values(s, false, (uint32_t)items, a);
 }
 
-static int take_attributes(struct stream *s, struct mesh *m, struct arena *arena)
+static int read_attributes(struct stream *s, struct mesh *m, struct arena *arena)
 {
 	uint64_t count;
-	int r = take_number(s, 4, &count);
+	int r = read_uint(s, 4, &count);
 	if (!r && count > ATTRIBUTES_MAX)
 		return file_error(s, "more than 64 attributes");
 	for (uint64_t i = 0; !r && i < count; i++)
-		r = take_attribute(s, m, (uint32_t)count, arena);
+		r = read_attribute(s, m, (uint32_t)count, arena);
 	return r;
 }
 
-static int take_mesh_5(struct stream *s, uint64_t flags, struct arena *arena, struct mesh *m)
+static int read_mesh_5(struct stream *s, uint64_t flags, struct arena *arena, struct mesh *m)
 {
 	uint64_t length = 0, count[4] = {0}; /* of vertices, triangles, positions, normals */
-	int r = take_number(s, 4, &length);
+	int r = read_uint(s, 4, &length);
 	if (!r)
-		r = length > NAME_MAX_BYTES ? file_error(s, "a name that is too long") : skip(s, length);
+		r = length > NAME_BYTES_MAX ? file_error(s, "a name that is too long") : skip_bytes(s, length);
 	for (int i = 0; !r && i < 4; i++)
-		r = take_number(s, 8, &count[i]);
+		r = read_uint(s, 8, &count[i]);
 	if (r)
 		return r;
-	if (!(flags & FLOATS) || count[2] > count[0] || count[3] > count[0])
+	if (!(flags & HAS_FLOATS) || count[2] > count[0] || count[3] > count[0])
 		return file_error(s, "the header of the mesh is damaged");
 	if (flags & HAS_TANGENTS_5)
 		return node_error(s->node, s->error, ENOTSUP, "%s: shading tangents are not supported", s->name);
-	r = make_room(s, count, RECORD, FACE_RECORD, flags & HAS_NORMALS, flags & HAS_UV_5, arena, m);
+	r = alloc_mesh(s, count, VERTEX_RECORD_SIZE, FACE_RECORD_SIZE, flags & HAS_NORMALS, flags & HAS_UV_5, arena, m);
 	if (!r)
-		r = take_records(s, m);
+		r = read_vertex_records(s, m);
 	if (!r)
-		r = take_triangles(s, VERSION_5, m);
+		r = read_triangles(s, VERSION_5, m);
 	if (!r)
-		r = skip(s, count[2] > 0 ? 4 * count[0] : 0);
+		r = skip_bytes(s, count[2] > 0 ? 4 * count[0] : 0);
 	if (!r)
-		r = skip(s, count[3] > 0 ? 4 * count[0] : 0);
+		r = skip_bytes(s, count[3] > 0 ? 4 * count[0] : 0);
 	if (!r)
-		r = take_attributes(s, m, arena);
+		r = read_attributes(s, m, arena);
 	return r;
 }
 
-static int take_mesh_3(struct stream *s, int version, uint64_t flags, struct arena *arena, struct mesh *m)
+static int read_mesh_3_or_4(struct stream *s, int version, uint64_t flags, struct arena *arena, struct mesh *m)
 {
 	uint64_t count[2];
 	int r = version == VERSION_4 ? skip_name(s) : 0;
 	for (int i = 0; !r && i < 2; i++)
-		r = take_number(s, 8, &count[i]);
+		r = read_uint(s, 8, &count[i]);
 	if (r)
 		return r;
-	bool doubles = flags & DOUBLES;
-	r = make_room(s, count, doubles ? 24 : 12, 12, flags & HAS_NORMALS, flags & HAS_UV, arena, m);
+	bool doubles = flags & HAS_DOUBLES;
+	r = alloc_mesh(s, count, doubles ? 24 : 12, 12, flags & HAS_NORMALS, flags & HAS_UV, arena, m);
 	if (!r)
-		r = take_reals(s, doubles, true, m->vertex_count, 3, m->position[0]);
+		r = read_floats(s, doubles, true, m->vertex_count, 3, m->position[0]);
 	if (!r && m->normal)
-		r = take_reals(s, doubles, true, m->vertex_count, 3, m->normal[0]);
+		r = read_floats(s, doubles, true, m->vertex_count, 3, m->normal[0]);
 	if (!r && m->uv)
-		r = take_reals(s, doubles, true, m->vertex_count, 2, m->uv[0]);
+		r = read_floats(s, doubles, true, m->vertex_count, 2, m->uv[0]);
 	if (!r && (flags & HAS_COLOURS))
-		r = take_colours(s, doubles, m, arena);
+		r = read_colours(s, doubles, m, arena);
 	if (!r)
-		r = take_triangles(s, version, m);
+		r = read_triangles(s, version, m);
 	return r;
 }
 
-static int take_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
+static int read_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
 {
 	struct mesh *m = &out->mesh;
 	uint64_t flags;
-	int r = take_number(s, 4, &flags);
+	int r = read_uint(s, 4, &flags);
 	if (!r)
-		r = version == VERSION_5 ? take_mesh_5(s, flags, arena, m) : take_mesh_3(s, version, flags, arena, m);
+		r = version == VERSION_5 ? read_mesh_5(s, flags, arena, m)
+					 : read_mesh_3_or_4(s, version, flags, arena, m);
 	if (!r)
 		r = check_end(s);
 	for (uint32_t i = 0; !r && m->normal && i < m->vertex_count; i++)
-		mesh_store(m->normal[i], mesh_unit(mesh_load(m->normal[i])));
+		vec3_store(m->normal[i], vec3_unit_or_zero(vec3_load(m->normal[i])));
 	out->face_normals = flags & HAS_FACE_NORMALS;
 	return r;
 }
@@ -328,8 +336,8 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
  * offsets precede it. */
 static int find_mesh(const struct stream *s, const struct asset *a, uint64_t index, size_t *begin, size_t *end)
 {
-	enum { HEAD = 4 };
-	if (a->size < HEAD + 4 || get_bytes(a->bytes, 2) != MAGIC)
+	enum { MESH_HEADER_SIZE = 4 };
+	if (a->size < MESH_HEADER_SIZE + 4 || get_bytes(a->bytes, 2) != MAGIC)
 		return file_error(s, "this is not a serialized mesh");
 	uint64_t version = get_bytes(a->bytes + 2, 2);
 	if (version < VERSION_3 || version > VERSION_5)
@@ -344,13 +352,14 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 				  "%s: shape_index=%llu, but the file has %llu mesh%s, counted from 0", s->name,
 				  (unsigned long long)index, (unsigned long long)count, count == 1 ? "" : "es");
 	size_t table = a->size - 4 - (size_t)count * (size_t)width;
-	uint64_t from = get_bytes(a->bytes + table + index * (size_t)width, width);
-	uint64_t to = index + 1 < count ? get_bytes(a->bytes + table + (index + 1) * (size_t)width, width) : table;
-	if (from > table || to > table || to < from + HEAD || get_bytes(a->bytes + from, 2) != MAGIC ||
-	    get_bytes(a->bytes + from + 2, 2) != version)
+	uint64_t mesh_begin = get_bytes(a->bytes + table + index * (size_t)width, width);
+	uint64_t mesh_end =
+		index + 1 < count ? get_bytes(a->bytes + table + (index + 1) * (size_t)width, width) : table;
+	if (mesh_begin > table || mesh_end > table || mesh_end < mesh_begin + MESH_HEADER_SIZE ||
+	    get_bytes(a->bytes + mesh_begin, 2) != MAGIC || get_bytes(a->bytes + mesh_begin + 2, 2) != version)
 		return file_error(s, "the table of meshes at its end is damaged");
-	*begin = (size_t)from;
-	*end = (size_t)to;
+	*begin = (size_t)mesh_begin;
+	*end = (size_t)mesh_end;
 	return 0;
 }
 
@@ -358,7 +367,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	struct asset a;
-	int r = mesh_open(n, assets, &a, e);
+	int r = mesh_open_file(n, assets, &a, e);
 	if (r)
 		return r;
 	struct stream s = {.node = n, .name = node_string(n, "filename", ""), .error = e};
@@ -372,8 +381,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		size_t size = end - begin - 4;
 		s.z.next_in = a.bytes + begin + 4;
 		s.z.avail_in = (uInt)size;
-		s.most = (uint64_t)size * ZLIB_RATIO;
-		r = take_mesh(&s, (int)get_bytes(a.bytes + begin + 2, 2), arena, out);
+		s.max_bytes = (uint64_t)size * ZLIB_RATIO;
+		r = read_mesh(&s, (int)get_bytes(a.bytes + begin + 2, 2), arena, out);
 		inflateEnd(&s.z);
 	}
 	assets->close(assets->user, &a);

@@ -19,25 +19,26 @@ const struct shape_ops *const shape_registry[] = {
 static int finish_shape(struct shape_geometry *out, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
 			struct error *e)
 {
-	struct mesh_finish f = {
-		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
-		out->face_normals || node_bool(n, "face_normals", false), node_float(n, "max_smooth_angle", -1)};
+	struct mesh_finish_options f = {out->in_world_space ? mat4_identity() : node_transform(n, "to_world"),
+					node_bool(n, "flip_normals", false),
+					out->face_normals || node_bool(n, "face_normals", false),
+					node_float(n, "max_smooth_angle", -1)};
 	int r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
-	if (out->made_here && out->mesh.triangle_count > 0)
+	if (out->is_generated && out->mesh.triangle_count > 0)
 		*dropped = 0;
 	return r;
 }
 
-int shape_curve_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
-		     struct error *e)
+int shape_curves_to_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+			 struct error *e)
 {
 	struct mesh mesh;
-	int rc = curve_mesh(&g->curve, arena, &mesh);
+	int rc = curve_make_mesh(&g->curve, arena, &mesh);
 	if (rc == -EFBIG)
 		return node_error(n, e, EFBIG, "its curves make more than %d triangles", MESH_TRIANGLES_MAX);
 	if (rc)
 		return node_error(n, e, -rc, "out of memory");
-	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .placed = true, .made_here = true};
+	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .in_world_space = true, .is_generated = true};
 	return finish_shape(g, n, arena, dropped, e);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes. One file per plug-in and one line in shape_list.h, by which the scene reader knows the shape and the generic
- * tests include it.
+ * Shapes. One file per plug-in and one line in shape_list.h, by which the scene reader knows the shape and the
+ * generic tests include it.
  *
  * A shape becomes triangles, a sphere or curves in world space (to_world applied, not yet rescaled), in double.
  * Triangles are wound counter-clockwise seen from outside. v = 0 is the top row of an image, as in both Mitsuba
@@ -25,11 +25,11 @@ enum shape_kind { SHAPE_MESH, SHAPE_SPHERE, SHAPE_CURVE };
 
 struct shape_geometry {
 	enum shape_kind kind;
-	struct mesh mesh;  /* its arrays are in the arena given */
-	bool placed;	   /* to_world has been applied to the mesh */
-	bool made_here;	   /* the triangles do not come from a file, so those without area are not reported */
-	bool face_normals; /* the file asks for flat shading */
-	bool materials;	   /* the file assigns materials to faces; these are not read */
+	struct mesh mesh;    /* its arrays are in the arena given */
+	bool in_world_space; /* to_world has been applied to the mesh */
+	bool is_generated;   /* the triangles do not come from a file, so those without area are not reported */
+	bool face_normals;   /* the file asks for flat shading */
+	bool has_materials;  /* the file assigns materials to faces; these are not read */
 	struct sphere sphere;
 	struct curve curve;
 };
@@ -38,7 +38,7 @@ struct shape_ops {
 	struct plugin_decl decl;
 	/* NULL: the shape contains others (group.h) and is not built itself. */
 	/* Sets *out to the sphere or the curves in world space, or to the mesh, which is in object space unless
-	 * `placed`; shape_build transforms and checks it. Returns 0 or a negative error code. */
+	 * `in_world_space`; shape_build transforms and checks it. Returns 0 or a negative error code. */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
 };
@@ -57,7 +57,7 @@ extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		struct shape_geometry *out, uint64_t *dropped, struct error *e);
 /* Replaces the curves of node n by a mesh of tubes. Returns 0, -EFBIG, -ENOMEM or another negative error code. */
-int shape_curve_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
-		     struct error *e);
+int shape_curves_to_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+			 struct error *e);
 
 #endif

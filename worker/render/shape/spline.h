@@ -10,7 +10,7 @@ enum { SPLINE_POINTS = 4 };
 /* Adds the rings of one curve of at least SPLINE_POINTS control points. Chords between rings deviate by at most
  * `tolerance` times the largest radius of the four control points around, unless that takes more than 64 chords per
  * piece. v grows by v_step from one control point to the next. Returns 0, -EFBIG or -ENOMEM. */
-int spline_add(struct list *rings, const double (*points)[4], uint32_t count, double tolerance, double v,
-	       double v_step);
+int spline_add_rings(struct list *rings, const double (*points)[4], uint32_t count, double tolerance, double v,
+		     double v_step);
 
 #endif

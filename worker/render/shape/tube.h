@@ -19,23 +19,23 @@ enum { TUBE_SIDES = 12 };
 struct tube_ring {
 	vec3 center, axis; /* axis: unit */
 	double radius;
-	/* The normal at a vertex is (1 - offset . bend) cos e + sin axis, where `offset` is the vector from the center
-	 * to the vertex and e its direction. bend: the change of the axis, c'' / |c'|^2 for a curve c. */
-	double cos, sin;
-	vec3 bend;
+	/* The normal at a vertex is (1 - offset . bend) cos e + normal_sin axis, where `offset` is the vector from the
+	 * center to the vertex and e its direction. curvature: the change of the axis, c'' / |c'|^2 for a curve c. */
+	double normal_cos, normal_sin;
+	vec3 curvature;
 	double v;
-	bool first; /* begins a new tube */
+	bool starts_tube; /* begins a new tube */
 };
 
-/* Adds a ring to `rings`, a list of struct tube_ring that the caller frees by list_free. -EFBIG if there would be more
+/* Adds a ring to `rings`, a list of struct tube_ring that the caller frees by list_fini. -EFBIG if there would be more
  * triangles than a mesh may have; -ENOMEM. */
-int tube_add(struct list *rings, const struct tube_ring *r);
+int tube_add_ring(struct list *rings, const struct tube_ring *r);
 /*
  * Adds a chain of cones with spheres as joints and as ends, like Embree's round linear curves: each cone touches the
  * spheres around its two ends. points: positions and radii. The texture coordinate is v at the first point and grows by
  * v_step from point to point. Returns 0, -EFBIG or -ENOMEM.
  */
 int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count, double v, double v_step);
-int tube_mesh(const struct list *rings, struct arena *arena, struct mesh *out); /* -ENOMEM */
+int tube_make_mesh(const struct list *rings, struct arena *arena, struct mesh *out); /* -ENOMEM */
 
 #endif

@@ -36,7 +36,7 @@ static bool is_digit(char c)
 
 /* Converts [first, last), which number_scan has accepted: an optional sign, digits, a point and an exponent. False
  * if it is too long or overflows. */
-static bool convert_slowly(const char *first, const char *last, double *out)
+static bool convert_with_strtod(const char *first, const char *last, double *out)
 {
 	static pthread_once_t once = PTHREAD_ONCE_INIT;
 	pthread_once(&once, make_locale);
@@ -52,20 +52,20 @@ static bool convert_slowly(const char *first, const char *last, double *out)
 
 struct digits {
 	uint64_t mantissa;
-	int exponent; /* decimal exponent of the mantissa's last digit */
-	bool exact;   /* no digit had to be left out of the mantissa */
-	bool any;
+	int exponent;  /* decimal exponent of the mantissa's last digit */
+	bool is_exact; /* no digit had to be left out of the mantissa */
+	bool has_digits;
 };
 
 static const char *scan_digits(const char *p, const char *end, struct digits *d, bool fraction)
 {
 	for (; p < end && is_digit(*p); p++) {
-		d->any = true;
+		d->has_digits = true;
 		if (d->mantissa < (UINT64_C(1) << 53) / 10 - 1) {
 			d->mantissa = d->mantissa * 10 + (uint64_t)(*p - '0');
 			d->exponent -= fraction;
 		} else {
-			d->exact = false;
+			d->is_exact = false;
 		}
 	}
 	return p;
@@ -77,28 +77,28 @@ const char *number_scan(const char *p, const char *end, double *out)
 	bool negative = false;
 	if (p < end && (*p == '+' || *p == '-'))
 		negative = *p++ == '-';
-	struct digits d = {.exact = true};
+	struct digits d = {.is_exact = true};
 	p = scan_digits(p, end, &d, false);
 	if (p < end && *p == '.')
 		p = scan_digits(p + 1, end, &d, true);
-	if (!d.any)
+	if (!d.has_digits)
 		return NULL;
 	if (p < end && (*p == 'e' || *p == 'E')) {
 		const char *q = p + 1;
-		bool down = false;
+		bool is_negative_exponent = false;
 		if (q < end && (*q == '+' || *q == '-'))
-			down = *q++ == '-';
+			is_negative_exponent = *q++ == '-';
 		if (q < end && is_digit(*q)) {
 			int e = 0;
 			for (; q < end && is_digit(*q); q++)
 				if (e < 100000)
 					e = e * 10 + (*q - '0');
-			d.exponent += down ? -e : e;
+			d.exponent += is_negative_exponent ? -e : e;
 			p = q;
 		}
 	}
-	if (!d.exact || d.exponent < -22 || d.exponent > 22) {
-		if (!convert_slowly(first, p, out))
+	if (!d.is_exact || d.exponent < -22 || d.exponent > 22) {
+		if (!convert_with_strtod(first, p, out))
 			return NULL;
 		return p;
 	}
@@ -110,10 +110,10 @@ const char *number_scan(const char *p, const char *end, double *out)
 
 const char *number_scan_printed(const char *p, const char *end, double *out)
 {
-	static const char *const none[] = {"nan", "inf", "1.#"};
+	static const char *const non_finite[] = {"nan", "inf", "1.#"};
 	const char *word = p < end && (*p == '+' || *p == '-') ? p + 1 : p;
-	for (size_t i = 0; i < sizeof none / sizeof *none; i++) {
-		if ((size_t)(end - word) < 3 || strncasecmp(word, none[i], 3) != 0)
+	for (size_t i = 0; i < sizeof non_finite / sizeof *non_finite; i++) {
+		if ((size_t)(end - word) < 3 || strncasecmp(word, non_finite[i], 3) != 0)
 			continue;
 		while (word < end && !number_is_blank(*word))
 			word++;
@@ -159,7 +159,7 @@ static const char *skip_blanks(const char *p)
 }
 
 /* Reads a number of a scene file; a trailing "f", which some programs write as in C, is skipped: "0.5f" is 0.5. */
-static const char *scan_value(const char *p, const char *end, double *out)
+static const char *scan_scene_number(const char *p, const char *end, double *out)
 {
 	const char *rest = number_scan(p, end, out);
 	return rest && rest < end && (*rest == 'f' || *rest == 'F') ? rest + 1 : rest;
@@ -168,7 +168,7 @@ static const char *scan_value(const char *p, const char *end, double *out)
 bool number_parse(const char *text, double *out)
 {
 	text = skip_blanks(text);
-	const char *rest = scan_value(text, text + strlen(text), out);
+	const char *rest = scan_scene_number(text, text + strlen(text), out);
 	return rest && *skip_blanks(rest) == 0;
 }
 
@@ -187,12 +187,12 @@ static const char *skip_separators(const char *p, const char *separators)
 	return p;
 }
 
-static int list(const char *text, const char *separators, double *out, size_t max)
+static int parse_list(const char *text, const char *separators, double *out, size_t max)
 {
 	const char *end = text + strlen(text), *p = skip_separators(text, separators);
 	size_t n = 0;
 	while (p < end) {
-		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
+		const char *rest = n < max ? scan_scene_number(p, end, &out[n]) : NULL;
 		if (!rest)
 			return -1;
 		n++;
@@ -203,12 +203,12 @@ static int list(const char *text, const char *separators, double *out, size_t ma
 	return (int)n;
 }
 
-int number_list(const char *text, double *out, size_t max)
+int number_parse_list(const char *text, double *out, size_t max)
 {
-	return list(text, ",", out, max);
+	return parse_list(text, ",", out, max);
 }
 
-int number_weights(const char *text, double *out, size_t max)
+int number_parse_weights(const char *text, double *out, size_t max)
 {
-	return list(text, ",;", out, max);
+	return parse_list(text, ",;", out, max);
 }

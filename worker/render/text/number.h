@@ -26,10 +26,10 @@ bool number_parse_int(const char *text, int64_t *out);
 
 /* Reads numbers, as number_parse() accepts them, separated by blanks, commas or both. Returns their count, or -1 if
  * the text contains anything else or more than max numbers. */
-int number_list(const char *text, double *out, size_t max);
+int number_parse_list(const char *text, double *out, size_t max);
 
-/* Like number_list(), for the weights of mixtures, which Mitsuba 0.6 also separates by ";". */
-int number_weights(const char *text, double *out, size_t max);
+/* Like number_parse_list(), for the weights of mixtures, which Mitsuba 0.6 also separates by ";". */
+int number_parse_weights(const char *text, double *out, size_t max);
 
 /* Returns the rest of the line from p on, without the blanks around it, and stores its length. */
 const char *number_line_rest(const char *p, const char *end, size_t *length);

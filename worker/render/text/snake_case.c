@@ -8,14 +8,14 @@ static bool is_upper(char c)
 	return c >= 'A' && c <= 'Z';
 }
 
-void snake_case(const char *name, char *out)
+void snake_case_from_camel(const char *name, char *out)
 {
-	char before = '_';
+	char previous = '_';
 	for (; *name; name++) {
-		if (is_upper(*name) && before != '_' && !is_upper(before))
+		if (is_upper(*name) && previous != '_' && !is_upper(previous))
 			*out++ = '_';
 		*out++ = is_upper(*name) ? (char)(*name - 'A' + 'a') : *name;
-		before = *name;
+		previous = *name;
 	}
 	*out = 0;
 }

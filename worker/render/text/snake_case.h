@@ -4,6 +4,6 @@
 #define WORKER_RENDER_TEXT_SNAKE_CASE_H
 
 /* toWorld -> to_world, intIOR -> int_ior. out holds 2 * strlen(name) + 1 bytes. */
-void snake_case(const char *name, char *out);
+void snake_case_from_camel(const char *name, char *out);
 
 #endif

@@ -7,15 +7,15 @@
 
 bool text_lines_next(struct text_lines *t, struct text_line *out)
 {
-	if (t->p >= t->end)
+	if (t->cursor >= t->end)
 		return false;
-	const char *newline = memchr(t->p, '\n', (size_t)(t->end - t->p)), *last = newline ? newline : t->end;
+	const char *newline = memchr(t->cursor, '\n', (size_t)(t->end - t->cursor)), *last = newline ? newline : t->end;
 	*out = (struct text_line){.number = ++t->number};
-	out->word = number_line_rest(t->p, last, &out->rest_length);
+	out->word = number_line_rest(t->cursor, last, &out->rest_length);
 	while (out->word_length < out->rest_length && !number_is_blank(out->word[out->word_length]))
 		out->word_length++;
 	out->rest = number_line_rest(out->word + out->word_length, last, &out->rest_length);
-	t->p = newline ? newline + 1 : t->end;
+	t->cursor = newline ? newline + 1 : t->end;
 	return true;
 }
 

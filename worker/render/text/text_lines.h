@@ -14,7 +14,7 @@ struct text_line {
 };
 
 struct text_lines {
-	const char *p, *end;
+	const char *cursor, *end;
 	int number; /* number of the line returned last, from 1 */
 };
 

@@ -17,22 +17,22 @@ struct attribute_values {
 	size_t count;
 	uint64_t hash;
 	uint32_t channels;
-	float least, most; /* bounds of the first three channels */
-	bool grey;	   /* the first three channels are equal everywhere */
+	float min, max; /* bounds of the first three channels */
+	bool is_grey;	/* the first three channels are equal everywhere */
 	const float *value;
 };
 
 /* The values that textures use, in a hash table whose entries are in the world's arena. A scene may have 2^18 meshes
  * with colours. */
-enum { ATTRIBUTE_POOL_LISTS = 1 << 12 };
+enum { ATTRIBUTE_POOL_BUCKETS = 1 << 12 };
 struct attribute_pool {
-	struct attribute_values *first[ATTRIBUTE_POOL_LISTS];
+	struct attribute_values *bucket[ATTRIBUTE_POOL_BUCKETS];
 };
 
 /* Whether some texture uses the attributes, or the edges of this shape. The value is the number of points of a triangle
  * at which such a texture has its extremes: the corners, and for edges also the point at equal distances from all
  * three. */
-enum attribute_asked { ASKED_NOTHING = 0, ASKED_ATTRIBUTES = 3, ASKED_EDGES = 4 };
+enum triangle_probes { TRIANGLE_PROBES_NONE = 0, TRIANGLE_PROBES_CORNERS = 3, TRIANGLE_PROBES_EDGES = 4 };
 
 struct attribute_table {
 	const struct scene_node *shape;
@@ -44,13 +44,13 @@ struct attribute_table {
 	uint32_t count;
 	const struct attribute *attributes;
 	struct attribute_pool *pool;
-	enum attribute_asked asked;
+	enum triangle_probes probes_per_triangle;
 };
 
 enum attribute_use { ATTRIBUTE_COLOR, ATTRIBUTE_COORDINATES };
 
 /* Computes the edges of a triangle in scene units; side[k] is opposite corner k. */
-void attribute_table_sides(const struct attribute_table *t, uint32_t triangle, vec3 side[3]);
+void attribute_table_edges(const struct attribute_table *t, uint32_t triangle, vec3 side[3]);
 
 /* Finds the attribute `name`. Returns NULL if there is none or its values are not valid for that use, and sets e to
  * -EINVAL with a sentence that names the mesh and the most similar name. n: node of the texture. */
@@ -59,7 +59,7 @@ const struct attribute *attribute_find(const struct attribute_table *t, const ch
 
 /* Returns the values of an attribute, decoded from sRGB if `decode`, either new in the arena or shared. NULL if out of
  * memory. */
-const struct attribute_values *attribute_keep(struct attribute_table *t, const struct attribute *a, bool decode,
-					      struct arena *arena);
+const struct attribute_values *attribute_values_intern(struct attribute_table *t, const struct attribute *a,
+						       bool decode, struct arena *arena);
 
 #endif

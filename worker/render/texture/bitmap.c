@@ -25,14 +25,14 @@ struct bitmap {
 	const float *coordinates; /* (u,v) at each vertex; NULL: those of the shape */
 	const uint32_t (*index)[3];
 	enum color_role role;
-	enum color_shape shape;
+	enum color_kind color_kind;
 	double max;
 };
 
 /* In the order of enum raster_wrap. `zero` and `one` are names of 0.6 for `black` and `white`. */
 #define WRAP_MODES "repeat|mirror|clamp|black|white|zero|one"
 
-static enum raster_wrap wrap_of(const char *mode)
+static enum raster_wrap parse_wrap_mode(const char *mode)
 {
 	static const char *const names[] = {"repeat", "mirror", "clamp", "black", "white"};
 	if (strcmp(mode, "zero") == 0)
@@ -50,29 +50,29 @@ static bool is_nearest(const char *filter)
 	return strcmp(filter, "nearest") == 0 || strcmp(filter, "none") == 0;
 }
 
-static double upper_bound(const struct bitmap *b)
+static double compute_upper_bound(const struct bitmap *b)
 {
 	bool white = b->raster.wrap_u == RASTER_WHITE || b->raster.wrap_v == RASTER_WHITE;
 	double largest = fmax(raster_max(&b->raster), white ? 1 : 0);
 	if (b->role == COLOR_ILLUMINANT)
 		return largest * color_max_d65();
-	if (b->shape == COLOR_SHAPE_CONSTANT || white)
+	if (b->color_kind == COLOR_KIND_CONSTANT || white)
 		return largest;
 	uint32_t w = b->raster.image.width, h = b->raster.image.height;
-	double m = 0, *known = b->raster.shared ? &b->raster.shared->bound : NULL;
-	if (known && *known >= 0)
-		return *known;
+	double bound = 0, *cached_bound = b->raster.shared ? &b->raster.shared->spectrum_bound : NULL;
+	if (cached_bound && *cached_bound >= 0)
+		return *cached_bound;
 	for (uint32_t y = 0; y < h; y++)
 		for (uint32_t x = 0; x < w; x++) {
 			double rgb[3];
 			if ((uint64_t)w * h > BOUND_PIXELS_MAX)
 				return 1;
 			raster_pixel(&b->raster, x, y, rgb);
-			m = fmax(m, color_max_rgb_reflectance(rgb));
+			bound = fmax(bound, color_max_rgb_reflectance(rgb));
 		}
-	if (known)
-		*known = m;
-	return m;
+	if (cached_bound)
+		*cached_bound = bound;
+	return bound;
 }
 
 /* Reads `coordinates`, the name of a mesh attribute that replaces (u,v). */
@@ -90,7 +90,7 @@ static int read_coordinates(struct bitmap *b, const struct scene_node *n, const 
 	const struct attribute *a = attribute_find(table, name, ATTRIBUTE_COORDINATES, n, e);
 	if (!a)
 		return -EINVAL;
-	const struct attribute_values *v = attribute_keep(table, a, false, build->arena);
+	const struct attribute_values *v = attribute_values_intern(table, a, false, build->arena);
 	if (!v)
 		return node_error(n, e, ENOMEM, "out of memory");
 	b->coordinates = v->value;
@@ -104,37 +104,37 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	struct bitmap *b = t->data;
 	if (role == COLOR_UNBOUNDED) /* as in Mitsuba, whose images are limited to 1 unless emitters use them */
 		role = COLOR_REFLECTANCE;
-	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
-					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
-					   !build->number     ? IMAGE_ALL
-					   : build->dialect_3 ? IMAGE_LUMINANCE
-							      : IMAGE_MEAN};
+	const struct raster_options range = {color_role_is_number(role) ? -DBL_MAX : 0,
+					     role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
+					     !build->is_number	? IMAGE_ALL
+					     : build->dialect_3 ? IMAGE_LUMINANCE
+								: IMAGE_MEAN};
 	int code = raster_read(&b->raster, n, build->assets, &range, build->arena, e);
 	if (code)
 		return code;
 	const char *both = node_string(n, "wrap_mode", "repeat");
-	b->raster.wrap_u = wrap_of(node_string(n, "wrap_mode_u", both));
-	b->raster.wrap_v = wrap_of(node_string(n, "wrap_mode_v", both));
-	b->raster.nearest = is_nearest(node_string(n, "filter_type", "bilinear"));
+	b->raster.wrap_u = parse_wrap_mode(node_string(n, "wrap_mode_u", both));
+	b->raster.wrap_v = parse_wrap_mode(node_string(n, "wrap_mode_v", both));
+	b->raster.is_nearest = is_nearest(node_string(n, "filter_type", "bilinear"));
 	b->map = uv_map_read(n);
 	b->role = role;
 	code = read_coordinates(b, n, build, e);
 	if (code || color_role_is_number(role))
 		return code;
-	b->shape = !raster_is_grey(&b->raster) ? COLOR_SHAPE_OTHER
-		   : role == COLOR_ILLUMINANT  ? COLOR_SHAPE_D65
-					       : COLOR_SHAPE_CONSTANT;
-	b->max = upper_bound(b);
+	b->color_kind = !raster_is_grey(&b->raster) ? COLOR_KIND_OTHER
+			: role == COLOR_ILLUMINANT  ? COLOR_KIND_D65
+						    : COLOR_KIND_CONSTANT;
+	b->max = compute_upper_bound(b);
 	return 0;
 }
 
-static spectrum bitmap_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum bitmap_eval(const struct texture *t, const struct texture_point *point, const struct wavelengths *w)
 {
 	const struct bitmap *b = t->data;
-	double rgb[3], u = at->u, v = at->v;
+	double rgb[3], u = point->u, v = point->v;
 	if (b->coordinates) {
-		u = texture_interpolate(b->coordinates, 2, b->index, at, 0);
-		v = texture_interpolate(b->coordinates, 2, b->index, at, 1);
+		u = texture_interpolate(b->coordinates, 2, b->index, point, 0);
+		v = texture_interpolate(b->coordinates, 2, b->index, point, 1);
 	}
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
@@ -155,10 +155,10 @@ static void bitmap_jet(const struct texture *t, double u, double v, struct textu
 {
 	const struct bitmap *b = t->data;
 	const double(*m)[3] = b->map.m;
-	struct raster_patch p;
+	struct raster_jet p;
 	uv_map_apply(&b->map, &u, &v);
-	raster_patch(&b->raster, u, v, &p);
-	j->grey = b->raster.image.channels == 1;
+	raster_jet(&b->raster, u, v, &p);
+	j->is_grey = b->raster.image.channels == 1;
 	for (int k = 0; k < 3; k++) {
 		j->x[k] = p.x[k];
 		j->du[k] = m[0][0] * p.du[k] + m[1][0] * p.dv[k];
@@ -180,9 +180,9 @@ static double bitmap_aspect(const struct texture *t)
 	return (double)i->width / i->height;
 }
 
-static enum color_shape bitmap_shape(const struct texture *t)
+static enum color_kind bitmap_color_kind(const struct texture *t)
 {
-	return ((const struct bitmap *)t->data)->shape;
+	return ((const struct bitmap *)t->data)->color_kind;
 }
 
 const struct texture_ops texture_ops_bitmap = {
@@ -202,6 +202,6 @@ const struct texture_ops texture_ops_bitmap = {
 	.height = bitmap_height,
 	.jet = bitmap_jet,
 	.max = bitmap_max,
-	.shape = bitmap_shape,
+	.color_kind = bitmap_color_kind,
 	.aspect = bitmap_aspect,
 };

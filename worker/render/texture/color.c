@@ -15,7 +15,7 @@
 
 #include <string.h>
 
-static const float table[3 * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * 3] = {
+static const float upsample_coefficients[3 * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * 3] = {
 #include "upsample_table.inc"
 };
 
@@ -34,28 +34,30 @@ double color_d65(double nm)
 	return ((1 - b) * cie_d65[cell] + b * cie_d65[cell + 1]) * (1 / D65_LUMINANCE);
 }
 
-#define STEP(x) ((x) * (x) * (3 - 2 * (x)))
-#define VALUE(k) STEP(STEP((double)(k) / (UPSAMPLE_TABLE_SIZE - 1)))
-#define VALUES(k) VALUE(k), VALUE((k) + 1), VALUE((k) + 2), VALUE((k) + 3)
+#define SMOOTHSTEP(x) ((x) * (x) * (3 - 2 * (x)))
+#define TABLE_VALUE(k) SMOOTHSTEP(SMOOTHSTEP((double)(k) / (UPSAMPLE_TABLE_SIZE - 1)))
+#define TABLE_VALUES_4(k) TABLE_VALUE(k), TABLE_VALUE((k) + 1), TABLE_VALUE((k) + 2), TABLE_VALUE((k) + 3)
 /* The values of upsample_table_value(), tabulated because every textured vertex needs them. */
-static const double values[UPSAMPLE_TABLE_SIZE] = {VALUES(0),  VALUES(4),  VALUES(8),  VALUES(12),
-						   VALUES(16), VALUES(20), VALUES(24), VALUES(28)};
+static const double upsample_values[UPSAMPLE_TABLE_SIZE] = {TABLE_VALUES_4(0),	TABLE_VALUES_4(4),  TABLE_VALUES_4(8),
+							    TABLE_VALUES_4(12), TABLE_VALUES_4(16), TABLE_VALUES_4(20),
+							    TABLE_VALUES_4(24), TABLE_VALUES_4(28)};
 
 /* Interpolates the coefficients of a colour trilinearly; its largest component must be > 0. */
-static void table_lookup(const double rgb[3], double c[3])
+static void look_up_coefficients(const double rgb[3], double c[3])
 {
 	const int n = UPSAMPLE_TABLE_SIZE;
 	int l = rgb[0] >= rgb[1] ? (rgb[0] >= rgb[2] ? 0 : 2) : (rgb[1] >= rgb[2] ? 1 : 2);
 	double z = rgb[l], x = rgb[(l + 1) % 3] * (n - 1) / z, y = rgb[(l + 2) % 3] * (n - 1) / z;
-	int xi = (int)x, yi = (int)y, zi = (int)search_cell(values, UPSAMPLE_TABLE_SIZE - 1, z);
+	int xi = (int)x, yi = (int)y, zi = (int)search_cell(upsample_values, UPSAMPLE_TABLE_SIZE - 1, z);
 	xi = xi > n - 2 ? n - 2 : xi;
 	yi = yi > n - 2 ? n - 2 : yi;
-	double fx = x - xi, fy = y - yi, fz = (z - values[zi]) / (values[zi + 1] - values[zi]);
+	double fx = x - xi, fy = y - yi,
+	       fz = (z - upsample_values[zi]) / (upsample_values[zi + 1] - upsample_values[zi]);
 	const double wx[2] = {1 - fx, fx}, wy[2] = {1 - fy, fy}, wz[2] = {1 - fz, fz};
 	double sum[3] = {0, 0, 0};
 	for (int dz = 0; dz < 2; dz++)
 		for (int dy = 0; dy < 2; dy++) {
-			const float *p = table + 3 * (((l * n + zi + dz) * n + yi + dy) * n + xi);
+			const float *p = upsample_coefficients + 3 * (((l * n + zi + dz) * n + yi + dy) * n + xi);
 			double near = wx[0] * wy[dy] * wz[dz], far = wx[1] * wy[dy] * wz[dz];
 			for (int k = 0; k < 3; k++)
 				sum[k] = sum[k] + near * (double)p[k] + far * (double)p[3 + k];
@@ -67,11 +69,11 @@ static void table_lookup(const double rgb[3], double c[3])
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w)
 {
 	if (WAVELENGTHS_GREY(w) || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
-		return spectrum_of(rgb[0]);
-	if (w->rgb)
-		return spectrum_of_rgb(rgb);
+		return spectrum_constant(rgb[0]);
+	if (w->is_rgb)
+		return spectrum_from_rgb(rgb);
 	double c[3];
-	table_lookup(rgb, c);
+	look_up_coefficients(rgb, c);
 	spectrum s;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double t = (w->nm[i] - UPSAMPLE_CENTER_NM) * (1 / UPSAMPLE_HALF_NM);
@@ -84,9 +86,9 @@ spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths
 {
 	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
 	if (largest == 0 || WAVELENGTHS_GREY(w))
-		return spectrum_of(largest);
-	if (w->rgb)
-		return spectrum_of_rgb(rgb);
+		return spectrum_constant(largest);
+	if (w->is_rgb)
+		return spectrum_from_rgb(rgb);
 	const double unit[3] = {rgb[0] / largest, rgb[1] / largest, rgb[2] / largest};
 	spectrum s = color_eval_rgb_reflectance(unit, w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -96,16 +98,16 @@ spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths
 
 spectrum color_eval_rgb_unbounded(const double rgb[3], const struct wavelengths *w)
 {
-	if (WAVELENGTHS_GREY(w) || w->rgb || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
+	if (WAVELENGTHS_GREY(w) || w->is_rgb || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
 		return color_eval_rgb_reflectance(rgb, w);
-	double scale = COLOR_UNBOUNDED_OVER * fmax(rgb[0], fmax(rgb[1], rgb[2]));
-	const double part[3] = {rgb[0] / scale, rgb[1] / scale, rgb[2] / scale};
-	return spectrum_scale(scale, color_eval_rgb_reflectance(part, w));
+	double scale = COLOR_UNBOUNDED_SCALE * fmax(rgb[0], fmax(rgb[1], rgb[2]));
+	const double unit[3] = {rgb[0] / scale, rgb[1] / scale, rgb[2] / scale};
+	return spectrum_scale(scale, color_eval_rgb_reflectance(unit, w));
 }
 
 struct color color_constant(double x)
 {
-	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
+	return (struct color){.kind = COLOR_KIND_CONSTANT, .scale = x};
 }
 
 /* Returns x times the white of the role: D65 for illuminants, otherwise constant. */
@@ -113,8 +115,8 @@ static struct color color_white(double x, enum color_role role)
 {
 	struct color c = color_constant(x);
 	if (role == COLOR_ILLUMINANT) {
-		c.shape = COLOR_SHAPE_D65;
-		c.d65 = true;
+		c.kind = COLOR_KIND_D65;
+		c.times_d65 = true;
 	}
 	return c;
 }
@@ -146,16 +148,16 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	*out = color_white(largest, role);
 	if (rgb[0] == rgb[1] && rgb[1] == rgb[2])
 		return 0;
-	out->shape = COLOR_SHAPE_OTHER;
-	out->sigmoid = true;
+	out->kind = COLOR_KIND_OTHER;
+	out->is_sigmoid = true;
 	out->scale = role == COLOR_REFLECTANCE	? 1
 		     : role == COLOR_ILLUMINANT ? largest
-						: COLOR_UNBOUNDED_OVER * largest;
+						: COLOR_UNBOUNDED_SCALE * largest;
 	double *unit = out->rgb, c[3];
-	out->tinted = true;
+	out->has_rgb = true;
 	for (int k = 0; k < 3; k++)
 		unit[k] = rgb[k] / out->scale;
-	table_lookup(unit, c);
+	look_up_coefficients(unit, c);
 	struct upsample s;
 	upsample_init(&s, 1);
 	upsample_fit(&s, unit, 1e-9, c);
@@ -164,43 +166,43 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 }
 
 /* A position in a table: from sample i, `part` of the way to sample i + 1. */
-struct piece {
+struct table_position {
 	uint32_t i;
-	double part;
+	double fraction;
 };
 
 /* Finds the position of nm, clamped to the ends of the table. Most tables are equidistant, so the first guess is
  * right. */
-static struct piece piece_of(const struct color *c, double nm)
+static struct table_position find_position(const struct color *c, double nm)
 {
-	const double *at = c->nm;
+	const double *nm_table = c->nm;
 	uint32_t last = c->count - 2;
-	if (!(nm > at[0]))
-		return (struct piece){0, 0};
-	if (!(nm < at[last + 1]))
-		return (struct piece){last, 1};
-	double guess = (nm - at[0]) * c->per_nm;
+	if (!(nm > nm_table[0]))
+		return (struct table_position){0, 0};
+	if (!(nm < nm_table[last + 1]))
+		return (struct table_position){last, 1};
+	double guess = (nm - nm_table[0]) * c->intervals_per_nm;
 	uint32_t g = guess >= (double)last ? last : (uint32_t)guess;
-	if (!(at[g] <= nm && nm <= at[g + 1]))
-		g = search_cell(at, c->count - 1, nm);
-	return (struct piece){g, (nm - at[g]) / (at[g + 1] - at[g])};
+	if (!(nm_table[g] <= nm && nm <= nm_table[g + 1]))
+		g = search_cell(nm_table, c->count - 1, nm);
+	return (struct table_position){g, (nm - nm_table[g]) / (nm_table[g + 1] - nm_table[g])};
 }
 
-static double piece_value(const struct color *c, struct piece p)
+static double value_at_position(const struct color *c, struct table_position p)
 {
-	return (1 - p.part) * c->value[p.i] + p.part * c->value[p.i + 1];
+	return (1 - p.fraction) * c->value[p.i] + p.fraction * c->value[p.i + 1];
 }
 
 static double table_value(const struct color *c, double nm)
 {
 	if (c->zero_outside && (nm < c->nm[0] || nm > c->nm[c->count - 1]))
 		return 0;
-	return piece_value(c, piece_of(c, nm));
+	return value_at_position(c, find_position(c, nm));
 }
 
 /* Computes the RGB components of the colour, at scale 1, for paths that carry RGB: D65 is white, and negative
  * components become 0. */
-static void set_rgb(struct color *c, bool under_d65)
+static void compute_rgb(struct color *c, bool under_d65)
 {
 	double xyz[3] = {0, 0, 0}, d65_xyz[3] = {0, 0, 0}, white[3];
 	for (int i = 0; i < CIE_COUNT; i++) {
@@ -215,24 +217,24 @@ static void set_rgb(struct color *c, bool under_d65)
 	rec709_from_xyz(d65_xyz, white);
 	for (int k = 0; k < 3; k++)
 		c->rgb[k] = fmax(c->rgb[k] / white[k], 0);
-	c->tinted = true;
+	c->has_rgb = true;
 }
 
-struct color color_of_table(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65)
+struct color color_from_samples(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65)
 {
-	struct color c = {.shape = COLOR_SHAPE_OTHER,
+	struct color c = {.kind = COLOR_KIND_OTHER,
 			  .scale = 1,
 			  .count = n,
-			  .per_nm = (n - 1) / (nm[n - 1] - nm[0]),
+			  .intervals_per_nm = (n - 1) / (nm[n - 1] - nm[0]),
 			  .nm = nm,
 			  .value = value,
 			  .zero_outside = zero_outside};
-	set_rgb(&c, under_d65);
+	compute_rgb(&c, under_d65);
 	return c;
 }
 
-static int color_from_table(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
-			    struct error *e)
+static int color_from_spectrum(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+			       struct error *e)
 {
 	uint32_t n = v->as.spectrum.count;
 	for (uint32_t i = 0; i < n; i++) {
@@ -247,7 +249,7 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 				 *value = arena_share(arena, v->as.spectrum.value, n * sizeof(double));
 	if (!nm || !value)
 		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
-	*out = color_of_table(n, nm->bytes, value->bytes, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
+	*out = color_from_samples(n, nm->bytes, value->bytes, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
 	for (int k = 0; k < 3 && role == COLOR_REFLECTANCE; k++)
 		out->rgb[k] = fmin(out->rgb[k], 1);
 	return 0;
@@ -257,7 +259,7 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 		     struct error *e)
 {
 	double x;
-	bool equal = false; /* constant over wavelengths rather than white */
+	bool is_constant = false; /* constant over wavelengths rather than white */
 	switch (v->type) {
 	case VALUE_RGB:
 		if (color_from_rgb(v->as.rgb, role, out))
@@ -266,11 +268,11 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 		return 0;
 	case VALUE_SPECTRUM:
 		if (v->as.spectrum.count > 1)
-			return color_from_table(v, role, arena, out, e);
+			return color_from_spectrum(v, role, arena, out, e);
 		if (v->as.spectrum.count == 0)
 			return error_set(e, EINVAL, "a spectrum without values");
 		x = v->as.spectrum.value[0];
-		equal = true;
+		is_constant = true;
 		break;
 	case VALUE_FLOAT:
 		x = v->as.number;
@@ -283,16 +285,16 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	}
 	if (!(x >= 0) || !(x <= role_max(role)))
 		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
-	*out = equal ? color_constant(x) : color_white(x, role);
-	if (equal && role == COLOR_ILLUMINANT)
-		set_rgb(out, false);
+	*out = is_constant ? color_constant(x) : color_white(x, role);
+	if (is_constant && role == COLOR_ILLUMINANT)
+		compute_rgb(out, false);
 	return 0;
 }
 
 static inline spectrum eval_lanes(const struct color *c, const struct wavelengths *w, int lanes)
 {
-	spectrum s = spectrum_of(c->scale);
-	if (c->sigmoid)
+	spectrum s = spectrum_constant(c->scale);
+	if (c->is_sigmoid)
 		for (int i = 0; i < lanes; i++) {
 			double nm = w->nm[i];
 			s.v[i] *=
@@ -301,40 +303,40 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 	if (c->count)
 		for (int i = 0; i < lanes; i++)
 			s.v[i] *= table_value(c, w->nm[i]);
-	if (c->d65)
+	if (c->times_d65)
 		for (int i = 0; i < lanes; i++)
 			s.v[i] *= color_d65(w->nm[i]);
 	return s;
 }
 
-spectrum color_eval_coloured(const struct color *c, const struct wavelengths *w)
+spectrum color_eval_colored(const struct color *c, const struct wavelengths *w)
 {
-	if (w->rgb)
-		return c->tinted ? spectrum_scale(c->scale, spectrum_of_rgb(c->rgb)) : spectrum_of(c->scale);
-	if (c->shape == COLOR_SHAPE_CONSTANT)
-		return spectrum_of(c->scale);
-	if (w->few)
-		return spectrum_repeat(eval_lanes(c, w, (int)w->few), (int)w->few);
+	if (w->is_rgb)
+		return c->has_rgb ? spectrum_scale(c->scale, spectrum_from_rgb(c->rgb)) : spectrum_constant(c->scale);
+	if (c->kind == COLOR_KIND_CONSTANT)
+		return spectrum_constant(c->scale);
+	if (w->period)
+		return spectrum_repeat(eval_lanes(c, w, (int)w->period), (int)w->period);
 	return eval_lanes(c, w, SPECTRUM_LANES);
 }
 
-void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2])
+void color_eval_pair(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2])
 {
-	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w) || w->rgb) {
+	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w) || w->is_rgb) {
 		out[0] = color_eval(a, w);
 		out[1] = color_eval(b, w);
 		return;
 	}
 	for (unsigned i = 0; i < SPECTRUM_LANES; i++) {
-		unsigned same = w->few ? i % w->few : i;
-		if (same < i) {
-			out[0].v[i] = out[0].v[same];
-			out[1].v[i] = out[1].v[same];
+		unsigned source_lane = w->period ? i % w->period : i;
+		if (source_lane < i) {
+			out[0].v[i] = out[0].v[source_lane];
+			out[1].v[i] = out[1].v[source_lane];
 			continue;
 		}
-		struct piece p = piece_of(a, w->nm[i]);
-		out[0].v[i] = a->scale * piece_value(a, p);
-		out[1].v[i] = b->scale * piece_value(b, p);
+		struct table_position p = find_position(a, w->nm[i]);
+		out[0].v[i] = a->scale * value_at_position(a, p);
+		out[1].v[i] = b->scale * value_at_position(b, p);
 	}
 }
 
@@ -356,7 +358,7 @@ double color_max_rgb_reflectance(const double rgb[3])
 	if (rgb[0] == rgb[1] && rgb[1] == rgb[2])
 		return rgb[0];
 	double t[3], c[3];
-	table_lookup(rgb, t);
+	look_up_coefficients(rgb, t);
 	coefficients_in_nm(t, c);
 	return sigmoid_max(c);
 }
@@ -377,7 +379,7 @@ static bool is_invisible(const struct color *c)
 double color_max(const struct color *c)
 {
 	double m = is_invisible(c) ? 0 : c->scale;
-	if (c->sigmoid)
+	if (c->is_sigmoid)
 		m *= sigmoid_max(c->coefficient);
 	if (c->count) {
 		double largest = 0;
@@ -385,7 +387,7 @@ double color_max(const struct color *c)
 			largest = fmax(largest, c->value[i]);
 		m *= largest;
 	}
-	if (c->d65)
+	if (c->times_d65)
 		m *= color_max_d65();
 	return m;
 }

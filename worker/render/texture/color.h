@@ -25,20 +25,20 @@ static inline bool color_role_is_number(enum color_role r)
 
 /* How a colour varies with wavelength. In a grey scene, all reflectances are CONSTANT and all emitters are of one
  * kind. */
-enum color_shape { COLOR_SHAPE_CONSTANT, COLOR_SHAPE_D65, COLOR_SHAPE_OTHER };
+enum color_kind { COLOR_KIND_CONSTANT, COLOR_KIND_D65, COLOR_KIND_OTHER };
 
 struct color {
-	enum color_shape shape;
-	double scale; /* factor of the following */
-	bool d65;     /* times normalised D65 */
-	bool sigmoid; /* times S(c0 x^2 + c1 x + c2), x the wavelength in nm */
+	enum color_kind kind;
+	double scale;	 /* factor of the following */
+	bool times_d65;	 /* times normalised D65 */
+	bool is_sigmoid; /* times S(c0 x^2 + c1 x + c2), x the wavelength in nm */
 	double coefficient[3];
 	uint32_t count; /* > 0: times a piecewise linear table; beyond its ends 0 if zero_outside, otherwise the end
 			   values */
-	double per_nm;	/* pieces per nm, on average */
+	double intervals_per_nm;  /* pieces per nm, on average */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
-	bool tinted; /* with colour=rgb, the components are scale times rgb; otherwise each is the scale */
+	bool has_rgb; /* with colour=rgb, the components are scale times rgb; otherwise each is the scale */
 	double rgb[3];
 };
 
@@ -52,20 +52,20 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
  * it is 0 if zero_outside, like all of Mitsuba's tables; otherwise it keeps the value at the end, which suits indices
  * and coefficients of media, where 0 is never meant. With colour=rgb, its components are those of light with these
  * values, times D65 if under_d65. */
-struct color color_of_table(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65);
+struct color color_from_samples(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65);
 struct color color_constant(double x);
-spectrum color_eval_coloured(const struct color *c, const struct wavelengths *w); /* color_eval, if not grey */
+spectrum color_eval_colored(const struct color *c, const struct wavelengths *w); /* color_eval, if not grey */
 static inline spectrum color_eval(const struct color *c, const struct wavelengths *w)
 {
 	if (WAVELENGTHS_GREY(w)) {
-		assert(c->shape != COLOR_SHAPE_OTHER);
-		return spectrum_of(c->scale);
+		assert(c->kind != COLOR_KIND_OTHER);
+		return spectrum_constant(c->scale);
 	}
-	return color_eval_coloured(c, w);
+	return color_eval_colored(c, w);
 }
 /* Evaluates two colours; with a single search if their tables share the wavelengths, as those of a metal's n and k
  * do. */
-void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2]);
+void color_eval_pair(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2]);
 double color_max(const struct color *c);  /* upper bound over wavelengths */
 double color_mean(const struct color *c); /* mean over wavelengths as they are sampled, to choose among emitters */
 
@@ -75,8 +75,8 @@ spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelength
 double color_max_rgb_reflectance(const double rgb[3]); /* the maximum of that spectrum */
 /* Likewise for emitters: largest component x reflectance x D65. rgb >= 0. */
 spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w);
-/* Likewise for quantities that may exceed 1: COLOR_UNBOUNDED_OVER x largest component x reflectance. */
-#define COLOR_UNBOUNDED_OVER 2
+/* Likewise for quantities that may exceed 1: COLOR_UNBOUNDED_SCALE x largest component x reflectance. */
+#define COLOR_UNBOUNDED_SCALE 2
 spectrum color_eval_rgb_unbounded(const double rgb[3], const struct wavelengths *w);
 double color_max_d65(void);
 

@@ -7,20 +7,20 @@
 #include <string.h>
 
 enum {
-	NUMBERS_MAX = 1 << 16, /* the most numbers that an index of two bytes can distinguish */
+	PALETTE_MAX = 1 << 16, /* the most numbers that an index of two bytes can distinguish */
 	/* The most failed probes per value, on average. A file whose numbers collide more often is stored without
 	 * indices, since indexing it could take hours. */
-	DETOUR_MAX = 8,
+	FAILED_PROBES_MAX = 8,
 };
 
 /* The distinct numbers of an image, in a hash table with open addressing. Numbers are compared by their bits, so that
  * -0 differs from 0. */
 struct number_table {
 	struct {
-		uint32_t bits, known; /* known: 1 + the index of the number; 0: the slot is free */
+		uint32_t bits, index_plus_1; /* index_plus_1: 1 + the index of the number; 0: the slot is free */
 	} * slot;
-	uint32_t slots; /* a power of two, at least twice the most numbers */
-	uint32_t numbers;
+	uint32_t slot_count; /* a power of two, at least twice the most numbers */
+	uint32_t count;
 };
 
 static uint32_t bits_of(float x)
@@ -38,104 +38,104 @@ static uint32_t first_slot(uint32_t bits)
 /* Returns the slot of the number, or a free one; at least half of the slots are free. */
 static uint32_t slot_of(const struct number_table *t, uint32_t bits)
 {
-	uint32_t at = first_slot(bits) & (t->slots - 1);
-	while (t->slot[at].known && t->slot[at].bits != bits)
-		at = (at + 1) & (t->slots - 1);
-	return at;
+	uint32_t slot = first_slot(bits) & (t->slot_count - 1);
+	while (t->slot[slot].index_plus_1 && t->slot[slot].bits != bits)
+		slot = (slot + 1) & (t->slot_count - 1);
+	return slot;
 }
 
 /* Enters all numbers into the table. Returns false if there are more than an index can distinguish, or if there are too
  * many collisions. */
-static bool find_numbers(struct number_table *t, const float *x, size_t count)
+static bool collect_numbers(struct number_table *t, const float *x, size_t count)
 {
-	size_t detours = 0;
+	size_t failed_probes = 0;
 	for (size_t i = 0; i < count; i++) {
-		uint32_t bits = bits_of(x[i]), at = slot_of(t, bits);
-		detours += (at - first_slot(bits)) & (t->slots - 1);
-		if (detours > DETOUR_MAX * count)
+		uint32_t bits = bits_of(x[i]), slot = slot_of(t, bits);
+		failed_probes += (slot - first_slot(bits)) & (t->slot_count - 1);
+		if (failed_probes > FAILED_PROBES_MAX * count)
 			return false;
-		if (t->slot[at].known)
+		if (t->slot[slot].index_plus_1)
 			continue;
-		if (t->numbers == NUMBERS_MAX)
+		if (t->count == PALETTE_MAX)
 			return false;
-		t->slot[at].bits = bits;
-		t->slot[at].known = ++t->numbers;
+		t->slot[slot].bits = bits;
+		t->slot[slot].index_plus_1 = ++t->count;
 	}
 	return true;
 }
 
-static size_t number_count(const struct image *i)
+static size_t value_count(const struct image *i)
 {
 	return (size_t)i->width * i->height * i->channels;
 }
 
 /* Allocates memory for the numbers and, if bytes > 0, for `count` indices of that size. -EFBIG or -ENOMEM. */
-static int allocate(struct indexed_image *out, size_t numbers, size_t count, size_t bytes, void **index,
-		    struct arena *arena, struct error *e)
+static int allocate_image(struct indexed_image *out, size_t palette_count, size_t count, size_t index_bytes,
+			  void **index, struct arena *arena, struct error *e)
 {
-	size_t need = numbers * sizeof *out->number + count * bytes;
-	if (need + arena->used > IMAGE_SCENE_BYTES_MAX)
-		return error_set(e, EFBIG,
-				 "%u x %u pixels take %zu MB, the scene before it %zu MB; at most %zu MB together",
-				 out->width, out->height, need >> 20, arena->used >> 20, IMAGE_SCENE_BYTES_MAX >> 20);
-	out->number = arena_alloc(arena, numbers, sizeof *out->number);
-	*index = bytes ? arena_alloc(arena, count, bytes) : NULL;
-	return !out->number || (bytes && !*index) ? error_set(e, ENOMEM, "out of memory") : 0;
+	size_t bytes_needed = palette_count * sizeof *out->palette + count * index_bytes;
+	if (bytes_needed + arena->used > IMAGE_SCENE_BYTES_MAX)
+		return error_set(
+			e, EFBIG, "%u x %u pixels take %zu MB, the scene before it %zu MB; at most %zu MB together",
+			out->width, out->height, bytes_needed >> 20, arena->used >> 20, IMAGE_SCENE_BYTES_MAX >> 20);
+	out->palette = arena_alloc(arena, palette_count, sizeof *out->palette);
+	*index = index_bytes ? arena_alloc(arena, count, index_bytes) : NULL;
+	return !out->palette || (index_bytes && !*index) ? error_set(e, ENOMEM, "out of memory") : 0;
 }
 
 static int make_indices(const struct number_table *t, const float *x, size_t count, struct arena *arena,
 			struct indexed_image *out, struct error *e)
 {
 	void *index = NULL;
-	bool bytes = t->numbers <= UINT8_MAX + 1;
-	int r = allocate(out, t->numbers, count, bytes ? 1 : 2, &index, arena, e);
+	bool is_8_bit = t->count <= UINT8_MAX + 1;
+	int r = allocate_image(out, t->count, count, is_8_bit ? 1 : 2, &index, arena, e);
 	if (r)
 		return r;
-	uint8_t *index8 = bytes ? index : NULL;
-	uint16_t *index16 = bytes ? NULL : index;
+	uint8_t *index8 = is_8_bit ? index : NULL;
+	uint16_t *index16 = is_8_bit ? NULL : index;
 	for (size_t i = 0; i < count; i++) {
-		uint32_t k = t->slot[slot_of(t, bits_of(x[i]))].known - 1;
-		out->number[k] = x[i];
-		if (bytes)
+		uint32_t k = t->slot[slot_of(t, bits_of(x[i]))].index_plus_1 - 1;
+		out->palette[k] = x[i];
+		if (is_8_bit)
 			index8[i] = (uint8_t)k;
 		else
 			index16[i] = (uint16_t)k;
 	}
-	out->numbers = t->numbers;
+	out->palette_count = t->count;
 	out->index8 = index8;
 	out->index16 = index16;
 	return 0;
 }
 
-int indexed_image_make(const struct image *from, struct arena *arena, struct indexed_image *out, struct error *e)
+int indexed_image_make(const struct image *source, struct arena *arena, struct indexed_image *out, struct error *e)
 {
-	size_t count = number_count(from);
-	struct number_table t = {.slots = 4};
-	*out = (struct indexed_image){.width = from->width, .height = from->height, .channels = from->channels};
-	while (t.slots < 2 * NUMBERS_MAX && t.slots < 2 * count)
-		t.slots *= 2;
-	t.slot = mem_alloc(t.slots, sizeof *t.slot);
+	size_t count = value_count(source);
+	struct number_table t = {.slot_count = 4};
+	*out = (struct indexed_image){.width = source->width, .height = source->height, .channels = source->channels};
+	while (t.slot_count < 2 * PALETTE_MAX && t.slot_count < 2 * count)
+		t.slot_count *= 2;
+	t.slot = mem_alloc(t.slot_count, sizeof *t.slot);
 	if (!t.slot)
 		return error_set(e, ENOMEM, "out of memory");
 	int r;
-	if (find_numbers(&t, from->pixels, count)) {
-		r = make_indices(&t, from->pixels, count, arena, out, e);
+	if (collect_numbers(&t, source->pixels, count)) {
+		r = make_indices(&t, source->pixels, count, arena, out, e);
 	} else {
 		void *none = NULL;
-		r = allocate(out, count, count, 0, &none, arena, e);
+		r = allocate_image(out, count, count, 0, &none, arena, e);
 		if (!r)
-			memcpy(out->number, from->pixels, count * sizeof *out->number);
+			memcpy(out->palette, source->pixels, count * sizeof *out->palette);
 	}
 	mem_free(t.slot);
 	return r;
 }
 
-struct indexed_image indexed_image_of(const struct image *from)
+struct indexed_image indexed_image_wrap(const struct image *source)
 {
-	return (struct indexed_image){from->width, from->height, from->channels, .number = from->pixels};
+	return (struct indexed_image){source->width, source->height, source->channels, .palette = source->pixels};
 }
 
-size_t indexed_image_numbers(const struct indexed_image *i)
+size_t indexed_image_palette_count(const struct indexed_image *i)
 {
-	return i->index8 || i->index16 ? i->numbers : (size_t)i->width * i->height * i->channels;
+	return i->index8 || i->index16 ? i->palette_count : (size_t)i->width * i->height * i->channels;
 }

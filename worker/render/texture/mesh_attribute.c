@@ -19,8 +19,8 @@ struct mesh_attribute {
 	size_t channels;
 	double scale, max;
 	enum color_role role;
-	enum color_shape shape;
-	bool mean; /* of the components */
+	enum color_kind color_kind;
+	bool takes_mean; /* of the components */
 };
 
 static int refuse_role(const struct scene_node *n, enum color_role role, struct error *e)
@@ -31,21 +31,21 @@ static int refuse_role(const struct scene_node *n, enum color_role role, struct 
 
 static void find_bounds(struct mesh_attribute *m, const struct attribute_values *v)
 {
-	bool grey = v->grey || m->mean;
-	double ends[2] = {m->scale * (double)v->least, m->scale * (double)v->most};
-	double most = fmax(fmax(ends[0], ends[1]), 0);
+	bool grey = v->is_grey || m->takes_mean;
+	double ends[2] = {m->scale * (double)v->min, m->scale * (double)v->max};
+	double max_value = fmax(fmax(ends[0], ends[1]), 0);
 	if (m->role == COLOR_ILLUMINANT) {
-		m->shape = v->grey ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
-		m->max = most * color_max_d65();
+		m->color_kind = v->is_grey ? COLOR_KIND_D65 : COLOR_KIND_OTHER;
+		m->max = max_value * color_max_d65();
 		return;
 	}
-	m->shape = grey ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_OTHER;
+	m->color_kind = grey ? COLOR_KIND_CONSTANT : COLOR_KIND_OTHER;
 	if (m->role == COLOR_UNBOUNDED) {
-		m->max = grey ? most : COLOR_UNBOUNDED_OVER * most;
+		m->max = grey ? max_value : COLOR_UNBOUNDED_SCALE * max_value;
 		return;
 	}
 	/* An upsampled colour may exceed its RGB components. */
-	m->max = grey ? fmin(most, 1) : 1;
+	m->max = grey ? fmin(max_value, 1) : 1;
 }
 
 static int make_attribute(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
@@ -59,22 +59,22 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 	const struct attribute *a = attribute_find(table, name, ATTRIBUTE_COLOR, n, e);
 	if (!a)
 		return -EINVAL;
-	bool decode = a->encoded && strcmp(n->type, "vertexcolors") == 0;
-	const struct attribute_values *v = attribute_keep(table, a, decode, build->arena);
+	bool decode = a->is_srgb && strcmp(n->type, "vertexcolors") == 0;
+	const struct attribute_values *v = attribute_values_intern(table, a, decode, build->arena);
 	struct mesh_attribute *m = t->data;
 	if (!v)
 		return node_error(n, e, ENOMEM, "out of memory");
 	*m = (struct mesh_attribute){.value = v->value,
-				     .index = a->per_face ? NULL : table->index,
+				     .index = a->is_per_face ? NULL : table->index,
 				     .channels = v->channels,
 				     .scale = node_float(n, "scale", 1),
 				     .role = role,
-				     .mean = build->number && v->channels > 1};
+				     .takes_mean = build->is_number && v->channels > 1};
 	find_bounds(m, v);
-	double most = v->grey || m->mean ? m->max : m->max / COLOR_UNBOUNDED_OVER;
-	if (role == COLOR_UNBOUNDED && !(most <= PARAM_METAL_MAX))
-		return node_error(n, e, ERANGE, "the attribute has numbers up to %g: they must be within [0, %g]", most,
-				  PARAM_METAL_MAX);
+	double max_value = v->is_grey || m->takes_mean ? m->max : m->max / COLOR_UNBOUNDED_SCALE;
+	if (role == COLOR_UNBOUNDED && !(max_value <= PARAM_METAL_MAX))
+		return node_error(n, e, ERANGE, "the attribute has numbers up to %g: they must be within [0, %g]",
+				  max_value, PARAM_METAL_MAX);
 	return 0;
 }
 
@@ -93,29 +93,29 @@ static int vertexcolors_create(struct texture *t, const struct scene_node *n, en
 	return make_attribute(t, n, "vertex_color", role, build, e);
 }
 
-static void look_up(const struct mesh_attribute *m, const struct texture_point *at, double rgb[3])
+static void eval_rgb(const struct mesh_attribute *m, const struct texture_point *point, double rgb[3])
 {
 	size_t step = m->channels > 1, n = m->channels;
 	if (!m->index) {
-		const float *p = m->value + at->prim * n;
+		const float *p = m->value + point->prim * n;
 		for (size_t k = 0; k < 3; k++)
 			rgb[k] = m->scale * (double)p[k * step];
 		return;
 	}
 	for (size_t k = 0; k < 3; k++)
-		rgb[k] = m->scale * texture_interpolate(m->value, n, m->index, at, k * step);
+		rgb[k] = m->scale * texture_interpolate(m->value, n, m->index, point, k * step);
 }
 
-static spectrum mesh_attribute_eval(const struct texture *t, const struct texture_point *at,
+static spectrum mesh_attribute_eval(const struct texture *t, const struct texture_point *point,
 				    const struct wavelengths *w)
 {
 	const struct mesh_attribute *m = t->data;
-	double rgb[3], most = m->role == COLOR_REFLECTANCE ? 1 : INFINITY;
-	look_up(m, at, rgb);
+	double rgb[3], limit = m->role == COLOR_REFLECTANCE ? 1 : INFINITY;
+	eval_rgb(m, point, rgb);
 	for (int k = 0; k < 3; k++)
-		rgb[k] = fmin(fmax(rgb[k], 0), most);
-	if (m->mean)
-		return spectrum_of((rgb[0] + rgb[1] + rgb[2]) / 3);
+		rgb[k] = fmin(fmax(rgb[k], 0), limit);
+	if (m->takes_mean)
+		return spectrum_constant((rgb[0] + rgb[1] + rgb[2]) / 3);
 	return m->role == COLOR_ILLUMINANT  ? color_eval_rgb_illuminant(rgb, w)
 	       : m->role == COLOR_UNBOUNDED ? color_eval_rgb_unbounded(rgb, w)
 					    : color_eval_rgb_reflectance(rgb, w);
@@ -126,9 +126,9 @@ static double mesh_attribute_max(const struct texture *t)
 	return ((const struct mesh_attribute *)t->data)->max;
 }
 
-static enum color_shape mesh_attribute_shape(const struct texture *t)
+static enum color_kind mesh_attribute_color_kind(const struct texture *t)
 {
-	return ((const struct mesh_attribute *)t->data)->shape;
+	return ((const struct mesh_attribute *)t->data)->color_kind;
 }
 
 /* No height and no jet: creation refuses the roles that need them. */
@@ -139,7 +139,7 @@ const struct texture_ops texture_ops_mesh_attribute = {
 	.create = attribute_create,
 	.eval = mesh_attribute_eval,
 	.max = mesh_attribute_max,
-	.shape = mesh_attribute_shape,
+	.color_kind = mesh_attribute_color_kind,
 };
 
 const struct texture_ops texture_ops_vertexcolors = {
@@ -148,5 +148,5 @@ const struct texture_ops texture_ops_vertexcolors = {
 	.create = vertexcolors_create,
 	.eval = mesh_attribute_eval,
 	.max = mesh_attribute_max,
-	.shape = mesh_attribute_shape,
+	.color_kind = mesh_attribute_color_kind,
 };

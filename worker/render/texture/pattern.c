@@ -13,11 +13,11 @@
 struct pattern {
 	struct texture color[2];
 	struct uv_map map;
-	unsigned (*which)(const struct pattern *p, double u, double v); /* index of the texture; (u,v) are mapped */
+	unsigned (*choose)(const struct pattern *p, double u, double v); /* index of the texture; (u,v) are mapped */
 	double line_width;
 };
 
-static unsigned square_at(const struct pattern *p, double u, double v)
+static unsigned choose_square(const struct pattern *p, double u, double v)
 {
 	(void)p;
 	bool right = u - floor(u) > 0.5, low = v - floor(v) > 0.5;
@@ -25,23 +25,23 @@ static unsigned square_at(const struct pattern *p, double u, double v)
 }
 
 /* Returns the distance to the nearest integer. */
-static double distance(double x)
+static double distance_to_integer(double x)
 {
 	return fabs(x - round(x));
 }
 
-static unsigned line_at(const struct pattern *p, double u, double v)
+static unsigned choose_line(const struct pattern *p, double u, double v)
 {
-	return distance(u) < p->line_width || distance(v) < p->line_width;
+	return distance_to_integer(u) < p->line_width || distance_to_integer(v) < p->line_width;
 }
 
-/* defaults: of color0 and color1; exchange: each takes the place of the other. */
-static int create(struct texture *t, const struct scene_node *n, const double defaults[2], bool exchange,
-		  enum color_role role, const struct texture_build *build, struct error *e)
+/* defaults: of color0 and color1; is_exchanged: each takes the place of the other. */
+static int create_pattern(struct texture *t, const struct scene_node *n, const double defaults[2], bool is_exchanged,
+			  enum color_role role, const struct texture_build *build, struct error *e)
 {
 	struct pattern *p = t->data;
 	p->map = uv_map_read(n);
-	int first = exchange ? 1 : 0;
+	int first = is_exchanged ? 1 : 0;
 	int code = texture_from_node(&p->color[first], n, "color0", defaults[0], role, build, e);
 	return code ? code : texture_from_node(&p->color[1 - first], n, "color1", defaults[1], role, build, e);
 }
@@ -49,28 +49,28 @@ static int create(struct texture *t, const struct scene_node *n, const double de
 static int checkerboard_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			       const struct texture_build *build, struct error *e)
 {
-	((struct pattern *)t->data)->which = square_at;
-	return create(t, n, (const double[2]){0.4, 0.2}, build->number && build->dialect_3, role, build, e);
+	((struct pattern *)t->data)->choose = choose_square;
+	return create_pattern(t, n, (const double[2]){0.4, 0.2}, build->is_number && build->dialect_3, role, build, e);
 }
 
 static int gridtexture_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			      const struct texture_build *build, struct error *e)
 {
 	struct pattern *p = t->data;
-	p->which = line_at;
+	p->choose = choose_line;
 	p->line_width = node_float(n, "line_width", 0.01);
-	return create(t, n, (const double[2]){0.2, 0.4}, false, role, build, e);
+	return create_pattern(t, n, (const double[2]){0.2, 0.4}, false, role, build, e);
 }
 
 static const struct texture *texture_at(const struct pattern *p, double u, double v)
 {
 	uv_map_apply(&p->map, &u, &v);
-	return &p->color[p->which(p, u, v)];
+	return &p->color[p->choose(p, u, v)];
 }
 
-static spectrum pattern_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum pattern_eval(const struct texture *t, const struct texture_point *point, const struct wavelengths *w)
 {
-	return texture_eval(texture_at(t->data, at->u, at->v), at, w);
+	return texture_eval(texture_at(t->data, point->u, point->v), point, w);
 }
 
 static double pattern_height(const struct texture *t, double u, double v)
@@ -90,11 +90,11 @@ static double pattern_max(const struct texture *t)
 	return fmax(texture_max(&p->color[0]), texture_max(&p->color[1]));
 }
 
-static enum color_shape pattern_shape(const struct texture *t)
+static enum color_kind pattern_color_kind(const struct texture *t)
 {
 	const struct pattern *p = t->data;
-	enum color_shape first = texture_shape(&p->color[0]);
-	return first == texture_shape(&p->color[1]) ? first : COLOR_SHAPE_OTHER;
+	enum color_kind first = texture_color_kind(&p->color[0]);
+	return first == texture_color_kind(&p->color[1]) ? first : COLOR_KIND_OTHER;
 }
 
 #define COLORS                                                                                                 \
@@ -110,7 +110,7 @@ static enum color_shape pattern_shape(const struct texture *t)
 		.height = pattern_height,                                                  \
 		.jet = pattern_jet,                                                        \
 		.max = pattern_max,                                                        \
-		.shape = pattern_shape,                                                    \
+		.color_kind = pattern_color_kind,                                          \
 	}
 PATTERN_OPS(checkerboard, COLORS);
 PATTERN_OPS(gridtexture, COLORS, {.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1});

@@ -12,27 +12,27 @@
 struct picture_entry;
 
 /* A hash table by key: a scene may read one image in 10^5 different ways. */
-enum { PICTURE_LISTS = 1 << 10 };
+enum { PICTURE_BUCKETS = 1 << 10 };
 struct picture_cache {
 	const struct arena *arena; /* images in other arenas are not shared */
-	struct picture_entry *first[PICTURE_LISTS];
+	struct picture_entry *bucket[PICTURE_BUCKETS];
 };
 
 /* Everything that determines the pixels, except the range to which they are clamped. */
 struct picture_key {
 	const char *name;
 	int64_t first_byte, byte_count, skip_bytes;
-	bool base64, linear;
+	bool is_base64, is_linear;
 	enum image_channel channel;
 	double threshold, power; /* power: exponent applied to the stored numbers; 1 unless linear */
 };
 
 struct picture {
 	struct indexed_image image;
-	uint64_t raised; /* number of pixels with a value that was raised to the least of the range */
+	uint64_t raised_pixel_count; /* number of pixels with a value that was raised to the least of the range */
 	/* Computed by users of the picture; negative: not known yet. */
-	double largest; /* largest of all values, at least 0 */
-	double bound;	/* upper bound of the spectra of all pixels */
+	double max_value;      /* largest of all values, at least 0 */
+	double spectrum_bound; /* upper bound of the spectra of all pixels */
 };
 
 /* Returns a picture with this key whose pixels are the same as if clamped to [least, largest], or NULL if there is

@@ -7,70 +7,70 @@
  */
 #include "worker/render/texture/raster.h"
 
-static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
-		  const struct picture_key *k, struct arena *arena, struct error *e)
+static int decode_image(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+			const struct picture_key *k, struct arena *arena, struct error *e)
 {
 	struct arena decoded = {0};
 	struct image image;
-	struct asset_range part;
+	struct asset_range file;
 	struct error reason;
-	int code = asset_part_open(&part, n, assets, e);
+	int code = asset_part_open(&file, n, assets, e);
 	if (code)
 		return code;
 	bool grey = k->channel == IMAGE_LUMINANCE || k->channel == IMAGE_MEAN;
-	code = image_decode(part.bytes, part.size, k->name, k->linear, grey ? IMAGE_ALL : k->channel, &decoded, &image,
-			    &reason);
-	asset_range_close(&part, assets);
+	code = image_decode(file.bytes, file.size, k->name, k->is_linear, grey ? IMAGE_ALL : k->channel, &decoded,
+			    &image, &reason);
+	asset_range_close(&file, assets);
 	if (!code)
-		code = image_power(&image, k->power, &reason);
+		code = image_apply_power(&image, k->power, &reason);
 	if (!code && grey)
-		image_grey(&image, k->channel);
+		image_convert_to_grey(&image, k->channel);
 	if (!code && (code = indexed_image_make(&image, arena, &r->image, &reason)))
 		error_prefix(&reason, code, "%s", k->name);
 	arena_fini(&decoded);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
-/* Returns the number of pixels with a value below `least`. */
-static uint64_t count_below(const struct indexed_image *i, double least)
+/* Returns the number of pixels with a value below `min`. */
+static uint64_t count_pixels_below(const struct indexed_image *i, double min)
 {
-	size_t numbers = indexed_image_numbers(i), values = (size_t)i->width * i->height * i->channels;
+	size_t numbers = indexed_image_palette_count(i), values = (size_t)i->width * i->height * i->channels;
 	uint64_t count = 0;
-	bool any = false;
-	for (size_t k = 0; k < numbers && !any; k++)
-		any = (double)i->number[k] < least;
-	for (size_t k = 0; k < values && any; k += i->channels) {
+	bool has_any = false;
+	for (size_t k = 0; k < numbers && !has_any; k++)
+		has_any = (double)i->palette[k] < min;
+	for (size_t k = 0; k < values && has_any; k += i->channels) {
 		bool below = false;
 		for (size_t c = 0; c < i->channels; c++)
-			below |= (double)indexed_image_at(i, k + c) < least;
+			below |= (double)indexed_image_value(i, k + c) < min;
 		count += below;
 	}
 	return count;
 }
 
 /* Applies the threshold, if there is one, and clamps to the range. Returns whether a pixel was outside the range. */
-static bool cut_to(struct indexed_image *i, double threshold, const struct raster_range *range)
+static bool clamp_to_range(struct indexed_image *i, double threshold, const struct raster_options *options)
 {
-	size_t count = indexed_image_numbers(i);
-	bool cut = false;
+	size_t count = indexed_image_palette_count(i);
+	bool is_changed = false;
 	for (size_t k = 0; k < count; k++) {
-		float x = i->number[k];
+		float x = i->palette[k];
 		if (threshold >= 0)
 			x = (double)x >= threshold ? 1 : 0;
-		float y = (double)x < range->least     ? (float)range->least
-			  : (double)x > range->largest ? (float)range->largest
-						       : x;
-		cut |= y != x;
-		i->number[k] = y;
+		float y = (double)x < options->min   ? (float)options->min
+			  : (double)x > options->max ? (float)options->max
+						     : x;
+		is_changed |= y != x;
+		i->palette[k] = y;
 	}
-	return cut;
+	return is_changed;
 }
 
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
-		const struct raster_range *range, struct arena *arena, struct error *e)
+		const struct raster_options *options, struct arena *arena, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL), *channel = node_string(n, "channel", "all");
-	enum image_channel kept = image_channel_named(channel);
+	enum image_channel selected = image_channel_named(channel);
 	double gamma = node_float(n, "gamma", 0);
 	if (!name)
 		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
@@ -82,36 +82,37 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		.first_byte = node_int(n, "first_byte", 0),
 		.byte_count = node_int(n, "byte_count", 0),
 		.skip_bytes = node_int(n, "skip_bytes", 0),
-		.base64 = node_bool(n, "base64", false),
-		.linear = gamma > 0 || node_bool(n, "raw", range->raw && gamma != -1),
-		.channel = kept == IMAGE_ALL ? range->all : kept,
+		.is_base64 = node_bool(n, "base64", false),
+		.is_linear = gamma > 0 || node_bool(n, "raw", options->default_raw && gamma != -1),
+		.channel = selected == IMAGE_ALL ? options->default_channel : selected,
 		.threshold = node_float(n, "threshold", -1),
 		.power = gamma > 0 ? gamma : 1,
 	};
-	struct picture_cache *decoded = assets->decoded && assets->decoded->arena == arena ? assets->decoded : NULL;
-	r->shared = decoded ? picture_find(decoded, &key, range->least, range->largest) : NULL;
+	struct picture_cache *cache =
+		assets->picture_cache && assets->picture_cache->arena == arena ? assets->picture_cache : NULL;
+	r->shared = cache ? picture_find(cache, &key, options->min, options->max) : NULL;
 	if (r->shared) {
 		r->image = r->shared->image;
-		r->raised = r->shared->raised;
+		r->raised_pixel_count = r->shared->raised_pixel_count;
 		return 0;
 	}
-	int code = decode(r, n, assets, &key, arena, e);
+	int code = decode_image(r, n, assets, &key, arena, e);
 	if (code)
 		return code;
-	r->raised = key.threshold >= 0 ? 0 : count_below(&r->image, range->least);
-	bool cut = cut_to(&r->image, key.threshold, range);
-	if (decoded)
-		r->shared = picture_add(decoded, &key, &r->image, range->least, range->largest, cut, arena);
+	r->raised_pixel_count = key.threshold >= 0 ? 0 : count_pixels_below(&r->image, options->min);
+	bool was_clamped = clamp_to_range(&r->image, key.threshold, options);
+	if (cache)
+		r->shared = picture_add(cache, &key, &r->image, options->min, options->max, was_clamped, arena);
 	if (r->shared)
-		r->shared->raised = r->raised;
+		r->shared->raised_pixel_count = r->raised_pixel_count;
 	return 0;
 }
 
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 {
-	size_t at = ((size_t)y * r->image.width + x) * r->image.channels;
+	size_t index = ((size_t)y * r->image.width + x) * r->image.channels;
 	for (size_t k = 0; k < 3; k++)
-		rgb[k] = (double)indexed_image_at(&r->image, r->image.channels == 3 ? at + k : at);
+		rgb[k] = (double)indexed_image_value(&r->image, r->image.channels == 3 ? index + k : index);
 }
 
 enum { OUTSIDE = UINT32_MAX }; /* index of columns and rows in a border of one colour */
@@ -122,7 +123,7 @@ static bool has_border(enum raster_wrap mode)
 }
 
 /* Maps x into the unit interval, or near it if the image has a border. */
-static double wrap(double x, enum raster_wrap mode)
+static double wrap_coordinate(double x, enum raster_wrap mode)
 {
 	if (!isfinite(x))
 		return 0;
@@ -138,7 +139,7 @@ static double wrap(double x, enum raster_wrap mode)
 
 /* Returns the index of the pixel that stands for the i-th, which may be one beyond the edge: on the opposite side if
  * repeated, the outermost pixel if mirrored or clamped. */
-static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
+static uint32_t wrap_index(int64_t i, uint32_t n, enum raster_wrap mode)
 {
 	if (has_border(mode) && (i < 0 || i >= (int64_t)n))
 		return OUTSIDE;
@@ -149,7 +150,7 @@ static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 	return (uint32_t)i;
 }
 
-static void texel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
+static void load_texel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 {
 	if (x != OUTSIDE && y != OUTSIDE) {
 		raster_pixel(r, x, y, rgb);
@@ -166,24 +167,24 @@ struct corners {
 static void find_corners(const struct raster *r, double u, double v, struct corners *k)
 {
 	uint32_t w = r->image.width, h = r->image.height;
-	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
+	double x = wrap_coordinate(u, r->wrap_u) * w, y = wrap_coordinate(v, r->wrap_v) * h;
 	int64_t i = (int64_t)floor(x - 0.5), j = (int64_t)floor(y - 0.5);
 	k->fx = x - 0.5 - (double)i;
 	k->fy = y - 0.5 - (double)j;
-	uint32_t xs[2] = {neighbour(i, w, r->wrap_u), neighbour(i + 1, w, r->wrap_u)};
-	uint32_t ys[2] = {neighbour(j, h, r->wrap_v), neighbour(j + 1, h, r->wrap_v)};
+	uint32_t xs[2] = {wrap_index(i, w, r->wrap_u), wrap_index(i + 1, w, r->wrap_u)};
+	uint32_t ys[2] = {wrap_index(j, h, r->wrap_v), wrap_index(j + 1, h, r->wrap_v)};
 	for (int n = 0; n < 4; n++)
-		texel(r, xs[n & 1], ys[n >> 1], k->c[n]);
+		load_texel(r, xs[n & 1], ys[n >> 1], k->c[n]);
 }
 
-static uint32_t nearest(double u, uint32_t n, enum raster_wrap mode)
+static uint32_t nearest_index(double u, uint32_t n, enum raster_wrap mode)
 {
-	return neighbour((int64_t)floor(wrap(u, mode) * n), n, mode == RASTER_REPEAT ? RASTER_CLAMP : mode);
+	return wrap_index((int64_t)floor(wrap_coordinate(u, mode) * n), n, mode == RASTER_REPEAT ? RASTER_CLAMP : mode);
 }
 
 static void eval_nearest(const struct raster *r, double u, double v, double rgb[3])
 {
-	texel(r, nearest(u, r->image.width, r->wrap_u), nearest(v, r->image.height, r->wrap_v), rgb);
+	load_texel(r, nearest_index(u, r->image.width, r->wrap_u), nearest_index(v, r->image.height, r->wrap_v), rgb);
 }
 
 static double interpolate(const struct corners *q, int k)
@@ -195,7 +196,7 @@ static double interpolate(const struct corners *q, int k)
 void raster_eval(const struct raster *r, double u, double v, double rgb[3])
 {
 	struct corners q;
-	if (r->nearest) {
+	if (r->is_nearest) {
 		eval_nearest(r, u, v, rgb);
 		return;
 	}
@@ -211,11 +212,11 @@ static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
 	return backwards ? -(double)pixels : (double)pixels;
 }
 
-void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out)
+void raster_jet(const struct raster *r, double u, double v, struct raster_jet *out)
 {
 	struct corners q;
-	*out = (struct raster_patch){.x = {0}};
-	if (r->nearest) {
+	*out = (struct raster_jet){.x = {0}};
+	if (r->is_nearest) {
 		eval_nearest(r, u, v, out->x);
 		return;
 	}
@@ -234,8 +235,8 @@ bool raster_is_grey(const struct raster *r)
 {
 	size_t count = (size_t)r->image.width * r->image.height;
 	for (size_t i = 0; r->image.channels == 3 && i < count; i++) {
-		float x = indexed_image_at(&r->image, 3 * i);
-		if (x != indexed_image_at(&r->image, 3 * i + 1) || x != indexed_image_at(&r->image, 3 * i + 2))
+		float x = indexed_image_value(&r->image, 3 * i);
+		if (x != indexed_image_value(&r->image, 3 * i + 1) || x != indexed_image_value(&r->image, 3 * i + 2))
 			return false;
 	}
 	return true;
@@ -243,13 +244,13 @@ bool raster_is_grey(const struct raster *r)
 
 double raster_max(const struct raster *r)
 {
-	size_t count = indexed_image_numbers(&r->image);
+	size_t count = indexed_image_palette_count(&r->image);
 	float m = 0;
-	if (r->shared && r->shared->largest >= 0)
-		return r->shared->largest;
+	if (r->shared && r->shared->max_value >= 0)
+		return r->shared->max_value;
 	for (size_t i = 0; i < count; i++)
-		m = r->image.number[i] > m ? r->image.number[i] : m;
+		m = r->image.palette[i] > m ? r->image.palette[i] : m;
 	if (r->shared)
-		r->shared->largest = (double)m;
+		r->shared->max_value = (double)m;
 	return (double)m;
 }

@@ -18,22 +18,23 @@ enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP, RASTER_BLACK, RAS
 struct raster {
 	struct indexed_image image;
 	enum raster_wrap wrap_u, wrap_v;
-	bool nearest;		/* otherwise bilinear */
-	struct picture *shared; /* NULL: the pixels are not shared */
-	uint64_t raised;	/* number of pixels with a value below the range given */
+	bool is_nearest;	     /* otherwise bilinear */
+	struct picture *shared;	     /* NULL: the pixels are not shared */
+	uint64_t raised_pixel_count; /* number of pixels with a value below the range given */
 };
 
-struct raster_range {
-	double least, largest;	/* pixels outside are clamped */
-	bool raw;		/* default of the parameter `raw`, unless `gamma` is given */
-	enum image_channel all; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
+struct raster_options {
+	double min, max;  /* pixels outside are clamped */
+	bool default_raw; /* default of the parameter `default_raw`, unless `gamma` is given */
+	enum image_channel
+		default_channel; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
 };
 
 /* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only this
  * channel, as three equal values) and threshold (pixels become 1 at or above it, 0 below). Returns 0 or a negative
  * error code. */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
-		const struct raster_range *range, struct arena *arena, struct error *e);
+		const struct raster_options *range, struct arena *arena, struct error *e);
 #define RASTER_PARAMS                                                                        \
 	{.name = "filename", .types = VALUE_STRING}, ASSET_PART_PARAMS,                      \
 		{.name = "channel", .types = VALUE_STRING, .choices = "all|r|g|b|a"},        \
@@ -47,10 +48,10 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
 /* The value with its derivatives with respect to u and v, and the mixed one. The other second derivatives are 0 between
  * pixel centres. */
-struct raster_patch {
+struct raster_jet {
 	double x[3], du[3], dv[3], duv[3];
 };
-void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out);
+void raster_jet(const struct raster *r, double u, double v, struct raster_jet *out);
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);
 bool raster_is_grey(const struct raster *r);
 double raster_max(const struct raster *r);

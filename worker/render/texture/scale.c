@@ -7,8 +7,8 @@ struct scale {
 	struct texture inner;
 	double factor;
 	struct color tint; /* its largest component is 1 */
-	bool tinted;
-	struct texture by; /* factor given as a texture; otherwise the constant 1 */
+	bool has_tint;
+	struct texture factor_texture; /* factor given as a texture; otherwise the constant 1 */
 	enum color_role role;
 };
 
@@ -16,23 +16,24 @@ struct scale {
 static int read_tint(struct scale *s, const struct scene_node *n, const struct property *p, struct error *e)
 {
 	const double *rgb = p->value.as.rgb;
-	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), of[3] = {0, 0, 0};
+	double max_component = fmax(rgb[0], fmax(rgb[1], rgb[2])), unit[3] = {0, 0, 0};
 	if (color_role_is_number(s->role))
 		return node_error(n, e, EINVAL, "scale is a number here, not a colour");
 	if (fmin(rgb[0], fmin(rgb[1], rgb[2])) < 0)
 		return node_error(n, e, ERANGE, "scale makes negative colours");
-	for (int k = 0; k < 3 && most > 0; k++)
-		of[k] = rgb[k] / most;
-	s->factor = most;
-	s->tinted = true;
-	return color_from_rgb(of, COLOR_REFLECTANCE, &s->tint);
+	for (int k = 0; k < 3 && max_component > 0; k++)
+		unit[k] = rgb[k] / max_component;
+	s->factor = max_component;
+	s->has_tint = true;
+	return color_from_rgb(unit, COLOR_REFLECTANCE, &s->tint);
 }
 
-static int read_by(struct scale *s, const struct scene_node *n, const struct texture_build *build, struct error *e)
+static int read_factor_texture(struct scale *s, const struct scene_node *n, const struct texture_build *build,
+			       struct error *e)
 {
 	if (color_role_is_number(s->role))
 		return node_error(n, e, EINVAL, "scale is a number here, not a texture");
-	return texture_create(&s->by, node_ref(n, "scale"), COLOR_REFLECTANCE, build, e);
+	return texture_create(&s->factor_texture, node_ref(n, "scale"), COLOR_REFLECTANCE, build, e);
 }
 
 static int scale_create(struct texture *t, const struct scene_node *n, enum color_role role,
@@ -40,17 +41,17 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 {
 	struct scale *s = t->data;
 	s->role = role;
-	const struct property *scale = node_find(n, "scale");
+	const struct property *scale = node_find_property(n, "scale");
 	int code = scale && scale->value.type == VALUE_RGB ? read_tint(s, n, scale, e) : 0;
-	s->by = (struct texture){.color = color_constant(1)};
+	s->factor_texture = (struct texture){.color = color_constant(1)};
 	if (!code && node_ref(n, "scale"))
-		code = read_by(s, n, build, e);
+		code = read_factor_texture(s, n, build, e);
 	if (code)
 		return code;
-	if (!s->tinted)
+	if (!s->has_tint)
 		s->factor = node_ref(n, "scale") ? 1 : node_float(n, "scale", 1);
 	const struct scene_node *inner = node_child(n, PLUGIN_TEXTURE, 0);
-	if (!inner && !node_find(n, "value"))
+	if (!inner && !node_find_property(n, "value"))
 		return node_error(n, e, EINVAL, "needs a texture inside, or a colour, `value`");
 	if (s->factor < 0 && !color_role_is_number(role))
 		return node_error(n, e, ERANGE, "scale=%g makes negative colours", s->factor);
@@ -58,14 +59,14 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 		     : texture_from_node(&s->inner, n, "value", 0, role, build, e);
 }
 
-static spectrum scale_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum scale_eval(const struct texture *t, const struct texture_point *point, const struct wavelengths *w)
 {
 	const struct scale *s = t->data;
-	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, at, w));
-	if (s->tinted)
+	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, point, w));
+	if (s->has_tint)
 		x = spectrum_mul(x, color_eval(&s->tint, w));
-	if (s->by.ops)
-		x = spectrum_mul(x, texture_eval(&s->by, at, w));
+	if (s->factor_texture.ops)
+		x = spectrum_mul(x, texture_eval(&s->factor_texture, point, w));
 	for (int i = 0; s->role == COLOR_REFLECTANCE && i < SPECTRUM_LANES; i++)
 		x.v[i] = fmin(x.v[i], 1);
 	return x;
@@ -94,7 +95,7 @@ static void scale_jet(const struct texture *t, double u, double v, struct textur
 static double scale_max(const struct texture *t)
 {
 	const struct scale *s = t->data;
-	double m = s->factor * texture_max(&s->inner) * texture_max(&s->by);
+	double m = s->factor * texture_max(&s->inner) * texture_max(&s->factor_texture);
 	return s->role == COLOR_REFLECTANCE ? fmin(m, 1) : m;
 }
 
@@ -103,13 +104,13 @@ static double scale_aspect(const struct texture *t)
 	return texture_aspect(&((const struct scale *)t->data)->inner);
 }
 
-/* Clamping at 1 does not change the color_shape: only reflectances are clamped, which are CONSTANT or OTHER. */
-static enum color_shape scale_shape(const struct texture *t)
+/* Clamping at 1 does not change the color_kind: only reflectances are clamped, which are CONSTANT or OTHER. */
+static enum color_kind scale_color_kind(const struct texture *t)
 {
 	const struct scale *s = t->data;
-	bool coloured =
-		(s->tinted && s->tint.shape != COLOR_SHAPE_CONSTANT) || texture_shape(&s->by) != COLOR_SHAPE_CONSTANT;
-	return coloured ? COLOR_SHAPE_OTHER : texture_shape(&s->inner);
+	bool coloured = (s->has_tint && s->tint.kind != COLOR_KIND_CONSTANT) ||
+			texture_color_kind(&s->factor_texture) != COLOR_KIND_CONSTANT;
+	return coloured ? COLOR_KIND_OTHER : texture_color_kind(&s->inner);
 }
 
 const struct texture_ops texture_ops_scale = {
@@ -126,6 +127,6 @@ const struct texture_ops texture_ops_scale = {
 	.height = scale_height,
 	.jet = scale_jet,
 	.max = scale_max,
-	.shape = scale_shape,
+	.color_kind = scale_color_kind,
 	.aspect = scale_aspect,
 };

@@ -51,7 +51,7 @@ static int height_from_value(struct texture *t, const struct scene_node *n, cons
 }
 
 /* A colour where a number is expected, as Mitsuba 3 takes it: the mean of r, g and b, or over a table's wavelengths. */
-static double number_of(const struct value *v)
+static double mean_of_color(const struct value *v)
 {
 	const double *nm = v->as.spectrum.nm, *x = v->as.spectrum.value;
 	double sum = 0;
@@ -66,7 +66,7 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 		      enum color_role role, const struct texture_build *build, struct error *e)
 {
 	const struct value absent = {.type = VALUE_FLOAT, .as.number = fallback};
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	const struct value *v = p ? &p->value : &absent;
 	*t = (struct texture){.ops = NULL};
 	if (v->type == VALUE_NODE)
@@ -77,8 +77,8 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 	int code = color_from_value(v, role, build->arena, &t->color, &reason);
 	if (code)
 		return node_error(n, e, -code, "%s: %s", name, reason.text);
-	if (build->number && t->color.shape != COLOR_SHAPE_CONSTANT)
-		t->color = color_constant(number_of(v));
+	if (build->is_number && t->color.kind != COLOR_KIND_CONSTANT)
+		t->color = color_constant(mean_of_color(v));
 	return 0;
 }
 
@@ -92,7 +92,7 @@ double texture_max(const struct texture *t)
 	return t->ops ? t->ops->max(t) : color_max(&t->color);
 }
 
-enum color_shape texture_shape(const struct texture *t)
+enum color_kind texture_color_kind(const struct texture *t)
 {
-	return t->ops ? t->ops->shape(t) : t->color.shape;
+	return t->ops ? t->ops->color_kind(t) : t->color.kind;
 }

@@ -18,19 +18,19 @@ struct texture_point {
 	double u, v;   /* texture coordinates */
 	double b1, b2; /* barycentric coordinates on the triangle `prim`; 0 on a sphere or without a surface */
 	uint32_t prim;
-	bool probe; /* probes a material without a surface: p is not known */
-	vec3 p;	    /* position in the world */
+	bool is_probe; /* probes a material without a surface: p is not known */
+	vec3 p;	       /* position in the world */
 };
 
 /* Interpolates channel k of values at the vertices of a mesh linearly. value: `channels` numbers per vertex; index: the
  * mesh's. */
 static inline double texture_interpolate(const float *value, size_t channels, const uint32_t (*index)[3],
-					 const struct texture_point *at, size_t k)
+					 const struct texture_point *point, size_t k)
 {
-	const uint32_t *i = index[at->prim];
-	double b0 = 1 - at->b1 - at->b2;
-	return b0 * (double)value[i[0] * channels + k] + at->b1 * (double)value[i[1] * channels + k] +
-	       at->b2 * (double)value[i[2] * channels + k];
+	const uint32_t *i = index[point->prim];
+	double b0 = 1 - point->b1 - point->b2;
+	return b0 * (double)value[i[0] * channels + k] + point->b1 * (double)value[i[1] * channels + k] +
+	       point->b2 * (double)value[i[2] * channels + k];
 }
 
 /* What texture_create needs besides the node. */
@@ -43,13 +43,13 @@ struct texture_build {
 	/* The texture stands for a number such as a roughness or a weight, not for a spectrum. For coloured images,
 	 * Mitsuba 3 then takes the luminance and 0.6 the mean, for colours both take the mean; Mitsuba 3 also exchanges
 	 * the colours of a checkerboard. */
-	bool number;
+	bool is_number;
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */
 struct texture_jet {
 	double x[3], du[3], dv[3], duu[3], duv[3], dvv[3];
-	bool grey; /* all three numbers are equal */
+	bool is_grey; /* all three numbers are equal */
 };
 
 struct texture_ops {
@@ -61,7 +61,7 @@ struct texture_ops {
 	double (*height)(const struct texture *t, double u, double v);			 /* for COLOR_HEIGHT */
 	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* for COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
-	enum color_shape (*shape)(const struct texture *t);
+	enum color_kind (*color_kind)(const struct texture *t);
 	double (*aspect)(const struct texture *t); /* width over height of the image; NULL: 1 */
 };
 
@@ -81,10 +81,10 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
 		   const struct texture_build *build, struct error *e);
 
-static inline spectrum texture_eval(const struct texture *t, const struct texture_point *at,
+static inline spectrum texture_eval(const struct texture *t, const struct texture_point *point,
 				    const struct wavelengths *w)
 {
-	return t->ops ? t->ops->eval(t, at, w) : color_eval(&t->color, w);
+	return t->ops ? t->ops->eval(t, point, w) : color_eval(&t->color, w);
 }
 
 static inline double texture_height(const struct texture *t, double u, double v)
@@ -102,7 +102,7 @@ static inline void texture_jet(const struct texture *t, double u, double v, stru
 
 double texture_aspect(const struct texture *t);
 double texture_max(const struct texture *t);
-enum color_shape texture_shape(const struct texture *t);
+enum color_kind texture_color_kind(const struct texture *t);
 static inline bool texture_is_constant(const struct texture *t)
 {
 	return !t->ops;

@@ -68,7 +68,7 @@ void upsample_init(struct upsample *s, int step_nm)
 	rec709_matrix(s->white, s->xyz_from_rgb);
 }
 
-static void to_xyz(const struct upsample *s, const double c[3], double xyz[3], double jacobian[3][3])
+static void xyz_from_coefficients(const struct upsample *s, const double c[3], double xyz[3], double jacobian[3][3])
 {
 	for (int k = 0; k < 3; k++)
 		xyz[k] = jacobian[k][0] = jacobian[k][1] = jacobian[k][2] = 0;
@@ -98,7 +98,7 @@ static double lab_curve(double x, double *slope)
 }
 
 /* Converts XYZ to L a b, with the derivatives with respect to XYZ. */
-static void to_lab(const struct upsample *s, const double xyz[3], double lab[3], double d[3][3])
+static void lab_from_xyz(const struct upsample *s, const double xyz[3], double lab[3], double d[3][3])
 {
 	double f[3], slope[3];
 	for (int k = 0; k < 3; k++) {
@@ -121,12 +121,12 @@ static double norm3(const double a[3])
 }
 
 /* Computes residual = Lab(c) - target, and its Jacobian with respect to c. Returns the norm of the residual. */
-static double residual_of(const struct upsample *s, const double target[3], const double c[3], double residual[3],
-			  double jacobian[3][3])
+static double compute_residual(const struct upsample *s, const double target[3], const double c[3], double residual[3],
+			       double jacobian[3][3])
 {
 	double xyz[3], by_c[3][3], lab[3], by_xyz[3][3];
-	to_xyz(s, c, xyz, by_c);
-	to_lab(s, xyz, lab, by_xyz);
+	xyz_from_coefficients(s, c, xyz, by_c);
+	lab_from_xyz(s, xyz, lab, by_xyz);
 	for (int r = 0; r < 3; r++) {
 		residual[r] = lab[r] - target[r];
 		for (int k = 0; k < 3; k++)
@@ -143,9 +143,9 @@ double upsample_fit(const struct upsample *s, const double rgb[3], double tolera
 	for (int k = 0; k < 3; k++)
 		xyz[k] = s->xyz_from_rgb[k][0] * rgb[0] + s->xyz_from_rgb[k][1] * rgb[1] +
 			 s->xyz_from_rgb[k][2] * rgb[2];
-	to_lab(s, xyz, target, unused);
+	lab_from_xyz(s, xyz, target, unused);
 
-	double r[3], j[3][3], error = residual_of(s, target, c, r, j), damping = 1e-6;
+	double r[3], j[3][3], error = compute_residual(s, target, c, r, j), damping = 1e-6;
 	for (int i = 0; i < ITERATIONS && error > tolerance; i++) {
 		/* Levenberg-Marquardt: the damping is proportional to the diagonal, so that units do not matter. */
 		double a[3][3], b[3], step[3], next[3], next_r[3], next_j[3][3];
@@ -159,7 +159,7 @@ double upsample_fit(const struct upsample *s, const double rgb[3], double tolera
 			break;
 		for (int k = 0; k < 3; k++)
 			next[k] = c[k] + step[k];
-		double next_error = residual_of(s, target, next, next_r, next_j);
+		double next_error = compute_residual(s, target, next, next_r, next_j);
 		if (!(next_error < error)) {
 			damping *= 10;
 			if (damping > 1e12)

@@ -21,23 +21,24 @@
 struct wireframe {
 	struct texture edge, interior;
 	struct attribute_table mesh; /* only its triangles are used */
-	bool lines;
-	double inner, outer; /* distances at which the transition from edge to interior begins and ends */
+	bool shows_lines;
+	double inner_distance,
+		outer_distance; /* distances at which the transition from edge to interior begins and ends */
 };
 
-static bool has_lines(const struct attribute_table *mesh)
+static bool is_wired_shape(const struct attribute_table *mesh)
 {
 	static const char *const types[] = {"obj", "ply", "serialized", "gltf", "cube"};
 	return mesh->triangle_count > 0 && text_is_among(mesh->shape->type, types, sizeof types / sizeof *types);
 }
 
-static double mean_side(const struct attribute_table *mesh)
+static double mean_edge_length(const struct attribute_table *mesh)
 {
 	double sum = 0;
 	for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-		vec3 side[3];
-		attribute_table_sides(mesh, t, side);
-		sum += vec3_length(side[0]) + vec3_length(side[1]) + vec3_length(side[2]);
+		vec3 edge[3];
+		attribute_table_edges(mesh, t, edge);
+		sum += vec3_length(edge[0]) + vec3_length(edge[1]) + vec3_length(edge[2]);
 	}
 	return sum / (3.0 * mesh->triangle_count);
 }
@@ -45,12 +46,12 @@ static double mean_side(const struct attribute_table *mesh)
 static void read_widths(struct wireframe *f, const struct scene_node *n)
 {
 	double width = node_float(n, "line_width", 0);
-	f->outer = width > 0 ? width : 0.1 * mean_side(&f->mesh);
-	f->inner = f->outer * (1 - node_float(n, "step_width", 0.5));
+	f->outer_distance = width > 0 ? width : 0.1 * mean_edge_length(&f->mesh);
+	f->inner_distance = f->outer_distance * (1 - node_float(n, "step_width", 0.5));
 }
 
-static int create(struct texture *t, const struct scene_node *n, enum color_role role,
-		  const struct texture_build *build, struct error *e)
+static int wireframe_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			    const struct texture_build *build, struct error *e)
 {
 	struct wireframe *f = t->data;
 	if (color_role_is_number(role))
@@ -63,52 +64,52 @@ static int create(struct texture *t, const struct scene_node *n, enum color_role
 		code = texture_from_node(&f->interior, n, "interior_color", 0.5, role, build, e);
 	if (code)
 		return code;
-	build->attributes->asked = ASKED_EDGES;
+	build->attributes->probes_per_triangle = TRIANGLE_PROBES_EDGES;
 	f->mesh = *build->attributes;
-	f->lines = has_lines(&f->mesh);
-	if (f->lines)
+	f->shows_lines = is_wired_shape(&f->mesh);
+	if (f->shows_lines)
 		read_widths(f, n);
 	return 0;
 }
 
 /* Returns the share of the interior's colour at a point. */
-static double interior_share(const struct wireframe *f, const struct texture_point *at)
+static double interior_share(const struct wireframe *f, const struct texture_point *point)
 {
-	if (!f->lines)
+	if (!f->shows_lines)
 		return 1;
-	vec3 side[3];
-	attribute_table_sides(&f->mesh, at->prim, side);
-	double twice = vec3_length(vec3_cross(side[1], side[2])), b[3] = {1 - at->b1 - at->b2, at->b1, at->b2},
-	       d = INFINITY;
+	vec3 edge[3];
+	attribute_table_edges(&f->mesh, point->prim, edge);
+	double double_area = vec3_length(vec3_cross(edge[1], edge[2])),
+	       b[3] = {1 - point->b1 - point->b2, point->b1, point->b2}, d = INFINITY;
 	for (int k = 0; k < 3; k++)
-		d = fmin(d, b[k] * twice / vec3_length(side[k]));
-	if (d >= f->outer)
+		d = fmin(d, b[k] * double_area / vec3_length(edge[k]));
+	if (d >= f->outer_distance)
 		return 1;
-	if (d <= f->inner)
+	if (d <= f->inner_distance)
 		return 0;
-	double x = (d - f->inner) / (f->outer - f->inner);
+	double x = (d - f->inner_distance) / (f->outer_distance - f->inner_distance);
 	return x * x * (3 - 2 * x);
 }
 
-static spectrum eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum wireframe_eval(const struct texture *t, const struct texture_point *point, const struct wavelengths *w)
 {
 	const struct wireframe *f = t->data;
-	double a = interior_share(f, at);
-	spectrum edge = a < 1 ? spectrum_scale(1 - a, texture_eval(&f->edge, at, w)) : spectrum_of(0);
-	return a > 0 ? spectrum_add(edge, spectrum_scale(a, texture_eval(&f->interior, at, w))) : edge;
+	double a = interior_share(f, point);
+	spectrum edge = a < 1 ? spectrum_scale(1 - a, texture_eval(&f->edge, point, w)) : spectrum_constant(0);
+	return a > 0 ? spectrum_add(edge, spectrum_scale(a, texture_eval(&f->interior, point, w))) : edge;
 }
 
-static double max(const struct texture *t)
+static double wireframe_max(const struct texture *t)
 {
 	const struct wireframe *f = t->data;
 	return fmax(texture_max(&f->edge), texture_max(&f->interior));
 }
 
-static enum color_shape shape(const struct texture *t)
+static enum color_kind wireframe_color_kind(const struct texture *t)
 {
 	const struct wireframe *f = t->data;
-	enum color_shape first = texture_shape(&f->edge);
-	return first == texture_shape(&f->interior) ? first : COLOR_SHAPE_OTHER;
+	enum color_kind first = texture_color_kind(&f->edge);
+	return first == texture_color_kind(&f->interior) ? first : COLOR_KIND_OTHER;
 }
 
 /* No height and no jet: creation refuses the roles that need them. */
@@ -118,8 +119,8 @@ const struct texture_ops texture_ops_wireframe = {
 		       {.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LENGTH_MAX},
 		       {.name = "step_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1}),
 	.data_size = sizeof(struct wireframe),
-	.create = create,
-	.eval = eval,
-	.max = max,
-	.shape = shape,
+	.create = wireframe_create,
+	.eval = wireframe_eval,
+	.max = wireframe_max,
+	.color_kind = wireframe_color_kind,
 };

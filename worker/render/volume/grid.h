@@ -16,39 +16,39 @@
 enum { GRID_CHANNELS_MAX = 3 };
 
 /* The values beyond the outermost points. */
-enum grid_outside { GRID_ZERO, GRID_CLAMP, GRID_REPEAT, GRID_MIRROR };
+enum grid_wrap { GRID_ZERO, GRID_CLAMP, GRID_REPEAT, GRID_MIRROR };
 
 struct grid {
 	int size[3];
-	int channels;		/* 1 or 3 */
-	const float *value;	/* channels vary fastest, then x, then y, then z */
-	mat4 to_cells;		/* from the world to cells; points are at integers */
-	double low[3], high[3]; /* the box, in cells */
-	bool turned; /* the box is [least, most] in the world instead, parallel to its axes; `low` and `high` then bound
-			it in cells, limited to +-GRID_CELL_MAX */
-	vec3 least, most; /* corners of the box if `turned` */
-	bool nearest;	  /* constant in each cell instead of linear; cells begin at integers */
-	enum grid_outside outside;
-	const unsigned char *full; /* for each brick, whether a value other than 0 counts in it */
+	int channels;			 /* 1 or 3 */
+	const float *value;		 /* channels vary fastest, then x, then y, then z */
+	mat4 to_cells;			 /* from the world to cells; points are at integers */
+	double cell_min[3], cell_max[3]; /* the box, in cells */
+	bool is_world_aligned; /* the box is [world_min, most] in the world instead, parallel to its axes; `cell_min`
+			and `cell_max` then bound it in cells, limited to +-GRID_CELL_MAX */
+	vec3 world_min, world_max; /* corners of the box if `is_world_aligned` */
+	bool is_nearest;	   /* constant in each cell instead of linear; cells begin at integers */
+	enum grid_wrap wrap;
+	const unsigned char *occupied_bricks; /* for each brick, whether a value other than 0 counts in it */
 	/* NULL, or two grids of three channels with the same points, which hold a symmetric matrix: xx yy zz, xy xz yz.
-	 * Along a ray of direction d, values are then multiplied by sqrt(d . matrix d), but not in grid_at. Integrals
+	 * Along a ray of direction d, values are then multiplied by sqrt(d . matrix d), but not in grid_eval. Integrals
 	 * are no longer exact: Gauss's rule with eight points is used in each cell. */
-	const struct grid *area;
+	const struct grid *area_matrix;
 };
 
 #define GRID_CELL_MAX 1e9
 
 /* Bricks are cubes of GRID_BRICK cells per side. Cells are numbered from -1, since the outermost lie half outside the
- * points. grid_bricks returns the number of bricks. */
+ * points. grid_brick_count returns the number of bricks. */
 enum { GRID_BRICK = 8 };
-size_t grid_bricks(const struct grid *g);
-/* Sets the elements of `full`, grid_bricks() zeros, of all bricks that are not empty, whatever g->outside is. Needs
- * only the sizes, channels and values of g. */
-void grid_find_full(const struct grid *g, unsigned char *full);
+size_t grid_brick_count(const struct grid *g);
+/* Sets the elements of `occupied_bricks`, grid_brick_count() zeros, of all bricks that are not empty, whatever g->wrap
+ * is. Needs only the sizes, channels and values of g. */
+void grid_find_occupied_bricks(const struct grid *g, unsigned char *full);
 
 /* Computes the values at p; a single channel is copied to all three. Returns false if p is outside the box, where
  * integrals take the value as 0. */
-bool grid_at(const struct grid *g, vec3 p, double value[GRID_CHANNELS_MAX]);
+bool grid_eval(const struct grid *g, vec3 p, double value[GRID_CHANNELS_MAX]);
 
 /* A segment of a ray: o + t d for t from t0 to t1, which may be INFINITY; d is a unit vector. */
 struct grid_ray {
@@ -59,9 +59,9 @@ struct grid_ray {
 /* Computes the integral of each channel over the part of the segment in the box, in units of t; 0 for channels that the
  * grid does not have. */
 void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX]);
-/* Returns the t at which the integral of weight[0] value[0] + ... from t0 reaches `least`, or INFINITY if it does not
- * before t1. sum: the integral of each channel up to that t. Weights and values must not be negative. */
-double grid_reach(const struct grid *g, const struct grid_ray *r, const double weight[GRID_CHANNELS_MAX], double least,
-		  double sum[GRID_CHANNELS_MAX]);
+/* Returns the t at which the integral of weight[0] value[0] + ... from t0 reaches `world_min`, or INFINITY if it does
+ * not before t1. sum: the integral of each channel up to that t. Weights and values must not be negative. */
+double grid_invert_integral(const struct grid *g, const struct grid_ray *r, const double weight[GRID_CHANNELS_MAX],
+			    double least, double sum[GRID_CHANNELS_MAX]);
 
 #endif

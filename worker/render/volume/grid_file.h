@@ -10,17 +10,17 @@ enum { GRID_SIDE_MAX = 1024 };
 struct grid_file {
 	uint32_t size[3]; /* 1 .. GRID_SIDE_MAX */
 	uint32_t channels;
-	double box[2][3];      /* two corners, as the file states them */
-	float *value;	       /* channels vary fastest, z slowest; finite; bytes become 0 to 1; in the arena */
-	double least, largest; /* smallest and largest of all values */
-	unsigned char *full;   /* struct grid.full; only set by grid_file_share; in the arena */
+	double box[2][3];	     /* two corners, as the file states them */
+	float *value;		     /* channels vary fastest, z slowest; finite; bytes become 0 to 1; in the arena */
+	double min_value, max_value; /* smallest and largest of all values */
+	unsigned char *occupied_bricks; /* struct grid.full; only set by grid_file_read_cached; in the arena */
 };
 
 /* A hash table, by name, of the files that a scene has read: volumes from the same file share its values. */
-struct grid_entry;
-enum { GRID_LISTS = 1 << 10 };
+struct grid_cache_entry;
+enum { GRID_CACHE_BUCKETS = 1 << 10 };
 struct grid_cache {
-	struct grid_entry *first[GRID_LISTS];
+	struct grid_cache_entry *bucket[GRID_CACHE_BUCKETS];
 };
 
 /* Reads the file that a node names. most: 1 accepts files of one channel, 3 of one or three, 6 of six. Returns 0,
@@ -29,7 +29,7 @@ int grid_file_read(const struct scene_node *n, const struct asset_source *assets
 		   struct grid_file *out, struct error *e);
 /* Like grid_file_read() with `most` 3, but from the cache if the file has been read before. The arena must outlive the
  * cache. */
-int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const struct asset_source *assets,
-		    struct arena *arena, struct grid_file *out, struct error *e);
+int grid_file_read_cached(struct grid_cache *cache, const struct scene_node *n, const struct asset_source *assets,
+			  struct arena *arena, struct grid_file *out, struct error *e);
 
 #endif

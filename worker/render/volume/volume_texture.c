@@ -14,8 +14,8 @@ struct volume_texture {
 	enum color_role role;
 };
 
-static int create(struct texture *t, const struct scene_node *n, enum color_role role,
-		  const struct texture_build *build, struct error *e)
+static int volume_texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
+				 const struct texture_build *build, struct error *e)
 {
 	struct volume_texture *x = t->data;
 	x->role = role;
@@ -36,48 +36,49 @@ static bool is_rgb(const struct volume_texture *x)
 
 /* Returns the point of the world at which the volume is evaluated. For probes, the third coordinate runs through its
  * range once for each step of the second. */
-static vec3 place_of(const struct volume_texture *x, const struct texture_point *at)
+static vec3 evaluation_point(const struct volume_texture *x, const struct texture_point *point)
 {
 	const struct grid *g = x->volume.grid;
-	if (!at->probe || !g)
-		return at->p;
-	const double part[3] = {at->u, at->v, fmod(at->u * 64 * 0.618 + at->v * 64, 1)};
+	if (!point->is_probe || !g)
+		return point->p;
+	const double part[3] = {point->u, point->v, fmod(point->u * 64 * 0.618 + point->v * 64, 1)};
 	double cell[3];
 	for (int i = 0; i < 3; i++)
-		cell[i] = g->low[i] + part[i] * (g->high[i] - g->low[i]);
+		cell[i] = g->cell_min[i] + part[i] * (g->cell_max[i] - g->cell_min[i]);
 	return mat4_point(&x->to_world, (vec3){cell[0], cell[1], cell[2]});
 }
 
-static spectrum eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum volume_texture_eval(const struct texture *t, const struct texture_point *point,
+				    const struct wavelengths *w)
 {
 	const struct volume_texture *x = t->data;
-	vec3 p = place_of(x, at);
+	vec3 p = evaluation_point(x, point);
 	if (!is_rgb(x))
-		return volume_at(&x->volume, p, false, w);
+		return volume_eval(&x->volume, p, false, w);
 	double rgb[GRID_CHANNELS_MAX];
-	grid_at(x->volume.grid, p, rgb);
+	grid_eval(x->volume.grid, p, rgb);
 	return x->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
 }
 
 /* An upsampled reflectance may exceed its RGB components. */
-static double max(const struct texture *t)
+static double volume_texture_max(const struct texture *t)
 {
 	const struct volume_texture *x = t->data;
 	return is_rgb(x) && x->role == COLOR_REFLECTANCE ? 1 : volume_max(&x->volume);
 }
 
-static enum color_shape shape(const struct texture *t)
+static enum color_kind volume_texture_color_kind(const struct texture *t)
 {
 	const struct volume_texture *x = t->data;
-	return is_rgb(x) ? COLOR_SHAPE_OTHER : x->volume.color.shape;
+	return is_rgb(x) ? COLOR_KIND_OTHER : x->volume.color.kind;
 }
 
 const struct texture_ops texture_ops_volume = {
 	.decl = {PLUGIN_TEXTURE, "volume", PARAMS({.name = "volume", .types = VALUE_VOLUME, .max = PARAM_LIGHT_MAX}), 0,
 		 PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct volume_texture),
-	.create = create,
-	.eval = eval,
-	.max = max,
-	.shape = shape,
+	.create = volume_texture_create,
+	.eval = volume_texture_eval,
+	.max = volume_texture_max,
+	.color_kind = volume_texture_color_kind,
 };

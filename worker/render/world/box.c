@@ -28,7 +28,7 @@ static bool clip_to_slab(double low, double high, double p, double d, double t[2
 	return t[0] <= t[1];
 }
 
-bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max)
+bool box_is_hit(const struct box *b, vec3 p, vec3 d, double t_max)
 {
 	double t[2] = {0, t_max};
 	return b->low.x <= b->high.x && clip_to_slab(b->low.x, b->high.x, p.x, d.x, t) &&

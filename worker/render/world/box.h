@@ -16,6 +16,6 @@ struct box box_empty(void);
 void box_grow(struct box *b, vec3 p);
 double box_extent(const struct box *b); /* length of the largest side */
 /* Whether the ray from p along d meets the box at a distance of at most t_max. */
-bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max);
+bool box_is_hit(const struct box *b, vec3 p, vec3 d, double t_max);
 
 #endif

@@ -20,7 +20,7 @@ int render_check(const struct scene *s, const struct asset_source *assets, const
  * collects these errors, each once; *out is only filled in if there are none. Any other error is returned, as by
  * render_check(). */
 int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-		     struct report *found, struct render_summary *out, struct error *e);
+		     struct report *report, struct render_summary *out, struct error *e);
 
 /* Builds a world with Embree's tree; ticks meanwhile (common/base/liveness.h). The scene description
  * may be freed afterwards. */
@@ -29,10 +29,10 @@ int world_new(struct world **w, const struct scene *s, const struct asset_source
 void world_free(struct world *w);
 /* Changes the settings (render_options.settings) of an existing world while no lease runs in it. *fits is false if one
  * of the changed settings requires building again: then a new world is needed, and this one is unchanged. */
-int world_set_accuracy(struct world *w, const char *accuracy, bool *fits, struct error *e);
+int world_set_accuracy(struct world *w, const char *accuracy, bool *can_apply, struct error *e);
 void world_summary(const struct world *w, struct render_summary *out);
 /* Returns X+Y+Z of the brightest emitter; used by canvas_grid_exponent if the bootstrap is black. */
-double world_brightest(const struct world *w);
+double world_brightness_bound(const struct world *w);
 /* Whether some emitter is a beam, whose light `path` does not find. */
 bool world_has_beam(const struct world *w);
 size_t world_embree_bytes(const struct world *w);

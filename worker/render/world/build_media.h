@@ -12,7 +12,7 @@
 int build_media(struct builder *b);
 /* Call after the emitters are built. Sets w->notes.endless if an unbounded medium around the camera
  * hides emitters at infinity. */
-void build_media_note(struct builder *b);
+void build_note_endless_medium(struct builder *b);
 /* Call after Embree's tree is built. Determines through which shapes light passes without a vertex, and
  * the media around emitters. */
 int build_scattering(struct builder *b);

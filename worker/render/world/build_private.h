@@ -25,30 +25,30 @@ struct builder {
 	/* One entry per shape: its geometry in double; for an instance, the mesh that it shares and the
 	 * instance node, otherwise NULL. */
 	struct shape_geometry *geometry;
-	struct shared_mesh **shared;
+	struct shared_mesh **shared_meshes;
 	const struct scene_node **instances;
 	/* One per shape, in scene units, applied to the shape as it was built; NULL: the shape does not move. */
 	struct motion **motions;
-	uint64_t triangles; /* total over all meshes, counting shared meshes once */
+	uint64_t triangle_count; /* total over all meshes, counting shared meshes once */
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
-	struct effects_choice forced;
+	struct effects_override forced_effects;
 	struct attribute_pool attributes;
 	struct grid_cache grids;
 	struct volume_build volumes; /* uses `grids` */
 	/* Bounding box of the scene, and one box per shape. */
-	struct box all, *boxes;
+	struct box scene_box, *shape_boxes;
 	/* A shape that emits was left out because it has no area. */
-	bool lost_light;
+	bool dropped_emitter;
 	/* Collects problems after which building continues; NULL: the first problem ends it. */
-	struct report *found;
+	struct report *report;
 	struct error *e;
 };
 
 /* Call if an object has failed with `code`. Returns 0 if the problem was recorded and building continues without the
  * object; otherwise the error code. */
-static inline int build_go_on(struct builder *b, int code)
+static inline int build_record_problem(struct builder *b, int code)
 {
-	return b->found ? report_problem_once(b->found, code, b->e) : code;
+	return b->report ? report_problem_once(b->report, code, b->e) : code;
 }
 
 static inline int build_out_of_memory(struct error *e)

@@ -10,7 +10,7 @@
 #include "worker/render/shape/shape.h"
 
 /* Returns the displacement property; NULL if the shape is not displaced. */
-const struct property *displacement_of(const struct scene_node *shape);
+const struct property *displacement_property(const struct scene_node *shape);
 
 /* Replaces the mesh of a displaced shape by a finer one in the arena; leaves other shapes unchanged. tessellation:
  * factor on the number of pieces into which an edge is divided. */

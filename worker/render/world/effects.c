@@ -2,7 +2,7 @@
 /* Names of effects, what omitting each saves, and which cannot be overridden. */
 #include "worker/render/world/effects.h"
 
-enum { ON = EFFECT_MAY_FORCE_ON, OFF = EFFECT_MAY_FORCE_OFF, SCENE = EFFECT_MAY_FORCE_OFF | EFFECT_OF_THE_SCENE };
+enum { ON = EFFECT_MAY_FORCE_ON, OFF = EFFECT_MAY_FORCE_OFF, SCENE = EFFECT_MAY_FORCE_OFF | EFFECT_CHANGES_SCENE };
 
 const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_COLOUR] = {"colour", ON, "drawing, carrying and storing wavelengths; colours become plain numbers",
@@ -25,7 +25,7 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing, except on paths that meet such a surface", NULL},
 	[EFFECT_ABSORPTION] = {"absorption", ON | SCENE, "a medium and an exponential per edge", NULL},
 	[EFFECT_SCATTERING] =
-		{"scattering", OFF | EFFECT_OF_THE_SCENE,
+		{"scattering", OFF | EFFECT_CHANGES_SCENE,
 		 "drawing distances; paths turn at surfaces only, and chains on half vectors can be chosen",
 		 "scattering by media is part of the scene"},
 	[EFFECT_TEXTURES] = {"textures", ON, "look-ups by (u,v); colours are constants",
@@ -38,13 +38,13 @@ const struct effect_decl effect_table[EFFECTS] = {
 				"whether surfaces coincide is a property of the scene"},
 	[EFFECT_INSTANCING] = {"instancing", 0, "transforms between rays and meshes",
 			       "whether instances share a mesh is a property of the scene"},
-	[EFFECT_MOTION] = {"motion", OFF | EFFECT_OF_THE_SCENE,
+	[EFFECT_MOTION] = {"motion", OFF | EFFECT_CHANGES_SCENE,
 			   "drawing and storing a time; everything stays where it is when the shutter opens",
 			   "what moves is part of the scene"},
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "following rays that escape", NULL},
 	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing, except on paths that end on one", NULL},
 	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing, except on paths that end on one", NULL},
-	[EFFECT_MEDIUM_LIGHT] = {"medium-light", OFF | EFFECT_OF_THE_SCENE,
+	[EFFECT_MEDIUM_LIGHT] = {"medium-light", OFF | EFFECT_CHANGES_SCENE,
 				 "collecting light along edges; chains on half vectors can be chosen",
 				 "emission by media is part of the scene"},
 	[EFFECT_TRANSPARENT_SHADOWS] =

@@ -47,21 +47,21 @@ enum effect {
 enum {
 	EFFECT_MAY_FORCE_ON = 1,
 	EFFECT_MAY_FORCE_OFF = 2,
-	EFFECT_OF_THE_SCENE = 4 /* if it is forced off, the image shows a different scene */
+	EFFECT_CHANGES_SCENE = 4 /* if it is forced off, the image shows a different scene */
 };
 
 struct effect_decl {
 	const char *name;
-	unsigned may;
-	const char *saves;  /* what omitting it saves */
-	const char *refuse; /* why it cannot be forced; NULL if it can */
+	unsigned override_flags;
+	const char *savings; /* what omitting it saves */
+	const char *refusal; /* why it cannot be forced; NULL if it can */
 };
 extern const struct effect_decl effect_table[EFFECTS];
 
 /* 1: forced on, -1: forced off, 0: determined by the scene. */
-struct effects_choice {
-	signed char of[EFFECTS];
-	bool any_on;
+struct effects_override {
+	signed char state[EFFECTS];
+	bool forces_any_on;
 };
 
 struct effects {
@@ -76,8 +76,8 @@ struct effects {
 	bool media;		  /* absorption or scattering */
 	/* Any effect that matters when sub-paths are joined: media, dispersion, transparent or refracted shadows. */
 	bool joints;
-	bool motion;		     /* paths have a time */
-	enum color_shape illuminant; /* spectrum shared by all emitters, if colour is off */
+	bool motion;		    /* paths have a time */
+	enum color_kind illuminant; /* spectrum shared by all emitters, if colour is off */
 	/* Edges of the longest path that can carry light, at most the scene's max_depth. */
 	uint32_t max_depth;
 	struct effect_line lines[RENDER_EFFECTS_MAX];

@@ -9,7 +9,7 @@ struct effects_source;
 struct world;
 
 /* Sets w->effects from shapes, BSDFs and emitters, and shape[] (one per shape, see visibility_bounds.h). */
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_override *forced,
 		     enum visibility *shape);
 
 #endif

@@ -10,55 +10,57 @@ static void remove_emitter(struct world *w, uint32_t i)
 {
 	w->emitters[i].power = 0;
 	if (w->emitter_shape[i] != UINT32_MAX)
-		w->parts[w->emitter_shape[i]].emitter = -1;
+		w->shape_bindings[w->emitter_shape[i]].emitter = -1;
 	if (w->environment == (int32_t)i)
 		w->environment = -1;
 }
 
-static bool is_switched_off(const struct emitter *em, const struct effects_choice *forced)
+static bool is_switched_off(const struct emitter *em, const struct effects_override *forced)
 {
-	enum effect which = em->delta ? EFFECT_DELTA_LIGHT : em->infinite ? EFFECT_ENVIRONMENT : EFFECT_AREA_LIGHT;
-	return forced->of[which] < 0;
+	enum effect which = em->is_delta      ? EFFECT_DELTA_LIGHT
+			    : em->is_infinite ? EFFECT_ENVIRONMENT
+					      : EFFECT_AREA_LIGHT;
+	return forced->state[which] < 0;
 }
 
 /* Makes shapes that no path can meet black and removes emitters without effect. Not used if an effect is forced on,
  * which might concern these objects. */
-static void leave_out(struct world *w, const enum visibility *shape)
+static void remove_invisible(struct world *w, const enum visibility *shape)
 {
 	uint32_t black = w->bsdf_count++; /* there is room for one more than there are shapes */
-	bsdf_black(&w->bsdfs[black]);
+	bsdf_make_black(&w->bsdfs[black]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
-			w->parts[i].bsdf = black;
+		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
+			w->shape_bindings[i].bsdf = black;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (!visibility_bounds_emitter(w, shape, i))
+		if (!visibility_bounds_emitter_is_visible(w, shape, i))
 			remove_emitter(w, i);
 }
 
-static unsigned lobes_without(const struct bsdf *b, const struct effects_choice *forced)
+static unsigned switched_off_lobes(const struct bsdf *b, const struct effects_override *forced)
 {
-	unsigned without = 0;
-	if (forced->of[EFFECT_TRANSMISSION] < 0 && (b->modes & BSDF_TRANSMIT))
-		without |= BSDF_WITHOUT_TRANSMISSION;
-	if (forced->of[EFFECT_SPECULAR] < 0 && b->has_delta)
-		without |= BSDF_WITHOUT_DELTA;
-	if (forced->of[isfinite(b->alpha) ? EFFECT_GLOSSY : EFFECT_DIFFUSE] < 0 && b->has_smooth)
-		without |= BSDF_WITHOUT_SMOOTH;
-	return without;
+	unsigned removed = 0;
+	if (forced->state[EFFECT_TRANSMISSION] < 0 && (b->modes & BSDF_TRANSMIT))
+		removed |= BSDF_WITHOUT_TRANSMISSION;
+	if (forced->state[EFFECT_SPECULAR] < 0 && b->has_delta)
+		removed |= BSDF_WITHOUT_DELTA;
+	if (forced->state[isfinite(b->min_alpha) ? EFFECT_GLOSSY : EFFECT_DIFFUSE] < 0 && b->has_smooth)
+		removed |= BSDF_WITHOUT_SMOOTH;
+	return removed;
 }
 
 /* If a medium's albedo varies, its optical depth is only known for both effects together (medium.h). */
-static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_choice *forced,
+static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_override *forced,
 			   struct error *e)
 {
 	m->absorbs = m->absorbs && fx->absorption;
-	m->scatters = m->scatters && fx->scattering && forced->of[EFFECT_SCATTERING] >= 0;
-	m->shines = m->shines && fx->medium_light;
+	m->scatters = m->scatters && fx->scattering && forced->state[EFFECT_SCATTERING] >= 0;
+	m->is_emissive = m->is_emissive && fx->medium_light;
 	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
 		return 0;
 	m->absorbs = m->scatters =
 		false; /* Either no path reaches the medium, or the user switched one of the effects off. */
-	return forced->of[EFFECT_ABSORPTION] < 0 || forced->of[EFFECT_SCATTERING] < 0
+	return forced->state[EFFECT_ABSORPTION] < 0 || forced->state[EFFECT_SCATTERING] < 0
 		       ? error_set(
 				 e, EINVAL,
 				 "absorption and scattering can only be switched off together in this scene: it has a "
@@ -66,19 +68,19 @@ static int apply_to_medium(struct medium *m, const struct effects *fx, const str
 		       : 0;
 }
 
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility *shape, struct error *e)
+int effects_apply(struct world *w, const struct effects_override *forced, const enum visibility *shape, struct error *e)
 {
-	if (!forced->any_on)
-		leave_out(w, shape);
+	if (!forced->forces_any_on)
+		remove_invisible(w, shape);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
 		struct bsdf *b = &w->bsdfs[i];
 		/* Dispersion that is forced on treats the index as varying with wavelength, by an amount of 0. */
 		if (!w->effects.dispersion)
-			b->dispersive = false;
-		else if (forced->of[EFFECT_DISPERSION] > 0 && b->eta != 1)
-			b->dispersive = true;
-		unsigned without = lobes_without(b, forced);
-		int rc = without ? bsdf_filter_lobes(b, without, &w->arena, e) : 0;
+			b->is_dispersive = false;
+		else if (forced->state[EFFECT_DISPERSION] > 0 && b->eta != 1)
+			b->is_dispersive = true;
+		unsigned removed = switched_off_lobes(b, forced);
+		int rc = removed ? bsdf_filter_lobes(b, removed, &w->arena, e) : 0;
 		if (rc)
 			return rc;
 	}
@@ -90,7 +92,7 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 		if (rc)
 			return rc;
 	}
-	if (forced->of[EFFECT_APERTURE])
+	if (forced->state[EFFECT_APERTURE])
 		camera_force_aperture(&w->camera, w->effects.aperture);
 	return 0;
 }

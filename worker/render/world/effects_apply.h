@@ -9,6 +9,7 @@ struct world;
 
 /* Removes what no path can meet and what was switched off. -EINVAL if the choice cannot be
  * applied to this scene; -ENOMEM. */
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility *shape, struct error *e);
+int effects_apply(struct world *w, const struct effects_override *forced, const enum visibility *shape,
+		  struct error *e);
 
 #endif

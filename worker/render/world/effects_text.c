@@ -15,7 +15,7 @@
 #include <string.h>
 
 /* Returns the effect of that name; EFFECTS if it is unknown. */
-static enum effect find(const char *name, size_t length)
+static enum effect find_effect(const char *name, size_t length)
 {
 	int i = 0;
 	while (i < EFFECTS &&
@@ -31,18 +31,18 @@ static int refuse_unknown(const char *name, size_t length, struct error *e)
 	struct spelling s = {.wanted = wanted};
 	for (int i = 0; i < EFFECTS; i++) {
 		spelling_offer(&s, effect_table[i].name);
-		spelling_list(list, sizeof list, effect_table[i].name);
+		spelling_append_to_list(list, sizeof list, effect_table[i].name);
 	}
 	return error_set(e, EINVAL, "no effect is called '%s'%s; there are %s", wanted,
 			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
-static int parse_item(const char *item, size_t length, struct effects_choice *out, struct error *e)
+static int parse_item(const char *item, size_t length, struct effects_override *out, struct error *e)
 {
 	if (length == 3 && memcmp(item, "all", 3) == 0) {
 		for (int i = 0; i < EFFECTS; i++)
-			if ((effect_table[i].may & EFFECT_MAY_FORCE_ON) && !out->of[i])
-				out->of[i] = 1;
+			if ((effect_table[i].override_flags & EFFECT_MAY_FORCE_ON) && !out->state[i])
+				out->state[i] = 1;
 		return 0;
 	}
 	if (length < 2 || (*item != '+' && *item != '-')) {
@@ -59,20 +59,20 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%s'%s", wanted,
 				 hint);
 	}
-	enum effect which = find(item + 1, length - 1);
+	enum effect which = find_effect(item + 1, length - 1);
 	if (which == EFFECTS)
 		return refuse_unknown(item + 1, length - 1, e);
 	const struct effect_decl *d = &effect_table[which];
-	bool on = *item == '+';
-	if (!(d->may & (on ? EFFECT_MAY_FORCE_ON : EFFECT_MAY_FORCE_OFF)))
-		return error_set(e, EINVAL, "%s cannot be forced %s: %s", d->name, on ? "on" : "off", d->refuse);
-	out->of[which] = on ? 1 : -1;
+	bool is_on = *item == '+';
+	if (!(d->override_flags & (is_on ? EFFECT_MAY_FORCE_ON : EFFECT_MAY_FORCE_OFF)))
+		return error_set(e, EINVAL, "%s cannot be forced %s: %s", d->name, is_on ? "on" : "off", d->refusal);
+	out->state[which] = is_on ? 1 : -1;
 	return 0;
 }
 
-int effects_parse(const char *text, struct effects_choice *out, struct error *e)
+int effects_parse(const char *text, struct effects_override *out, struct error *e)
 {
-	*out = (struct effects_choice){.any_on = false};
+	*out = (struct effects_override){.forces_any_on = false};
 	if (!*text)
 		return 0;
 	for (const char *at = text;; at++) {
@@ -85,62 +85,63 @@ int effects_parse(const char *text, struct effects_choice *out, struct error *e)
 			break;
 	}
 	for (int i = 0; i < EFFECTS; i++)
-		out->any_on |= out->of[i] > 0;
+		out->forces_any_on |= out->state[i] > 0;
 	return 0;
 }
 
-void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX])
+void effects_print(const struct effects_override *c, char text[PLAN_EFFECTS_MAX])
 {
-	bool all = true;
+	bool is_all = true;
 	for (int i = 0; i < EFFECTS; i++)
-		all &= c->of[i] != 0 || !(effect_table[i].may & EFFECT_MAY_FORCE_ON);
-	all &= c->any_on;
+		is_all &= c->state[i] != 0 || !(effect_table[i].override_flags & EFFECT_MAY_FORCE_ON);
+	is_all &= c->forces_any_on;
 	struct text t = {text, PLAN_EFFECTS_MAX};
 	memset(text, 0, PLAN_EFFECTS_MAX);
-	text_put(&t, "%s", all ? "all" : "");
+	text_appendf(&t, "%s", is_all ? "all" : "");
 	for (int i = 0; i < EFFECTS; i++)
-		if (c->of[i] < 0 || (c->of[i] > 0 && !all))
-			text_put(&t, "%s%c%s", *text ? "," : "", c->of[i] < 0 ? '-' : '+', effect_table[i].name);
+		if (c->state[i] < 0 || (c->state[i] > 0 && !is_all))
+			text_appendf(&t, "%s%c%s", *text ? "," : "", c->state[i] < 0 ? '-' : '+', effect_table[i].name);
 }
 
-int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e)
+int render_canonical_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e)
 {
-	struct effects_choice c;
+	struct effects_override c;
 	int rc = effects_parse(text, &c, e);
 	if (!rc)
 		effects_print(&c, canonical);
 	return rc;
 }
 
-void render_effects_note(const struct render_summary *scene, char *text, size_t size)
+void render_other_scene_note(const struct render_summary *scene, char *text, size_t size)
 {
 	struct text t = {text, size};
 	*text = 0;
 	for (size_t i = 0; i < scene->line_count; i++)
-		if (scene->lines[i].other_scene)
-			text_put(&t, "%s%s", *text ? ", " : "the image is of another scene: without ",
-				 scene->lines[i].name);
+		if (scene->lines[i].changes_scene)
+			text_appendf(&t, "%s%s", *text ? ", " : "the image is of another scene: without ",
+				     scene->lines[i].name);
 }
 
 bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size)
 {
-	const struct render_coincident *c = &scene->coincident;
-	render_effects_note(scene, text, size);
+	const struct coincidence_notes *c = &scene->coincidence_notes;
+	render_other_scene_note(scene, text, size);
 	if (*text && i-- == 0)
 		return true;
-	if (scene->settings.unplaced && i-- == 0) {
+	if (scene->settings.is_unplaced && i-- == 0) {
 		snprintf(text, size,
 			 "the scene has no <sensor>: as in Mitsuba, a camera in front of it looks along +z%s",
-			 scene->brightest > 0 ? "" : "; it has no emitter either: the image is black");
+			 scene->brightness_bound > 0 ? "" : "; it has no emitter either: the image is black");
 		return true;
 	}
-	const char *const met[] = {scene->notes.unseen,	 scene->notes.negative, scene->notes.dark,
-				   scene->notes.endless, scene->notes.backs,	scene->notes.scales,
-				   scene->notes.flat,	 scene->notes.normals,	scene->notes.close,
-				   scene->notes.without, scene->notes.gone,	scene->notes.materials};
-	for (size_t k = 0; k < sizeof met / sizeof *met; k++)
-		if (*met[k] && i-- == 0) {
-			snprintf(text, size, "%s", met[k]);
+	const char *const notes[] = {
+		scene->notes.nothing_visible, scene->notes.negative_pixels, scene->notes.no_light,
+		scene->notes.endless_medium,  scene->notes.black_backs,	    scene->notes.small_shape,
+		scene->notes.flat_triangles,  scene->notes.bad_normals,	    scene->notes.near_camera,
+		scene->notes.empty_meshes,    scene->notes.tiny_shapes,	    scene->notes.unread_materials};
+	for (size_t k = 0; k < sizeof notes / sizeof *notes; k++)
+		if (*notes[k] && i-- == 0) {
+			snprintf(text, size, "%s", notes[k]);
 			return true;
 		}
 	if (i < c->count) {
@@ -148,20 +149,20 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 		return true;
 	}
 	i -= c->count;
-	if (c->total > c->count && i-- == 0) {
-		snprintf(text, size, "%zu more pairs of shapes coincide", c->total - c->count);
+	if (c->pair_count > c->count && i-- == 0) {
+		snprintf(text, size, "%zu more pairs of shapes coincide", c->pair_count - c->count);
 		return true;
 	}
 	snprintf(
 		text, size,
 		"the search for coinciding surfaces stopped at its limit: where others coincide, it is undefined which one a ray hits");
-	return c->incomplete && i == 0;
+	return c->is_incomplete && i == 0;
 }
 
-bool render_effect_on(const struct render_summary *scene, const char *name)
+bool render_effect_is_on(const struct render_summary *scene, const char *name)
 {
 	for (size_t i = 0; i < scene->line_count; i++)
 		if (strcmp(scene->lines[i].name, name) == 0)
-			return scene->lines[i].on;
+			return scene->lines[i].is_on;
 	return false;
 }

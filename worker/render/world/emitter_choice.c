@@ -8,10 +8,11 @@
  * If emitter e is chosen with probability p_e, the second moment of the estimate of a point's direct light is sum c_e^2
  * / p_e, where c_e is the light from e. Relative to all light at the point, and averaged over the points of a cell, it
  * is sum a_e / p_e, where a_e is the mean of the squared shares of e. The minimum is at p_e proportional to sqrt(a_e).
- * Because a cell has few points, a_e includes BORROWED points of the enclosing cell, whose a_e in turn includes points
- * of the cell around it, up to the whole scene. Light sub-paths choose their emitter by the mean of two probabilities,
- * one by power and one by the shares of the whole scene. Cells use these probabilities in a fraction DEFENSIVE of all
- * cases, so that light that reached none of the points is chosen, too, and weights stay bounded.
+ * Because a cell has few points, a_e includes BORROWED_POINTS points of the enclosing cell, whose a_e in turn includes
+ * points of the cell around it, up to the whole scene. Light sub-paths choose their emitter by the mean of two
+ * probabilities, one by power and one by the shares of the whole scene. Cells use these probabilities in a fraction
+ * DEFENSIVE_FRACTION of all cases, so that light that reached none of the points is chosen, too, and weights stay
+ * bounded.
  *
  * Fails only if out of memory. Where too few points get light along a straight line (as when all lamps shine at
  * mirrors), or there are too many emitters, power alone decides.
@@ -23,44 +24,44 @@
 #include "worker/render/world/emitter_points.h"
 
 enum {
-	VALUES = 1 << 21, /* most points times parts; within the following bounds there is one point per pixel */
-	POINTS_MOST = 1 << 13,
-	POINTS_LEAST = 1 << 9,
+	SHARES_MAX = 1 << 21, /* most points times parts; within the following bounds there is one point per pixel */
+	POINTS_MAX = 1 << 13,
+	POINTS_MIN = 1 << 9,
 	CELL_POINTS = 16,
 };
-static const double BORROWED = 4, DEFENSIVE = 0.1;
+static const double BORROWED_POINTS = 4, DEFENSIVE_FRACTION = 0.1;
 
 /* Nodes are numbered as in a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
 struct emitter_choice {
 	uint32_t first_cell; /* index of the first leaf; also the number of leaves */
 	struct cut {
 		unsigned axis;
-		double at;
+		double position;
 	} * cuts; /* cuts[i]: where node i is halved */
-	uint32_t parts;
-	/* For each cell, parts + 1 cumulative probabilities: part i is chosen between edges i and i + 1. */
-	double *edge;
+	uint32_t part_count;
+	/* For each cell, part_count + 1 cumulative probabilities: part i is chosen between edges i and i + 1. */
+	double *cdf;
 };
 
-struct maker {
+struct choice_builder {
 	const struct world *w;
-	struct emitter_choice *to;
+	struct emitter_choice *choice;
 	const struct emitter_points *points;
-	double *sum;   /* sums of squared shares, for each part and node */
-	double *light; /* probabilities of the parts if light sub-paths chose them */
+	double *sum;		   /* sums of squared shares, for each part and node */
+	double *light_probability; /* probabilities of the parts if light sub-paths chose them */
 };
 
-static const double *cell_of(const struct emitter_choice *c, vec3 p)
+static const double *cell_cdf(const struct emitter_choice *c, vec3 p)
 {
 	uint32_t node = 1;
 	while (node < c->first_cell)
-		node = 2 * node + (vec3_along(p, c->cuts[node].axis) >= c->cuts[node].at);
-	return &c->edge[(size_t)(node - c->first_cell) * (c->parts + 1)];
+		node = 2 * node + (vec3_component(p, c->cuts[node].axis) >= c->cuts[node].position);
+	return &c->cdf[(size_t)(node - c->first_cell) * (c->part_count + 1)];
 }
 
-static double chance_of(const double *edge, uint32_t part)
+static double part_probability(const double *cdf, uint32_t part)
 {
-	return edge[part + 1] - edge[part];
+	return cdf[part + 1] - cdf[part];
 }
 
 bool emitter_choice_pick(const struct world *w, vec3 p, const double u[3], struct emitter_pick *out)
@@ -69,25 +70,25 @@ bool emitter_choice_pick(const struct world *w, vec3 p, const double u[3], struc
 	if (!c) {
 		*out = (struct emitter_pick){.emitter = world_pick_emitter(w, u[2]), .u = {u[0], u[1]}};
 		if (out->emitter >= 0)
-			out->denser = w->emitter_pdf[out->emitter];
+			out->density_ratio = w->emitter_pdf[out->emitter];
 		return out->emitter >= 0;
 	}
-	const double *edge = cell_of(c, p);
-	uint32_t part = search_cell(edge, c->parts, u[2]);
+	const double *cdf = cell_cdf(c, p);
+	uint32_t part = search_cell(cdf, c->part_count, u[2]);
 	out->emitter = emitter_of_part(w, part);
-	out->denser = chance_of(edge, part) * emitter_part_denser(w, part);
-	emitter_part_narrow(w, part, u, out->u);
+	out->density_ratio = part_probability(cdf, part) * emitter_part_density_ratio(w, part);
+	emitter_part_remap(w, part, u, out->u);
 	return true;
 }
 
-double emitter_choice_denser(const struct world *w, vec3 p, int32_t emitter, const struct emitter *em,
-			     const struct emitter_point *y)
+double emitter_choice_density_ratio(const struct world *w, vec3 p, int32_t emitter, const struct emitter *em,
+				    const struct emitter_point *y)
 {
 	const struct emitter_choice *c = w->emitter_choice;
 	if (!c)
 		return w->emitter_pdf[emitter];
 	uint32_t part = emitter_part_of(w, emitter, em, y);
-	return chance_of(cell_of(c, p), part) * emitter_part_denser(w, part);
+	return part_probability(cell_cdf(c, p), part) * emitter_part_density_ratio(w, part);
 }
 
 /* ---- making it ---- */
@@ -100,17 +101,17 @@ static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigne
 		box_grow(&box, nodes[i].p);
 	vec3 side = vec3_sub(box.high, box.low);
 	for (unsigned k = 0; k < 3; k++) {
-		unsigned at = k;
-		for (; at > 0 && vec3_along(side, axis[at - 1]) < vec3_along(side, k); at--)
-			axis[at] = axis[at - 1];
-		axis[at] = k;
+		unsigned slot = k;
+		for (; slot > 0 && vec3_component(side, axis[slot - 1]) < vec3_component(side, k); slot--)
+			axis[slot] = axis[slot - 1];
+		axis[slot] = k;
 	}
 }
 
 static bool is_divided(const struct point_tree_node *nodes, size_t middle, unsigned axis)
 {
 	for (size_t i = 0; i < middle; i++)
-		if (vec3_along(nodes[i].p, axis) >= vec3_along(nodes[middle].p, axis))
+		if (vec3_component(nodes[i].p, axis) >= vec3_component(nodes[middle].p, axis))
 			return false;
 	return true;
 }
@@ -118,7 +119,7 @@ static bool is_divided(const struct point_tree_node *nodes, size_t middle, unsig
 /* Partitions the nodes around nodes[middle] along the longest axis for which all nodes before `middle` are strictly
  * below it, and returns that axis. Along other axes a lookup would not find them: the points of a floor, for example,
  * all have the same height. */
-static unsigned divide(struct point_tree_node *nodes, size_t count, size_t middle)
+static unsigned divide_nodes(struct point_tree_node *nodes, size_t count, size_t middle)
 {
 	unsigned axis[3];
 	sort_axes(nodes, count, axis);
@@ -130,131 +131,136 @@ static unsigned divide(struct point_tree_node *nodes, size_t count, size_t middl
 	return axis[2];
 }
 
-static double *sums_of(const struct maker *m, uint32_t node)
+static double *node_sums(const struct choice_builder *m, uint32_t node)
 {
-	return &m->sum[(size_t)node * m->to->parts];
+	return &m->sum[(size_t)node * m->choice->part_count];
 }
 
 /* Divides the points recursively and adds up the squares of their shares. */
-static void halve(const struct maker *m, uint32_t node, struct point_tree_node *nodes, size_t count)
+static void halve_node(const struct choice_builder *m, uint32_t node, struct point_tree_node *nodes, size_t count)
 {
-	const uint32_t n = m->to->parts;
-	double *sum = sums_of(m, node);
-	if (node >= m->to->first_cell) {
+	const uint32_t n = m->choice->part_count;
+	double *sum = node_sums(m, node);
+	if (node >= m->choice->first_cell) {
 		for (size_t i = 0; i < count; i++)
 			for (uint32_t e = 0; e < n; e++) {
-				double share = (double)m->points->share[(size_t)nodes[i].id * n + e];
+				double share = (double)m->points->shares[(size_t)nodes[i].id * n + e];
 				sum[e] += share * share;
 			}
 		return;
 	}
 	size_t middle = count / 2;
-	unsigned axis = divide(nodes, count, middle);
-	m->to->cuts[node] = (struct cut){axis, vec3_along(nodes[middle].p, axis)};
-	halve(m, 2 * node, nodes, middle);
-	halve(m, 2 * node + 1, &nodes[middle], count - middle);
+	unsigned axis = divide_nodes(nodes, count, middle);
+	m->choice->cuts[node] = (struct cut){axis, vec3_component(nodes[middle].p, axis)};
+	halve_node(m, 2 * node, nodes, middle);
+	halve_node(m, 2 * node + 1, &nodes[middle], count - middle);
 	for (uint32_t e = 0; e < n; e++)
-		sum[e] = sums_of(m, 2 * node)[e] + sums_of(m, 2 * node + 1)[e];
+		sum[e] = node_sums(m, 2 * node)[e] + node_sums(m, 2 * node + 1)[e];
 }
 
 /* Computes sqrt(a), scaled to a sum of 1 and mixed with the probabilities of light sub-paths. */
-static void part_chances(const double *a, uint32_t n, const double *light, double *out)
+static void part_probabilities(const double *a, uint32_t n, const double *light_probability, double *out)
 {
 	double sum = 0;
 	for (uint32_t e = 0; e < n; e++)
 		sum += sqrt(a[e]);
 	for (uint32_t e = 0; e < n; e++)
-		out[e] = (1 - DEFENSIVE) * (sqrt(a[e]) / sum) + DEFENSIVE * light[e];
+		out[e] = (1 - DEFENSIVE_FRACTION) * (sqrt(a[e]) / sum) + DEFENSIVE_FRACTION * light_probability[e];
 }
 
-/* Computes the cumulative probabilities. edge[n] is 1, and parts of probability 0 are never chosen. */
-static void edges(const double *chance, uint32_t n, double *edge)
+/* Computes the cumulative probabilities. cdf[n] is 1, and parts of probability 0 are never chosen. */
+static void compute_cdf(const double *probability, uint32_t n, double *cdf)
 {
 	double sum = 0;
 	for (uint32_t e = 0; e < n; e++) {
-		edge[e] = sum;
-		sum += chance[e];
+		cdf[e] = sum;
+		sum += probability[e];
 	}
 	for (uint32_t e = 0; e < n; e++)
-		edge[e] /= sum;
-	edge[n] = 1;
-	for (uint32_t e = n; e > 0 && chance[e - 1] == 0; e--)
-		edge[e - 1] = 1;
+		cdf[e] /= sum;
+	cdf[n] = 1;
+	for (uint32_t e = n; e > 0 && probability[e - 1] == 0; e--)
+		cdf[e - 1] = 1;
 }
 
 /* Turns sums into means that include the borrowed points of the enclosing node. `count` points are in the node. */
-static void fill(const struct maker *m, uint32_t node, size_t count)
+static void fill_node(const struct choice_builder *m, uint32_t node, size_t count)
 {
-	const uint32_t n = m->to->parts;
-	double *a = sums_of(m, node);
-	const double *around = node > 1 ? sums_of(m, node / 2) : NULL;
+	const uint32_t n = m->choice->part_count;
+	double *a = node_sums(m, node);
+	const double *parent = node > 1 ? node_sums(m, node / 2) : NULL;
 	for (uint32_t e = 0; e < n; e++)
-		a[e] = around ? (a[e] + BORROWED * around[e]) / ((double)count + BORROWED) : a[e] / (double)count;
-	if (node >= m->to->first_cell) {
-		part_chances(a, n, m->light, a);
-		edges(a, n, &m->to->edge[(size_t)(node - m->to->first_cell) * (n + 1)]);
+		a[e] = parent ? (a[e] + BORROWED_POINTS * parent[e]) / ((double)count + BORROWED_POINTS)
+			      : a[e] / (double)count;
+	if (node >= m->choice->first_cell) {
+		part_probabilities(a, n, m->light_probability, a);
+		compute_cdf(a, n, &m->choice->cdf[(size_t)(node - m->choice->first_cell) * (n + 1)]);
 		return;
 	}
-	fill(m, 2 * node, count / 2);
-	fill(m, 2 * node + 1, count - count / 2);
+	fill_node(m, 2 * node, count / 2);
+	fill_node(m, 2 * node + 1, count - count / 2);
 }
 
 /* Sets the probabilities of light sub-paths, and those of the parts that follow from them. */
-static void choose_for_light(struct world *w, const struct maker *m)
+static void set_light_probabilities(struct world *w, const struct choice_builder *m)
 {
 	const struct emitter_points *p = m->points;
-	const uint32_t n = m->to->parts;
+	const uint32_t n = m->choice->part_count;
 	for (uint32_t e = 0; e < w->emitter_count; e++)
 		w->emitter_pdf[e] /= 2;
 	for (size_t i = 0; i < (size_t)p->count * n; i++)
-		w->emitter_pdf[emitter_of_part(w, (uint32_t)(i % n))] += (double)p->share[i] / 2 / p->count;
-	edges(w->emitter_pdf, w->emitter_count, w->emitter_cdf);
+		w->emitter_pdf[emitter_of_part(w, (uint32_t)(i % n))] += (double)p->shares[i] / 2 / p->count;
+	compute_cdf(w->emitter_pdf, w->emitter_count, w->emitter_cdf);
 	for (uint32_t e = 0; e < w->emitter_count; e++)
-		w->emitter_pdf[e] = chance_of(w->emitter_cdf, e);
+		w->emitter_pdf[e] = part_probability(w->emitter_cdf, e);
 	for (uint32_t i = 0; i < n; i++)
-		m->light[i] = emitter_part_shines(w, i)
-				      ? w->emitter_pdf[emitter_of_part(w, i)] / emitter_part_denser(w, i)
-				      : 0;
+		m->light_probability[i] = emitter_part_emits(w, i) ? w->emitter_pdf[emitter_of_part(w, i)] /
+									     emitter_part_density_ratio(w, i)
+								   : 0;
 }
 
-static int build_choice(struct world *w, struct arena *scratch, uint32_t parts, uint32_t most)
+static int build_choice(struct world *w, struct arena *scratch, uint32_t part_count, uint32_t max_points)
 {
 	struct emitter_points points;
-	int rc = emitter_points_find(w, most, scratch, &points);
+	int rc = emitter_points_find(w, max_points, scratch, &points);
 	if (rc || points.count < CELL_POINTS)
 		return rc;
 	struct emitter_choice *c = arena_alloc(&w->arena, 1, sizeof *c);
-	struct maker m = {.w = w, .to = c, .points = &points, .light = arena_alloc(scratch, parts, sizeof *m.light)};
-	if (!c || !m.light)
+	struct choice_builder m = {.w = w,
+				   .choice = c,
+				   .points = &points,
+				   .light_probability = arena_alloc(scratch, part_count, sizeof *m.light_probability)};
+	if (!c || !m.light_probability)
 		return -ENOMEM;
-	c->parts = parts;
+	c->part_count = part_count;
 	for (c->first_cell = 1; 2 * c->first_cell * CELL_POINTS <= points.count;)
 		c->first_cell *= 2;
 	c->cuts = arena_alloc(&w->arena, c->first_cell, sizeof *c->cuts);
-	c->edge = arena_alloc(&w->arena, c->first_cell * (parts + (size_t)1), sizeof *c->edge);
-	m.sum = arena_alloc(scratch, 2 * c->first_cell * (size_t)parts, sizeof *m.sum);
-	if (!c->cuts || !c->edge || !m.sum)
+	c->cdf = arena_alloc(&w->arena, c->first_cell * (part_count + (size_t)1), sizeof *c->cdf);
+	m.sum = arena_alloc(scratch, 2 * c->first_cell * (size_t)part_count, sizeof *m.sum);
+	if (!c->cuts || !c->cdf || !m.sum)
 		return -ENOMEM;
-	halve(&m, 1, points.nodes, points.count);
-	choose_for_light(w, &m);
-	fill(&m, 1, points.count);
+	halve_node(&m, 1, points.nodes, points.count);
+	set_light_probabilities(w, &m);
+	fill_node(&m, 1, points.count);
 	w->emitter_choice = c;
 	return 0;
 }
 
 int emitter_choice_make(struct world *w)
 {
-	uint32_t shining = 0, parts = emitter_part_count(w);
-	for (uint32_t i = 0; i < parts; i++)
-		shining += emitter_part_shines(w, i);
-	if (shining < 2 || w->emitter_count > EMITTER_CHOICE_MOST || w->accuracy.emitter_choice != SETTING_BY_PLACE)
+	uint32_t emitting_parts = 0, part_count = emitter_part_count(w);
+	for (uint32_t i = 0; i < part_count; i++)
+		emitting_parts += emitter_part_emits(w, i);
+	if (emitting_parts < 2 || w->emitter_count > EMITTER_CHOICE_EMITTERS_MAX ||
+	    w->accuracy.emitter_choice != SETTING_BY_PLACE)
 		return 0;
-	uint32_t most = VALUES / parts;
+	uint32_t max_points = SHARES_MAX / part_count;
 	uint64_t pixels = (uint64_t)w->settings.width * w->settings.height;
-	most = most < pixels ? most : (uint32_t)pixels;
-	most = most > POINTS_MOST ? POINTS_MOST : most < POINTS_LEAST ? POINTS_LEAST : most;
+	max_points = max_points < pixels ? max_points : (uint32_t)pixels;
+	max_points = max_points > POINTS_MAX ? POINTS_MAX : max_points < POINTS_MIN ? POINTS_MIN : max_points;
 	struct arena scratch = {0};
-	int rc = build_choice(w, &scratch, parts, most);
+	int rc = build_choice(w, &scratch, part_count, max_points);
 	arena_fini(&scratch);
 	return rc;
 }

@@ -33,25 +33,25 @@ static inline int32_t emitter_of_part(const struct world *w, uint32_t part)
 
 /* Whether a part emits. A divided emitter is not a part itself. An emitter that was switched off
  * (effects_apply.h) has power 0. */
-static inline bool emitter_part_shines(const struct world *w, uint32_t part)
+static inline bool emitter_part_emits(const struct world *w, uint32_t part)
 {
 	return w->emitters[emitter_of_part(w, part)].power > 0 &&
 	       (part >= w->emitter_count || !emitter_is_divided(w, (int32_t)part));
 }
 
 /* Returns the density of points of a part, given that it was chosen, divided by their density on the whole emitter. */
-static inline double emitter_part_denser(const struct world *w, uint32_t part)
+static inline double emitter_part_density_ratio(const struct world *w, uint32_t part)
 {
 	return part < w->emitter_count ? 1 : ENVIRONMENT_PARTS;
 }
 
 /* Converts two numbers in [0,1) to those from which the emitter draws a point of the part. */
-static inline void emitter_part_narrow(const struct world *w, uint32_t part, const double u[2], double out[2])
+static inline void emitter_part_remap(const struct world *w, uint32_t part, const double u[2], double out[2])
 {
 	uint32_t k = part - w->emitter_count;
-	bool whole = part < w->emitter_count;
-	out[0] = whole ? u[0] : (k % ENVIRONMENT_SIDE + u[0]) / ENVIRONMENT_SIDE;
-	out[1] = whole ? u[1] : (k / ENVIRONMENT_SIDE + u[1]) / ENVIRONMENT_SIDE;
+	bool is_whole_emitter = part < w->emitter_count;
+	out[0] = is_whole_emitter ? u[0] : (k % ENVIRONMENT_SIDE + u[0]) / ENVIRONMENT_SIDE;
+	out[1] = is_whole_emitter ? u[1] : (k / ENVIRONMENT_SIDE + u[1]) / ENVIRONMENT_SIDE;
 }
 
 /* Returns the part that contains a point of em, which is that emitter at some time. */

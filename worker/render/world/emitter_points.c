@@ -18,17 +18,17 @@
 #include <string.h>
 
 enum {
-	WALKS = 4,	/* most walks for each point wanted */
-	POINTS = 4,	/* most points per walk */
-	STEPS = 16,	/* most surfaces that a walk meets, including those that yield no point */
-	TESTS = 96,	/* most shadow rays per point */
-	RAYS = 1 << 18, /* most shadow rays for all points */
-	SURFACES = 8,	/* most surfaces that a shadow ray passes */
+	WALKS_PER_POINT = 4, /* most walks for each point wanted */
+	POINTS_PER_WALK = 4, /* most points per walk */
+	STEPS_MAX = 16,	     /* most surfaces that a walk meets, including those that yield no point */
+	TESTS_MAX = 96,	     /* most shadow rays per point */
+	RAYS_MAX = 1 << 18,  /* most shadow rays for all points */
+	SURFACES_MAX = 8,    /* most surfaces that a shadow ray passes */
 };
-static const double GLOSS = 0.1, /* fraction of the light that glossy reflection may add from any direction */
-	FAINT = 0.01;		 /* fraction of the light that has arrived, below which an offer is not tested */
+static const double GLOSS_FRACTION = 0.1, /* fraction of the light that glossy reflection may add from any direction */
+	FAINT_FRACTION = 0.01; /* fraction of the light that has arrived, below which an offer is not tested */
 
-struct point {
+struct scatter_point {
 	/* ng: on the side from which the walk came; 0 in a medium. */
 	vec3 p, ng;
 	struct prim_ref prim;
@@ -36,47 +36,47 @@ struct point {
 };
 
 /* The end of a shadow ray. */
-struct target {
+struct shadow_target {
 	struct ray_end end; /* only if not infinite */
 	bool infinite;
 	vec3 d; /* unit direction to it */
 };
 
-struct finder {
+struct point_finder {
 	const struct world *w;
-	bool opens; /* some surface lets light through */
-	uint32_t rays;
-	uint32_t most, parts;
+	bool any_transmits; /* some surface lets light through */
+	uint32_t ray_count;
+	uint32_t max_points, part_count;
 	struct emitter_points *out;
 	struct offer {
 		double light;
 		bool tested;
-	} * offers;		/* the unoccluded light of each part */
-	struct target *targets; /* and the point that emits it */
+	} * offers;		       /* the unoccluded light of each part */
+	struct shadow_target *targets; /* and the point that emits it */
 };
 
 /* ---- what emitters bring ---- */
 
-static bool lets_light_through(const struct world *w, uint32_t shape)
+static bool transmits_light(const struct world *w, uint32_t shape)
 {
-	const struct world_shape *part = &w->parts[shape];
-	return part->passable || (w->bsdfs[part->bsdf].modes & BSDF_TRANSMIT);
+	const struct shape_binding *binding = &w->shape_bindings[shape];
+	return binding->is_null_face || (w->bsdfs[binding->bsdf].modes & BSDF_TRANSMIT);
 }
 
 /* Whether light arrives at x along a straight line, passing surfaces that let light through without being bent. */
-static bool is_lit(const struct finder *f, const struct point *x, const struct target *y)
+static bool is_lit(const struct point_finder *f, const struct scatter_point *x, const struct shadow_target *y)
 {
 	const struct world *w = f->w;
 	struct ray_end from = {x->p, x->ng, x->prim};
-	for (int n = 0; n < SURFACES; n++) {
+	for (int n = 0; n < SURFACES_MAX; n++) {
 		struct ray_hit hit;
 		struct surface_point at;
 		if (y->infinite ? !accel_occluded_to_infinity(w->accel, &from, y->d)
 				: !accel_occluded(w->accel, &from, &y->end))
 			return true;
 		double end = y->infinite ? INFINITY : vec3_length(vec3_sub(y->end.p, from.p));
-		if (!f->opens || !accel_closest(w->accel, &from, y->d, 0, end, &hit) ||
-		    !lets_light_through(w, hit.prim.shape))
+		if (!f->any_transmits || !accel_closest(w->accel, &from, y->d, 0, end, &hit) ||
+		    !transmits_light(w, hit.prim.shape))
 			return false;
 		surface_from_hit(&w->shapes[hit.prim.shape], from.p, y->d, &hit, &at);
 		from = (struct ray_end){at.p, at.ng, hit.prim};
@@ -86,53 +86,54 @@ static bool is_lit(const struct finder *f, const struct point *x, const struct t
 
 /* Draws a point of the part from u. *pdf: its density as seen from x, per solid angle. Returns
  * false if there is no point. */
-static bool draw_point(const struct world *w, uint32_t part, const struct emitter *em, const struct point *x,
-		       const double u[2], struct emitter_point *y, struct target *to, double *pdf)
+static bool draw_point(const struct world *w, uint32_t part, const struct emitter *em, const struct scatter_point *x,
+		       const double u[2], struct emitter_point *y, struct shadow_target *target, double *pdf)
 {
 	double narrowed[2];
-	emitter_part_narrow(w, part, u, narrowed);
+	emitter_part_remap(w, part, u, narrowed);
 	if (!emitter_sample_toward(em, x->p, narrowed, y, pdf) || !(*pdf > 0))
 		return false;
-	*pdf *= emitter_part_denser(w, part);
-	*to = (struct target){.infinite = y->infinite, .d = y->p};
-	if (y->infinite)
+	*pdf *= emitter_part_density_ratio(w, part);
+	*target = (struct shadow_target){.infinite = y->is_infinite, .d = y->p};
+	if (y->is_infinite)
 		return true;
 	uint32_t shape = w->emitter_shape[part];
 	double time = x->prim.time;
-	to->end = (struct ray_end){
-		y->p, y->n, shape == UINT32_MAX ? prim_none_at(time) : (struct prim_ref){shape, y->where.prim, time}};
+	target->end = (struct ray_end){y->p, y->n,
+				       shape == UINT32_MAX ? prim_none_at(time)
+							   : (struct prim_ref){shape, y->texture_point.prim, time}};
 	vec3 d = vec3_sub(y->p, x->p);
 	double distance = vec3_length(d);
 	if (!(distance > 0))
 		return false;
-	to->d = vec3_scale(1 / distance, d);
+	target->d = vec3_scale(1 / distance, d);
 	*pdf *= distance * distance;
-	if (!em->delta)
-		*pdf /= fmax(fabs(vec3_dot(y->n, to->d)), 0x1p-30);
+	if (!em->is_delta)
+		*pdf /= fmax(fabs(vec3_dot(y->n, target->d)), 0x1p-30);
 	return true;
 }
 
 /* Returns the light that the part would bring to x if nothing were between. */
-static double unoccluded_light(const struct world *w, uint32_t part, const struct point *x, const double u[2],
-			       const struct wavelengths *wl, struct target *to)
+static double unoccluded_light(const struct world *w, uint32_t part, const struct scatter_point *x, const double u[2],
+			       const struct wavelengths *wl, struct shadow_target *target)
 {
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &room);
+	struct emitter_storage storage;
+	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &storage);
 	struct emitter_point y;
 	double pdf, sum = 0;
-	if (!emitter_part_shines(w, part) || !draw_point(w, part, em, x, u, &y, to, &pdf))
+	if (!emitter_part_emits(w, part) || !draw_point(w, part, em, x, u, &y, target, &pdf))
 		return 0;
-	double cosine = vec3_dot(x->ng, to->d);
+	double cosine = vec3_dot(x->ng, target->d);
 	if (x->opaque && !(cosine > 0))
 		return 0;
-	spectrum light = em->ops->radiance(em, &y, vec3_neg(to->d), wl);
+	spectrum light = em->ops->radiance(em, &y, vec3_neg(target->d), wl);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		sum += light.v[i];
-	double brought = sum / pdf * (GLOSS + (1 - GLOSS) * fabs(cosine));
-	return isfinite(brought) ? brought : 0;
+	double contribution = sum / pdf * (GLOSS_FRACTION + (1 - GLOSS_FRACTION) * fabs(cosine));
+	return isfinite(contribution) ? contribution : 0;
 }
 
-static uint32_t greatest_untested(const struct offer *o, uint32_t n)
+static uint32_t brightest_untested(const struct offer *o, uint32_t n)
 {
 	uint32_t best = UINT32_MAX;
 	for (uint32_t i = 0; i < n; i++)
@@ -148,32 +149,32 @@ static void draw_numbers(uint64_t walk, uint64_t step, uint64_t use, double u[4]
 }
 
 /* Adds the point x with its shares, if any light arrives there. */
-static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t step)
+static void add_point(struct point_finder *f, const struct scatter_point *x, uint64_t walk, uint64_t step)
 {
 	const struct world *w = f->w;
 	double u[4], arrived = 0, sum = 0;
 	draw_numbers(walk, step, 1, u);
 	const struct wavelengths wl = world_wavelengths(w, u[2]);
-	for (uint32_t i = 0; i < f->parts; i++)
+	for (uint32_t i = 0; i < f->part_count; i++)
 		f->offers[i] = (struct offer){unoccluded_light(w, i, x, u, &wl, &f->targets[i]), false};
-	for (int n = 0; n < TESTS; n++) {
-		uint32_t i = greatest_untested(f->offers, f->parts);
-		if (i == UINT32_MAX || f->offers[i].light < FAINT * arrived)
+	for (int n = 0; n < TESTS_MAX; n++) {
+		uint32_t i = brightest_untested(f->offers, f->part_count);
+		if (i == UINT32_MAX || f->offers[i].light < FAINT_FRACTION * arrived)
 			break;
 		f->offers[i].tested = true;
-		f->rays++;
+		f->ray_count++;
 		if (is_lit(f, x, &f->targets[i]))
 			arrived += f->offers[i].light;
 		else
 			f->offers[i].light = 0;
 	}
-	for (uint32_t i = 0; i < f->parts; i++)
+	for (uint32_t i = 0; i < f->part_count; i++)
 		sum += f->offers[i].light;
 	if (!(sum > 0) || !isfinite(sum))
 		return;
 	struct emitter_points *out = f->out;
-	float *share = &out->share[(size_t)out->count * f->parts];
-	for (uint32_t i = 0; i < f->parts; i++)
+	float *share = &out->shares[(size_t)out->count * f->part_count];
+	for (uint32_t i = 0; i < f->part_count; i++)
 		share[i] = (float)(f->offers[i].light / sum);
 	out->nodes[out->count] = (struct point_tree_node){x->p, out->count};
 	out->count++;
@@ -182,104 +183,107 @@ static void add(struct finder *f, const struct point *x, uint64_t walk, uint64_t
 /* ---- walks ---- */
 
 struct step {
-	struct ray_end from;
+	struct ray_end origin;
 	vec3 d;
 	double t_min, t_max;
 };
 
 /* Starts a walk at the camera. Returns false if the camera sees nothing at that film point. */
-static bool leave_camera(const struct world *w, uint64_t walk, struct step *s)
+static bool start_walk(const struct world *w, uint64_t walk, struct step *s)
 {
 	const struct scene_settings *set = &w->settings;
-	struct camera room;
+	struct camera storage;
 	double u[4], v[4];
 	draw_numbers(walk, 0, 0, u);
 	draw_numbers(walk, 0, 2, v);
-	const struct camera *c = camera_at(&w->camera, u[2], &room);
+	const struct camera *c = camera_at(&w->camera, u[2], &storage);
 	double x = set->crop_x + u[0] * scene_settings_width(set), y = set->crop_y + u[1] * scene_settings_height(set);
-	if (!camera_has(c, x, y))
+	if (!camera_film_point_is_valid(c, x, y))
 		return false;
-	s->from = (struct ray_end){.p = camera_point(c, v), .prim = prim_none_at(u[2])};
-	s->d = camera_direction(c, s->from.p, x, y);
-	camera_clip(c, s->d, &s->t_min, &s->t_max);
+	s->origin = (struct ray_end){.p = camera_sample_point(c, v), .prim = prim_none_at(u[2])};
+	s->d = camera_direction(c, s->origin.p, x, y);
+	camera_clip_range(c, s->d, &s->t_min, &s->t_max);
 	return true;
 }
 
-static vec3 mirrored(vec3 d, vec3 n)
+static vec3 mirror_direction(vec3 d, vec3 n)
 {
 	return vec3_madd(d, -2 * vec3_dot(d, n), n);
 }
 
 /* Returns the direction in which a walk that came along d continues. n: unit normal on the side from which it came. */
-static vec3 scattered(const struct bsdf *b, vec3 d, vec3 n, const double u[4])
+static vec3 scatter_direction(const struct bsdf *b, vec3 d, vec3 n, const double u[4])
 {
-	bool through = (b->modes & BSDF_TRANSMIT) && (u[2] < 0.5 || !(b->modes & BSDF_REFLECT));
+	bool transmits = (b->modes & BSDF_TRANSMIT) && (u[2] < 0.5 || !(b->modes & BSDF_REFLECT));
 	if (!b->has_smooth || (b->has_delta && u[3] < 0.5))
-		return through ? d : mirrored(d, n);
+		return transmits ? d : mirror_direction(d, n);
 	/* A direction distributed by the cosine. */
-	struct frame axes = frame_around(through ? vec3_neg(n) : n);
+	struct frame axes = frame_around(transmits ? vec3_neg(n) : n);
 	double r = sqrt(u[0]), phi = 2 * M_PI * u[1];
 	return frame_to_world(&axes, (vec3){r * cos(phi), r * sin(phi), sqrt(1 - u[0])});
 }
 
 /* Adds a point on the way to the next surface, which is at `distance`. */
-static void add_in_medium(struct finder *f, const struct step *s, double distance, uint64_t walk, uint64_t step)
+static void add_point_in_medium(struct point_finder *f, const struct step *s, double distance, uint64_t walk,
+				uint64_t step)
 {
 	double u[4];
 	draw_numbers(walk, step, 2, u);
-	const struct point x = {.p = vec3_madd(s->from.p, s->t_min + u[0] * (distance - s->t_min), s->d),
-				.prim = prim_none_at(s->from.prim.time)};
-	add(f, &x, walk, STEPS + step);
+	const struct scatter_point x = {.p = vec3_madd(s->origin.p, s->t_min + u[0] * (distance - s->t_min), s->d),
+					.prim = prim_none_at(s->origin.prim.time)};
+	add_point(f, &x, walk, STEPS_MAX + step);
 }
 
 /* Continues a walk to the next surface and adds a point there if it scatters, which is counted in *points.
  * Returns false if the walk ends. */
-static bool step_to_surface(struct finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
+static bool step_to_surface(struct point_finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
 {
 	const struct world *w = f->w;
 	struct ray_hit hit;
 	struct surface_point at;
 	double u[4];
-	if (!accel_closest(w->accel, &s->from, s->d, s->t_min, s->t_max, &hit))
+	if (!accel_closest(w->accel, &s->origin, s->d, s->t_min, s->t_max, &hit))
 		return false;
-	surface_from_hit(&w->shapes[hit.prim.shape], s->from.p, s->d, &hit, &at);
-	if (EFFECT_IS_ON(w, scattering) && f->out->count < f->most)
-		add_in_medium(f, s, vec3_length(vec3_sub(at.p, s->from.p)), walk, number);
-	const struct world_shape *part = &w->parts[hit.prim.shape];
-	const struct bsdf *b = &w->bsdfs[part->bsdf];
+	surface_from_hit(&w->shapes[hit.prim.shape], s->origin.p, s->d, &hit, &at);
+	if (EFFECT_IS_ON(w, scattering) && f->out->count < f->max_points)
+		add_point_in_medium(f, s, vec3_length(vec3_sub(at.p, s->origin.p)), walk, number);
+	const struct shape_binding *binding = &w->shape_bindings[hit.prim.shape];
+	const struct bsdf *b = &w->bsdfs[binding->bsdf];
 	vec3 n = vec3_dot(at.ng, s->d) > 0 ? vec3_neg(at.ng) : at.ng;
-	if (!part->passable && b->has_smooth && f->out->count < f->most) {
-		const struct point x = {at.p, n, hit.prim, !(b->modes & BSDF_TRANSMIT)};
-		add(f, &x, walk, number);
+	if (!binding->is_null_face && b->has_smooth && f->out->count < f->max_points) {
+		const struct scatter_point x = {at.p, n, hit.prim, !(b->modes & BSDF_TRANSMIT)};
+		add_point(f, &x, walk, number);
 		++*points;
 	}
 	draw_numbers(walk, number, 0, u);
-	if (!part->passable)
-		s->d = scattered(b, s->d, n, u);
-	s->from = (struct ray_end){at.p, at.ng, hit.prim};
+	if (!binding->is_null_face)
+		s->d = scatter_direction(b, s->d, n, u);
+	s->origin = (struct ray_end){at.p, at.ng, hit.prim};
 	s->t_min = 0;
 	s->t_max = INFINITY;
-	return part->passable || !b->black;
+	return binding->is_null_face || !b->is_black;
 }
 
-int emitter_points_find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out)
+int emitter_points_find(const struct world *w, uint32_t max_points, struct arena *arena, struct emitter_points *out)
 {
-	struct finder f = {.w = w, .most = most, .parts = emitter_part_count(w), .out = out};
+	struct point_finder f = {.w = w, .max_points = max_points, .part_count = emitter_part_count(w), .out = out};
 	out->count = 0;
-	out->nodes = arena_alloc(arena, most, sizeof *out->nodes);
-	out->share = arena_alloc(arena, (size_t)most * f.parts, sizeof *out->share);
-	f.offers = arena_alloc(arena, f.parts, sizeof *f.offers);
-	f.targets = arena_alloc(arena, f.parts, sizeof *f.targets);
-	if (!out->nodes || !out->share || !f.offers || !f.targets)
+	out->nodes = arena_alloc(arena, max_points, sizeof *out->nodes);
+	out->shares = arena_alloc(arena, (size_t)max_points * f.part_count, sizeof *out->shares);
+	f.offers = arena_alloc(arena, f.part_count, sizeof *f.offers);
+	f.targets = arena_alloc(arena, f.part_count, sizeof *f.targets);
+	if (!out->nodes || !out->shares || !f.offers || !f.targets)
 		return -ENOMEM;
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		f.opens |= lets_light_through(w, i);
-	for (uint64_t walk = 0; walk < (uint64_t)WALKS * most && out->count < most && f.rays < RAYS; walk++) {
+		f.any_transmits |= transmits_light(w, i);
+	for (uint64_t walk = 0;
+	     walk < (uint64_t)WALKS_PER_POINT * max_points && out->count < max_points && f.ray_count < RAYS_MAX;
+	     walk++) {
 		struct step s;
 		int points = 0;
-		if (!leave_camera(w, walk, &s))
+		if (!start_walk(w, walk, &s))
 			continue;
-		for (uint64_t n = 1; n <= STEPS && points < POINTS; n++)
+		for (uint64_t n = 1; n <= STEPS_MAX && points < POINTS_PER_WALK; n++)
 			if (!step_to_surface(&f, &s, walk, n, &points))
 				break;
 	}

@@ -11,12 +11,12 @@
 
 struct emitter_points {
 	uint32_t count;
-	struct point_tree_node *nodes; /* positions; id is the row of `share` */
-	float *share;		       /* [count][emitter_part_count]; each row sums to 1 */
+	struct point_tree_node *nodes; /* positions; id is the row of `shares` */
+	float *shares;		       /* [count][emitter_part_count]; each row sums to 1 */
 };
 
-/* Finds points of a finished world with at least one emitter, at most `most` of them; points that get no light are left
- * out. Memory comes from the arena. Deterministic. Returns -ENOMEM if out of memory. */
-int emitter_points_find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out);
+/* Finds points of a finished world with at least one emitter, at most `max_points` of them; points that get no light
+ * are left out. Memory comes from the arena. Deterministic. Returns -ENOMEM if out of memory. */
+int emitter_points_find(const struct world *w, uint32_t max_points, struct arena *arena, struct emitter_points *out);
 
 #endif

@@ -8,26 +8,27 @@
 
 /* Whether m consists only of translation, rotation, reflection and one scale for all directions, which *scale
  * receives. */
-static bool is_similar(const mat4 *m, double *scale)
+static bool is_similarity(const mat4 *m, double *scale)
 {
 	const vec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
-	double s2 = vec3_dot(x, x), off = TOLERANCE * s2;
+	double s2 = vec3_dot(x, x), tolerance = TOLERANCE * s2;
 	*scale = sqrt(s2);
-	return fabs(vec3_dot(y, y) - s2) <= off && fabs(vec3_dot(z, z) - s2) <= off && fabs(vec3_dot(x, y)) <= off &&
-	       fabs(vec3_dot(y, z)) <= off && fabs(vec3_dot(z, x)) <= off;
+	return fabs(vec3_dot(y, y) - s2) <= tolerance && fabs(vec3_dot(z, z) - s2) <= tolerance &&
+	       fabs(vec3_dot(x, y)) <= tolerance && fabs(vec3_dot(y, z)) <= tolerance &&
+	       fabs(vec3_dot(z, x)) <= tolerance;
 }
 
 /* Checks the motion: spheres must stay spheres, and displaced shapes, whose displacement is in scene
  * units, must keep their size. */
-static int check(const struct builder *b, const struct listed_shape *l, uint32_t id, const struct motion *m)
+static int check_motion(const struct builder *b, const struct listed_shape *l, uint32_t id, const struct motion *m)
 {
 	bool sphere = b->geometry[id].kind == SHAPE_SPHERE;
 	if (!sphere && !build_is_displaced(b, l->node))
 		return 0;
 	for (uint32_t i = 0; i < m->count; i++) {
 		double scale;
-		mat4 at = motion_at(m, m->key[i].time);
-		if (!is_similar(&at, &scale) || (!sphere && !(fabs(scale - 1) <= TOLERANCE)))
+		mat4 at = motion_transform_at(m, m->key[i].time);
+		if (!is_similarity(&at, &scale) || (!sphere && !(fabs(scale - 1) <= TOLERANCE)))
 			return node_error(l->node, b->e, ENOTSUP,
 					  sphere ? "a sphere that moves may not be stretched in one direction"
 						 : "a displaced shape that moves may not change its size");
@@ -47,33 +48,34 @@ static int make_motion(struct builder *b, const struct scene_node *n, const stru
 	*moves = motion_make(m, a, s->shutter_open, s->shutter_close, keys);
 	/* If the shutter is open for 1 unit of time, it does not matter whether the exposure of a line is given as a
 	 * time or as a fraction of the shutter's. */
-	bool one = fabs(s->shutter_close - s->shutter_open - 1) < 1e-9;
-	return *moves && s->roll != ROLL_NONE && !one
+	bool shutter_is_unit = fabs(s->shutter_close - s->shutter_open - 1) < 1e-9;
+	return *moves && s->rolling_shutter != ROLL_NONE && !shutter_is_unit
 		       ? node_error(n, b->e, ENOTSUP,
 				    "it moves, and a rolling shutter is only supported if shutter_close is 1 after "
 				    "shutter_open")
 		       : 0;
 }
 
-int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from)
+int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box start_box)
 {
 	const struct scene_node *outer = l->instance ? l->instance : l->node;
 	bool moves;
-	int rc = make_motion(b, outer, l->moves, &b->motions[id], &moves);
+	int rc = make_motion(b, outer, l->animation, &b->motions[id], &moves);
 	if (rc)
 		return rc;
 	struct motion *m = b->motions[id];
-	bool in_group = l->instance && b->shared[id];
-	if (!in_group && !mat4_invert(node_transform(outer, "to_world"), &m->before))
+	bool in_group = l->instance && b->shared_meshes[id];
+	if (!in_group && !mat4_invert(node_transform(outer, "to_world"), &m->pre_transform))
 		return node_error(outer, b->e, EINVAL, "to_world flattens it (it has no inverse)");
-	rc = check(b, l, id, m);
+	rc = check_motion(b, l, id, m);
 	if (rc)
 		return rc;
-	struct box *all = &b->boxes[id];
-	motion_bounds(m, from.low, from.high, &all->low, &all->high);
-	double most = fmax(triangle_norm_max(all->low), triangle_norm_max(all->high));
-	return most <= MESH_COORDINATE_MAX ? 0
-					   : node_error(outer, b->e, ERANGE, "it moves beyond %g", MESH_COORDINATE_MAX);
+	struct box *bounds = &b->shape_boxes[id];
+	motion_bounds(m, start_box.low, start_box.high, &bounds->low, &bounds->high);
+	double max_norm = fmax(triangle_norm_max(bounds->low), triangle_norm_max(bounds->high));
+	return max_norm <= MESH_COORDINATE_MAX
+		       ? 0
+		       : node_error(outer, b->e, ERANGE, "it moves beyond %g", MESH_COORDINATE_MAX);
 }
 
 int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, const struct box *box, struct placement *p)
@@ -82,9 +84,10 @@ int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, cons
 	struct movement *v = arena_alloc(&b->w->arena, 1, sizeof *v);
 	if (!v)
 		return -ENOMEM;
-	const vec3 back = {1 / scale, 1 / scale, 1 / scale};
+	const vec3 inverse_scale = {1 / scale, 1 / scale, 1 / scale};
 	*v = (struct movement){*b->motions[id], box->low, box->high};
-	v->motion.before = mat4_mul(v->motion.before, mat4_mul(mat4_translate(center), mat4_scale(back)));
+	v->motion.pre_transform =
+		mat4_mul(v->motion.pre_transform, mat4_mul(mat4_translate(center), mat4_scale(inverse_scale)));
 	motion_rescale(&v->motion, w->center, w->scale);
 	return placement_make_moving(p, v) ? 0 : -EINVAL;
 }
@@ -100,8 +103,8 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 		return build_out_of_memory(b->e);
 	if (rc)
 		return node_error(b->shape_nodes[id], b->e, EINVAL, "it becomes too small while it moves");
-	p->first = id;
-	g->place = p;
+	p->first_shape = id;
+	g->placement = p;
 	return 0;
 }
 
@@ -109,9 +112,9 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 static int check_reach(const struct builder *b, const struct scene_node *n, const struct motion *m)
 {
 	for (uint32_t i = 0; i < m->count; i++)
-		if (!(vec3_length(m->key[i].at) <= PARAM_REACH_MAX))
+		if (!(vec3_length(m->key[i].translation) <= PARAM_DISTANCE_MAX))
 			return node_error(n, b->e, ERANGE, "it moves more than %g scene radii away from the scene",
-					  PARAM_REACH_MAX);
+					  PARAM_DISTANCE_MAX);
 	return 0;
 }
 
@@ -119,11 +122,11 @@ static int check_reach(const struct builder *b, const struct scene_node *n, cons
 static int check_emitter(const struct builder *b, const struct emitter *em, const struct scene_node *n,
 			 const struct motion *m)
 {
-	if (!em->infinite)
+	if (!em->is_infinite)
 		return check_reach(b, n, m);
-	for (uint32_t i = 0; i < m->count && !em->delta; i++) {
-		mat4 at = motion_at(m, m->key[i].time);
-		if (!mat4_keeps_angles(&at))
+	for (uint32_t i = 0; i < m->count && !em->is_delta; i++) {
+		mat4 at = motion_transform_at(m, m->key[i].time);
+		if (!mat4_is_conformal(&at))
 			return node_error(n, b->e, ENOTSUP, "an environment that moves may only be turned");
 	}
 	return 0;
@@ -144,9 +147,9 @@ int moving_emitter(struct builder *b, struct emitter *em, const struct scene_nod
 	rc = check_emitter(b, em, n, m);
 	if (rc)
 		return rc;
-	mat4 open = motion_at(m, 0);
-	em->ops->place(em, &open);
-	em->moves = moves ? m : NULL;
+	mat4 open = motion_transform_at(m, 0);
+	em->ops->set_transform(em, &open);
+	em->motion = moves ? m : NULL;
 	return 0;
 }
 
@@ -154,7 +157,7 @@ int moving_camera(struct builder *b)
 {
 	struct world *w = b->w;
 	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor);
-	if (!w->settings.moves)
+	if (!w->settings.is_moving)
 		return 0;
 	const struct animation *a = node_animation(sensor);
 	struct motion *m;
@@ -164,7 +167,7 @@ int moving_camera(struct builder *b)
 		return build_out_of_memory(b->e);
 	for (uint32_t i = 0; i < a->count; i++) {
 		upright[i].time = a->key[i].time;
-		if (!scene_settings_upright(a->key[i].place, &upright[i].place))
+		if (!scene_settings_orthonormalize(a->key[i].transform, &upright[i].transform))
 			return node_error(sensor, b->e, EINVAL,
 					  "to_world may only rotate, translate, mirror and scale a camera");
 	}
@@ -172,6 +175,6 @@ int moving_camera(struct builder *b)
 	if (rc)
 		return rc;
 	motion_rescale(m, w->center, w->scale);
-	w->camera.moves = m;
+	w->camera.motion = m;
 	return check_reach(b, sensor, m);
 }

@@ -10,9 +10,9 @@
 #include "worker/render/shape/group.h"
 #include "worker/render/world/build_private.h"
 
-/* For shape `id`, which has been read and has the bounding box `from`: computes its motion, and the box in which it
- * stays while it moves. -ENOTSUP: it cannot move like that; -ERANGE: it leaves the range of coordinates. */
-int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from);
+/* For shape `id`, which has been read and has the bounding box `start_box`: computes its motion, and the box in which
+ * it stays while it moves. -ENOTSUP: it cannot move like that; -ERANGE: it leaves the range of coordinates. */
+int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box start_box);
 /* After the world has been rescaled: computes the placement of shape `id`, whose mesh has the given centre, scale and
  * box. Returns -EINVAL where placement_make fails; -ENOMEM. */
 int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, const struct box *box, struct placement *p);

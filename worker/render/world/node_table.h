@@ -16,17 +16,17 @@ struct node_entry {
 	/* The key. NULL is a valid node; mesh NULL: the entry applies to all meshes. */
 	const void *node, *mesh;
 	uint32_t number;
-	bool used;
+	bool is_used;
 };
 
 struct node_table {
 	struct node_entry *entries;
-	size_t mask, count, most;
-	uint64_t compared; /* number of entries probed so far */
+	size_t mask, count, capacity;
+	uint64_t probe_count; /* number of entries probed so far */
 };
 
 /* Makes a table for at most that many entries. Returns 0 or -ENOMEM. */
-int node_table_init(struct node_table *t, uint32_t most, struct arena *arena);
+int node_table_init(struct node_table *t, uint32_t capacity, struct arena *arena);
 
 /* Looks up a key. Returns false if it is not in the table. */
 bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *number);

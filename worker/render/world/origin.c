@@ -3,64 +3,66 @@
 
 #include <stdlib.h>
 
-#define MIXED 0x1p-12
-#define WIDE 0x1p11
+#define MIXED_SCALES_MAX 0x1p-12
+#define WIDE_EXTENT_RATIO 0x1p11
 
-static double middle_of(const struct box *b, unsigned axis)
+static double box_middle(const struct box *b, unsigned axis)
 {
-	return 0.5 * (vec3_along(b->low, axis) + vec3_along(b->high, axis));
+	return 0.5 * (vec3_component(b->low, axis) + vec3_component(b->high, axis));
 }
 
 int weighted_value_compare(const void *a, const void *b)
 {
 	const struct weighted_value *x = a, *y = b;
-	return (x->at > y->at) - (x->at < y->at);
+	return (x->value > y->value) - (x->value < y->value);
 }
 
 static double median(struct weighted_value *w, uint32_t count)
 {
-	double total = 0, passed = 0;
+	double total = 0, cumulative = 0;
 	qsort(w, count, sizeof *w, weighted_value_compare);
 	for (uint32_t i = 0; i < count; i++)
 		total += w[i].weight;
 	for (uint32_t i = 0; i < count; i++) {
-		passed += w[i].weight;
-		if (passed >= 0.5 * total)
-			return w[i].at;
+		cumulative += w[i].weight;
+		if (cumulative >= 0.5 * total)
+			return w[i].value;
 	}
-	return w[count - 1].at;
+	return w[count - 1].value;
 }
 
 /* Returns the extent of the smallest shape. */
-static double least_extent(const struct box *shapes, uint32_t count)
+static double smallest_extent(const struct box *shapes, uint32_t count)
 {
-	double least = INFINITY;
+	double smallest = INFINITY;
 	for (uint32_t i = 0; i < count; i++)
-		least = fmin(least, box_extent(&shapes[i]));
-	return least;
+		smallest = fmin(smallest, box_extent(&shapes[i]));
+	return smallest;
 }
 
-static bool is_mixed(double least, const struct box *all)
+static bool has_mixed_scales(double smallest, const struct box *scene_box)
 {
-	return least > 0 && least < MIXED * box_extent(all);
+	return smallest > 0 && smallest < MIXED_SCALES_MAX * box_extent(scene_box);
 }
 
-double origin_wide_from(const struct box *all, const struct box *shapes, uint32_t count)
+double origin_min_wide_extent(const struct box *scene_box, const struct box *shapes, uint32_t count)
 {
-	double least = least_extent(shapes, count);
-	return is_mixed(least, all) ? WIDE * least : INFINITY;
+	double smallest = smallest_extent(shapes, count);
+	return has_mixed_scales(smallest, scene_box) ? WIDE_EXTENT_RATIO * smallest : INFINITY;
 }
 
-vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighted_value *room)
+vec3 origin_choose(const struct box *scene_box, const struct box *shapes, uint32_t count,
+		   struct weighted_value *scratch)
 {
-	double at[3], least = least_extent(shapes, count);
+	double center[3], smallest = smallest_extent(shapes, count);
 	for (unsigned axis = 0; axis < 3; axis++) {
-		at[axis] = middle_of(all, axis);
-		if (!is_mixed(least, all))
+		center[axis] = box_middle(scene_box, axis);
+		if (!has_mixed_scales(smallest, scene_box))
 			continue;
 		for (uint32_t i = 0; i < count; i++)
-			room[i] = (struct weighted_value){middle_of(&shapes[i], axis), least / box_extent(&shapes[i])};
-		at[axis] = median(room, count);
+			scratch[i] = (struct weighted_value){box_middle(&shapes[i], axis),
+							     smallest / box_extent(&shapes[i])};
+		center[axis] = median(scratch, count);
 	}
-	return (vec3){at[0], at[1], at[2]};
+	return (vec3){center[0], center[1], center[2]};
 }

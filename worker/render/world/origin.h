@@ -12,17 +12,18 @@
 
 /* A number and its weight. */
 struct weighted_value {
-	double at, weight;
+	double value, weight;
 };
-int weighted_value_compare(const void *a, const void *b); /* for qsort, by `at` */
+int weighted_value_compare(const void *a, const void *b); /* for qsort, by `value` */
 
 /* Returns the origin: the centre of the bounding box; in a scene of mixed scales, whose smallest shape is less than
  * 2^-12 of the scene's extent, the median along each axis of the shapes' centres, weighted by 1 / extent, so that it
- * lies among small things. `room` needs space for `count` values. */
-vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighted_value *room);
+ * lies among small things. `scratch` needs space for `count` values. */
+vec3 origin_choose(const struct box *scene_box, const struct box *shapes, uint32_t count,
+		   struct weighted_value *scratch);
 
 /* Returns the extent from which triangles of a scene of mixed scales are too large for floats, in the scene's lengths,
  * as in worker/render/geom/accel.c; INFINITY if the scene does not have mixed scales. */
-double origin_wide_from(const struct box *all, const struct box *shapes, uint32_t count);
+double origin_min_wide_extent(const struct box *scene_box, const struct box *shapes, uint32_t count);
 
 #endif

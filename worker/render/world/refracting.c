@@ -12,17 +12,17 @@
 #include <errno.h>
 
 enum {
-	POINTS = 128,
-	TRIANGLES = 1 << 16,	  /* most triangles that are used of all meshes together */
-	TRIANGLES_LEAST = 1 << 4, /* fewest triangles that are used of each mesh */
+	POINTS_MAX = 128,
+	TRIANGLES_MAX = 1 << 16,     /* most triangles that are used of all meshes together */
+	MESH_TRIANGLES_MIN = 1 << 4, /* fewest triangles that are used of each mesh */
 };
 
 /* State of the systematic sampling. */
-struct spread {
+struct area_sampling {
 	struct world *w;
 	/* area: total area passed so far; step: area between two points, or 0 to only sum the areas. */
 	double area, step;
-	uint32_t triangles; /* most triangles that are used of a mesh */
+	uint32_t max_triangles; /* most triangles that are used of a mesh */
 };
 
 static double triangle_area(const struct geom_shape *s, struct prim_ref prim)
@@ -56,22 +56,22 @@ static struct surface_point point_on(const struct geom_shape *s, struct prim_ref
 	return x;
 }
 
-static void place_points(struct spread *s, double area, struct prim_ref prim)
+static void place_points(struct area_sampling *s, double area, struct prim_ref prim)
 {
 	struct world *w = s->w;
 	s->area += area;
 	if (!(s->step > 0))
 		return;
-	while (w->refracting_point_count < POINTS && (w->refracting_point_count + 0.5) * s->step < s->area) {
-		struct refracting_point *to = &w->refracting_points[w->refracting_point_count];
+	while (w->refracting_point_count < POINTS_MAX && (w->refracting_point_count + 0.5) * s->step < s->area) {
+		struct refracting_point *point = &w->refracting_points[w->refracting_point_count];
 		struct surface_point x = point_on(&w->shapes[prim.shape], prim, w->refracting_point_count);
-		double eta = w->bsdfs[w->parts[prim.shape].bsdf].eta;
-		*to = (struct refracting_point){x.p, eta < 1 ? vec3_neg(x.ng) : x.ng, fmax(eta, 1 / eta)};
+		double eta = w->bsdfs[w->shape_bindings[prim.shape].bsdf].eta;
+		*point = (struct refracting_point){x.p, eta < 1 ? vec3_neg(x.ng) : x.ng, fmax(eta, 1 / eta)};
 		w->refracting_point_count++;
 	}
 }
 
-static void pass_shape(struct spread *s, uint32_t i)
+static void sample_shape(struct area_sampling *s, uint32_t i)
 {
 	const struct geom_shape *g = &s->w->shapes[i];
 	struct prim_ref prim = {i, 0, 0.5};
@@ -79,41 +79,41 @@ static void pass_shape(struct spread *s, uint32_t i)
 		place_points(s, 4 * M_PI * g->radius * g->radius, prim);
 		return;
 	}
-	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / s->triangles : 0);
+	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / s->max_triangles : 0);
 	for (prim.prim = stride / 2; prim.prim < g->triangle_count; prim.prim += stride)
 		place_points(s, stride * triangle_area(g, prim), prim);
 }
 
 static bool is_refracting(const struct world *w, uint32_t shape)
 {
-	return !w->shapes[shape].curves && bsdf_refracts(&w->bsdfs[w->parts[shape].bsdf]);
+	return !w->shapes[shape].curves && bsdf_refracts_connections(&w->bsdfs[w->shape_bindings[shape].bsdf]);
 }
 
-static void pass_all(struct spread *s)
+static void sample_all_shapes(struct area_sampling *s)
 {
 	s->area = 0;
 	for (uint32_t i = 0; i < s->w->shape_count; i++)
 		if (is_refracting(s->w, i))
-			pass_shape(s, i);
+			sample_shape(s, i);
 }
 
 int refracting_points_make(struct world *w)
 {
-	struct spread s = {.w = w, .step = 0};
+	struct area_sampling s = {.w = w, .step = 0};
 	uint32_t shapes = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shapes += is_refracting(w, i);
 	if (!shapes)
 		return 0;
-	s.triangles = TRIANGLES / shapes > TRIANGLES_LEAST ? TRIANGLES / shapes : TRIANGLES_LEAST;
-	pass_all(&s);
+	s.max_triangles = TRIANGLES_MAX / shapes > MESH_TRIANGLES_MIN ? TRIANGLES_MAX / shapes : MESH_TRIANGLES_MIN;
+	sample_all_shapes(&s);
 	if (!(s.area > 0))
 		return 0;
-	w->refracting_points = arena_alloc(&w->arena, POINTS, sizeof *w->refracting_points);
+	w->refracting_points = arena_alloc(&w->arena, POINTS_MAX, sizeof *w->refracting_points);
 	if (!w->refracting_points)
 		return -ENOMEM;
-	s.step = s.area / POINTS;
-	pass_all(&s);
+	s.step = s.area / POINTS_MAX;
+	sample_all_shapes(&s);
 	return 0;
 }
 
@@ -123,15 +123,15 @@ static inline bool is_behind(const struct refracting_point *q, vec3 z)
 	return vec3_dot(vec3_sub(q->p, z), q->n) > 0;
 }
 
-static const struct refracting_point *nearest(const struct world *w, vec3 z)
+static const struct refracting_point *find_nearest(const struct world *w, vec3 z)
 {
 	const struct refracting_point *best = NULL;
-	double least = INFINITY;
+	double min_distance2 = INFINITY;
 	for (uint32_t i = 0; i < w->refracting_point_count; i++) {
 		vec3 d = vec3_sub(w->refracting_points[i].p, z);
-		double square = vec3_dot(d, d);
-		if (square < least) {
-			least = square;
+		double distance2 = vec3_dot(d, d);
+		if (distance2 < min_distance2) {
+			min_distance2 = distance2;
 			best = &w->refracting_points[i];
 		}
 	}
@@ -139,33 +139,34 @@ static const struct refracting_point *nearest(const struct world *w, vec3 z)
 }
 
 /* Returns the optical length of the path from z through q to the light; for light from infinity up to a constant. */
-static double optical_path(const struct refracting_point *q, vec3 z, const struct refracting_end *from)
+static double optical_path(const struct refracting_point *q, vec3 z, const struct refracting_light *light)
 {
 	vec3 d = vec3_sub(q->p, z);
 	double inside = q->eta * vec3_length(d);
-	return from->infinite ? inside - vec3_dot(d, from->at) : inside + vec3_length(vec3_sub(from->at, q->p));
+	return light->infinite ? inside - vec3_dot(d, light->position)
+			       : inside + vec3_length(vec3_sub(light->position, q->p));
 }
 
-uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_end *from,
-				const struct refracting_point *out[REFRACTING_RANKED])
+uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_light *light,
+				const struct refracting_point *out[REFRACTING_POINTS_RANKED])
 {
-	double path[REFRACTING_RANKED];
+	double lengths[REFRACTING_POINTS_RANKED];
 	uint32_t count = 0;
-	const struct refracting_point *near = nearest(w, z);
-	if (!near || !is_behind(near, z))
+	const struct refracting_point *nearest = find_nearest(w, z);
+	if (!nearest || !is_behind(nearest, z))
 		return 0;
 	for (uint32_t i = 0; i < w->refracting_point_count; i++) {
 		const struct refracting_point *q = &w->refracting_points[i];
-		double here = is_behind(q, z) ? optical_path(q, z, from) : INFINITY;
-		if (!(here < (count < REFRACTING_RANKED ? INFINITY : path[count - 1])))
+		double length = is_behind(q, z) ? optical_path(q, z, light) : INFINITY;
+		if (!(length < (count < REFRACTING_POINTS_RANKED ? INFINITY : lengths[count - 1])))
 			continue;
-		uint32_t at = count < REFRACTING_RANKED ? count++ : count - 1;
-		for (; at > 0 && here < path[at - 1]; at--) {
-			path[at] = path[at - 1];
-			out[at] = out[at - 1];
+		uint32_t slot = count < REFRACTING_POINTS_RANKED ? count++ : count - 1;
+		for (; slot > 0 && length < lengths[slot - 1]; slot--) {
+			lengths[slot] = lengths[slot - 1];
+			out[slot] = out[slot - 1];
 		}
-		path[at] = here;
-		out[at] = q;
+		lengths[slot] = length;
+		out[slot] = q;
 	}
 	return count;
 }

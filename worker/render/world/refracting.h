@@ -24,15 +24,15 @@ struct refracting_point {
 int refracting_points_make(struct world *w);
 
 /* The origin of light: a point, or, if it is infinitely far away, the unit direction towards it. */
-struct refracting_end {
-	vec3 at;
+struct refracting_light {
+	vec3 position;
 	bool infinite;
 };
 
-/* Finds the points through which light from `from` has the shortest optical path to z, the shortest first. Returns
+/* Finds the points through which light from `light` has the shortest optical path to z, the shortest first. Returns
  * their number: 0 unless z lies in the denser medium behind the point that is nearest to it. Pure. */
-enum { REFRACTING_RANKED = 2 };
-uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_end *from,
-				const struct refracting_point *out[REFRACTING_RANKED]);
+enum { REFRACTING_POINTS_RANKED = 2 };
+uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_light *light,
+				const struct refracting_point *out[REFRACTING_POINTS_RANKED]);
 
 #endif

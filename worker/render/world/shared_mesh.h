@@ -18,19 +18,19 @@ enum { SHARED_TRIANGLES_MIN = 17 };
 struct shared_mesh {
 	struct shape_geometry geometry; /* in the shapegroup's coordinates */
 	struct box box;
-	bool shared; /* false: each instance is built on its own */
-	bool placed; /* the following members are valid */
+	bool is_shared; /* false: each instance is built on its own */
+	bool is_placed; /* the following members are valid */
 	vec3 center;
 	double scale; /* factor from the shapegroup's coordinates to the frame of `shape` */
 	struct geom_shape shape;
-	uint32_t (*turned)[3]; /* the indices with reversed winding; NULL: no instance is mirrored */
-	uint32_t first;	       /* the first shape of the world that uses the mesh */
+	uint32_t (*mirrored_index)[3]; /* the indices with reversed winding; NULL: no instance is mirrored */
+	uint32_t first_shape;	       /* the first shape of the world that uses the mesh */
 };
 
 /* Whether an instance may share its mesh, judging by its node. */
-bool shared_mesh_may(const struct builder *b, const struct listed_shape *s);
-/* Sets m->shared if the mesh, which has been read, is shared. A shape that moves shares any mesh that it can. */
-void shared_mesh_read(struct shared_mesh *m, bool moves);
+bool shared_mesh_is_allowed(const struct builder *b, const struct listed_shape *s);
+/* Sets m->is_shared if the mesh, which has been read, is shared. A shape that moves shares any mesh that it can. */
+void shared_mesh_decide(struct shared_mesh *m, bool moves);
 /* Computes the bounding box of an instance. -ERANGE, with the instance's line, if it leaves the range of
  * coordinates. */
 int shared_mesh_box(const struct shared_mesh *m, const struct scene_node *instance, struct box *box, struct error *e);

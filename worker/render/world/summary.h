@@ -13,11 +13,11 @@
  * wavelength". */
 struct effect_line {
 	const char *name;
-	bool on;
-	bool forced;	  /* overridden by the user */
-	bool other_scene; /* forced off, so the image shows a different scene */
-	char why[240];
-	const char *saves; /* what omitting the effect saves */
+	bool is_on;
+	bool is_forced;	    /* overridden by the user */
+	bool changes_scene; /* forced off, so the image shows a different scene */
+	char reason[240];
+	const char *savings; /* what omitting the effect saves */
 };
 enum { RENDER_EFFECTS_MAX = 26 };
 
@@ -30,27 +30,27 @@ struct render_options {
 };
 
 /* Notes about shapes with coinciding surfaces, one sentence for each pair. */
-enum { RENDER_COINCIDENT_MAX = 8 };
-struct render_coincident {
-	char text[RENDER_COINCIDENT_MAX][400];
-	size_t count, total; /* number of sentences; number of pairs */
-	bool incomplete;     /* the search reached its bound */
+enum { COINCIDENCE_NOTES_MAX = 8 };
+struct coincidence_notes {
+	char text[COINCIDENCE_NOTES_MAX][400];
+	size_t count, pair_count; /* number of sentences; number of pairs */
+	bool is_incomplete;	  /* the search reached its bound */
 };
 
 /* Notes about the scene, made while shapes were read and placed and afterwards; "" if there is nothing to say. */
 struct world_notes {
-	char scales[512];    /* a shape that is too small relative to another one, by name */
-	char flat[384];	     /* how many triangles without area were left out */
-	char normals[256];   /* how many normals of meshes are not finite */
-	char close[256];     /* a shape that is too near to the camera */
-	char without[256];   /* how many meshes have no triangles at all */
-	char gone[256];	     /* how many shapes are too small for the scene */
-	char materials[384]; /* how many shape files name materials that are not read */
-	char unseen[192];    /* that the camera sees no shape */
-	char negative[384];  /* how many pixels of an emitter's image are negative */
-	char dark[128];	     /* that the emitters give no light */
-	char backs[192];     /* that the camera sees backs that are black */
-	char endless[256];   /* that the camera stands in a medium that no light from infinity gets through */
+	char small_shape[512];	    /* a shape that is too small relative to another one, by name */
+	char flat_triangles[384];   /* how many triangles without area were left out */
+	char bad_normals[256];	    /* how many normals of meshes are not finite */
+	char near_camera[256];	    /* a shape that is too near to the camera */
+	char empty_meshes[256];	    /* how many meshes have no triangles at all */
+	char tiny_shapes[256];	    /* how many shapes are too small for the scene */
+	char unread_materials[384]; /* how many shape files name materials that are not read */
+	char nothing_visible[192];  /* that the camera sees no shape */
+	char negative_pixels[384];  /* how many pixels of an emitter's image are negative */
+	char no_light[128];	    /* that the emitters give no light */
+	char black_backs[192];	    /* that the camera sees backs that are black */
+	char endless_medium[256];   /* that the camera stands in a medium that no light from infinity gets through */
 };
 
 struct render_summary {
@@ -62,19 +62,19 @@ struct render_summary {
 	uint64_t shapes, triangles; /* including all that instances show */
 	uint64_t instances;	    /* number of instances in the scene */
 	/* Number of shapes that share meshes, number of meshes that they share, and number of triangles in memory. */
-	uint64_t sharing, shared_meshes, stored_triangles;
+	uint64_t sharing_shapes, shared_meshes, stored_triangles;
 	uint64_t segments; /* number of round cones of curves */
 	/* Approximate size of the world in bytes; Embree's part is estimated per triangle. */
-	uint64_t memory;
-	double brightest; /* see world_brightest() */
-	bool beams;	  /* see world_has_beam() */
-	bool rolls;	  /* see world_rolls() */
-	struct render_coincident coincident;
+	uint64_t memory_bytes;
+	double brightness_bound;  /* see world_brightness_bound() */
+	bool has_beam;		  /* see world_has_beam() */
+	bool has_rolling_shutter; /* see world_has_rolling_shutter() */
+	struct coincidence_notes coincidence_notes;
 	struct world_notes notes;
 };
 
 /* Size of the camera's text, one line of name=value pairs with the scene language's names: fov in degrees along
  * fov_axis, to_world by rows (x left on the image, y up, z forward). It goes into the image's header. */
-enum { RENDER_CAMERA_TEXT = 768 };
+enum { RENDER_CAMERA_TEXT_MAX = 768 };
 
 #endif

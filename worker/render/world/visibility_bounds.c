@@ -18,24 +18,24 @@
 
 /* Shapes count as apart at this distance, in scene radii; floats have a precision of 2^-24. */
 #define MARGIN 0x1p-16
-static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
+static vec3 load_vertex(const struct geom_shape *g, uint32_t i)
 {
 	vec3 p = triangle_vertex((const float(*)[3])g->position, i);
-	return g->place ? placement_point(g->place, p) : p;
+	return g->placement ? placement_point(g->placement, p) : p;
 }
 
 /* Returns the unit normal of a triangle's plane, and its height over the origin. */
-static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *height)
+static vec3 triangle_plane(const struct geom_shape *g, uint32_t triangle, double *height)
 {
 	const uint32_t *t = g->index[triangle];
-	vec3 v0 = vertex_of(g, t[0]);
-	vec3 n = vec3_normalize(vec3_cross(vec3_sub(vertex_of(g, t[1]), v0), vec3_sub(vertex_of(g, t[2]), v0)));
+	vec3 v0 = load_vertex(g, t[0]);
+	vec3 n = vec3_normalize(vec3_cross(vec3_sub(load_vertex(g, t[1]), v0), vec3_sub(load_vertex(g, t[2]), v0)));
 	*height = vec3_dot(n, v0);
 	return n;
 }
 
 /* Computes the smallest and the largest n.p over a shape. */
-static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
+static void extent_along(const struct geom_shape *g, vec3 n, double *low, double *high)
 {
 	if (g->is_sphere) {
 		*low = vec3_dot(n, g->center) - g->radius;
@@ -45,32 +45,32 @@ static void extent(const struct geom_shape *g, vec3 n, double *low, double *high
 	*low = INFINITY;
 	*high = -INFINITY;
 	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++) {
-		double h = vec3_dot(n, curves_center(g->curves, i)), r = (double)g->curves->point[i][3];
+		double h = vec3_dot(n, curves_center(g->curves, i)), r = (double)g->curves->points[i][3];
 		*low = fmin(*low, h - r);
 		*high = fmax(*high, h + r);
 	}
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
-			double h = vec3_dot(n, vertex_of(g, g->index[i][k]));
+			double h = vec3_dot(n, load_vertex(g, g->index[i][k]));
 			*low = fmin(*low, h);
 			*high = fmax(*high, h);
 		}
 }
 
-static double farthest(const struct geom_shape *g, vec3 from)
+static double farthest_distance(const struct geom_shape *g, vec3 from)
 {
 	if (g->is_sphere)
 		return vec3_length(vec3_sub(g->center, from)) + g->radius;
-	double far2 = 0, far = 0;
+	double max_distance2 = 0, max_distance = 0;
 	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++)
-		far = fmax(far,
-			   vec3_length(vec3_sub(curves_center(g->curves, i), from)) + (double)g->curves->point[i][3]);
+		max_distance = fmax(max_distance, vec3_length(vec3_sub(curves_center(g->curves, i), from)) +
+							  (double)g->curves->points[i][3]);
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
-			vec3 d = vec3_sub(vertex_of(g, g->index[i][k]), from);
-			far2 = fmax(far2, vec3_dot(d, d));
+			vec3 d = vec3_sub(load_vertex(g, g->index[i][k]), from);
+			max_distance2 = fmax(max_distance2, vec3_dot(d, d));
 		}
-	return fmax(far, sqrt(far2));
+	return fmax(max_distance, sqrt(max_distance2));
 }
 
 /* Whether a shape is known to be convex, closed and opaque. An ellipsoid is, too, but it is a mesh whose triangles
@@ -79,8 +79,8 @@ static bool is_container(const struct world *w, const struct scene_node *node, u
 {
 	const struct geom_shape *g = &w->shapes[shape];
 	bool convex = strcmp(node->type, "cube") == 0 || g->is_sphere;
-	return convex && !surface_moves(g) && !displacement_of(node) &&
-	       !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
+	return convex && !surface_moves(g) && !displacement_property(node) &&
+	       !(w->bsdfs[w->shape_bindings[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
 /* Whether no camera path can start inside the shape: all of it is beyond the near plane, or behind the
@@ -88,45 +88,45 @@ static bool is_container(const struct world *w, const struct scene_node *node, u
 static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
 {
 	const struct camera *c = &w->camera;
-	double low, high, at = vec3_dot(c->axes.n, c->position);
-	if (c->moves)
+	double low, high, camera_height = vec3_dot(c->axes.n, c->position);
+	if (c->motion)
 		return false;
-	extent(g, c->axes.n, &low, &high);
-	return low > at + c->near_clip + MARGIN || high < at - MARGIN;
+	extent_along(g, c->axes.n, &low, &high);
+	return low > camera_height + c->near_clip + MARGIN || high < camera_height - MARGIN;
 }
 
 static bool contains(const struct geom_shape *outer, const struct geom_shape *inner)
 {
 	if (outer->is_sphere)
-		return farthest(inner, outer->center) < outer->radius - MARGIN;
+		return farthest_distance(inner, outer->center) < outer->radius - MARGIN;
 	for (uint32_t i = 0; i < outer->triangle_count; i++) {
-		double height, unused, low, high, least, most;
-		vec3 n = plane_of(outer, i, &height);
-		extent(outer, n, &low, &high);
+		double height, unused, low, high, inner_low, inner_high;
+		vec3 n = triangle_plane(outer, i, &height);
+		extent_along(outer, n, &low, &high);
 		/* A convex shape lies on one side of the plane of each of its triangles. */
 		if (high > height + MARGIN)
 			n = vec3_neg(n), height = -height;
-		extent(inner, n, &least, &most);
-		extent(outer, n, &unused, &high);
-		if (high > height + MARGIN || most > height - MARGIN)
+		extent_along(inner, n, &inner_low, &inner_high);
+		extent_along(outer, n, &unused, &high);
+		if (high > height + MARGIN || inner_high > height - MARGIN)
 			return false;
 	}
 	return true;
 }
 
-static bool box_holds(const struct box *outer, const struct box *inner)
+static bool box_contains(const struct box *outer, const struct box *inner)
 {
 	return inner->low.x >= outer->low.x && inner->high.x <= outer->high.x && inner->low.y >= outer->low.y &&
 	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
 }
 
 /* Returns the index of the first of n sorted numbers that is not below x. */
-static uint32_t first_from(const struct weighted_value *sorted, uint32_t n, double x)
+static uint32_t find_lower_bound(const struct weighted_value *sorted, uint32_t n, double x)
 {
 	uint32_t low = 0, high = n;
 	while (low < high) {
 		uint32_t middle = low + (high - low) / 2;
-		if (sorted[middle].at < x)
+		if (sorted[middle].value < x)
 			low = middle + 1;
 		else
 			high = middle;
@@ -138,29 +138,30 @@ static uint32_t first_from(const struct weighted_value *sorted, uint32_t n, doub
  * box are checked closely. */
 static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility *shape)
 {
-	struct weighted_value *by_x = src->room;
+	struct weighted_value *by_x = src->scratch;
 	uint32_t n = w->shape_count;
 	for (uint32_t i = 0; i < n; i++)
-		by_x[i] = (struct weighted_value){src->box[i].low.x, i};
+		by_x[i] = (struct weighted_value){src->boxes[i].low.x, i};
 	if (n > 0)
 		qsort(by_x, n, sizeof *by_x, weighted_value_compare);
 	for (uint32_t o = 0; o < n; o++) {
-		const struct box *outer = &src->box[o];
-		if (!is_container(w, src->shape[o], o) || !camera_is_outside(w, &w->shapes[o]))
+		const struct box *outer = &src->boxes[o];
+		if (!is_container(w, src->shape_nodes[o], o) || !camera_is_outside(w, &w->shapes[o]))
 			continue;
-		for (uint32_t k = first_from(by_x, n, outer->low.x); k < n && by_x[k].at <= outer->high.x; k++) {
+		for (uint32_t k = find_lower_bound(by_x, n, outer->low.x); k < n && by_x[k].value <= outer->high.x;
+		     k++) {
 			uint32_t i = (uint32_t)by_x[k].weight;
 			if (i != o && shape[i] == VISIBILITY_YES && !surface_moves(&w->shapes[i]) &&
-			    box_holds(outer, &src->box[i]) && contains(&w->shapes[o], &w->shapes[i]))
+			    box_contains(outer, &src->boxes[i]) && contains(&w->shapes[o], &w->shapes[i]))
 				shape[i] = VISIBILITY_ENCLOSED;
 		}
 	}
 }
 
-bool visibility_bounds_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter)
+bool visibility_bounds_emitter_is_visible(const struct world *w, const enum visibility *shape, uint32_t emitter)
 {
-	uint32_t on = w->emitter_shape[emitter];
-	return w->emitters[emitter].power > 0 && (on == UINT32_MAX || shape[on] != VISIBILITY_ENCLOSED);
+	uint32_t surface = w->emitter_shape[emitter];
+	return w->emitters[emitter].power > 0 && (surface == UINT32_MAX || shape[surface] != VISIBILITY_ENCLOSED);
 }
 
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
@@ -170,49 +171,50 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 		shape[i] = VISIBILITY_YES;
 	find_enclosed(w, src, shape);
 	bool dark = true,
-	     passable = false; /* passable: faces that are not vertices let light through, whatever the depth */
+	     media_scatter =
+		     false; /* media_scatter: faces that are not vertices let light through, whatever the depth */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		dark &= !visibility_bounds_emitter(w, shape, i);
+		dark &= !visibility_bounds_emitter_is_visible(w, shape, i);
 	for (uint32_t i = 0; i < w->media_count; i++) {
-		if (w->media[i].shines)
+		if (w->media[i].is_emissive)
 			return;
-		passable |= w->media[i].scatters;
+		media_scatter |= w->media[i].scatters;
 	}
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] == VISIBILITY_YES && (dark || (max_depth <= 1 && !passable)))
+		if (shape[i] == VISIBILITY_YES && (dark || (max_depth <= 1 && !media_scatter)))
 			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;
 }
 
 static struct triangle triangle_at(const struct geom_shape *g, uint32_t i)
 {
 	const float(*p)[3] = (const float(*)[3])g->position;
-	return g->place ? placement_triangle(g->place, p, g->index[i]) : triangle_from(p, g->index[i]);
+	return g->placement ? placement_triangle(g->placement, p, g->index[i]) : triangle_from(p, g->index[i]);
 }
 
-static bool lies_in(const struct triangle *plane, const struct geom_shape *g)
+static bool lies_in_plane(const struct triangle *plane, const struct geom_shape *g)
 {
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++)
-			if (triangle_height(plane, vertex_of(g, g->index[i][k])) != 0)
+			if (triangle_height(plane, load_vertex(g, g->index[i][k])) != 0)
 				return false;
 	return true;
 }
 
 uint32_t visibility_bounds_depth(const struct world *w, const enum visibility *shape)
 {
-	bool any = false;
+	bool has_plane = false;
 	struct triangle plane;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
-		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
+		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
 			continue;
 		if (g->is_sphere || g->curves || surface_moves(g))
 			return UINT32_MAX;
-		if (!any)
+		if (!has_plane)
 			plane = triangle_at(g, 0);
-		any = true;
-		if (!lies_in(&plane, g))
+		has_plane = true;
+		if (!lies_in_plane(&plane, g))
 			return UINT32_MAX;
 	}
-	return any ? 2 : 1;
+	return has_plane ? 2 : 1;
 }

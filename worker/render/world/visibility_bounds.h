@@ -13,7 +13,7 @@ struct box;
 struct weighted_value;
 
 struct bsdf_visibility {
-	enum visibility shapes; /* visibility of the shapes that use the BSDF */
+	enum visibility visibility; /* visibility of the shapes that use the BSDF */
 	bool has_shape;
 };
 
@@ -21,18 +21,18 @@ struct bsdf_visibility {
 struct effects_source {
 	const struct scene *scene;
 	/* One per shape, and one per BSDF; NULL: the default BSDF. */
-	const struct scene_node *const *shape, *const *bsdf;
-	const struct scene_node *const *emitter; /* one per emitter */
-	const struct scene_node *sensor;	 /* NULL: the scene has none */
-	uint32_t max_depth;			 /* as requested; 0: the scene's value */
-	const struct box *box;			 /* one per shape, in any unit */
-	struct weighted_value *room;		 /* space for one per shape */
-	struct bsdf_visibility *visibility;	 /* space for one per BSDF */
+	const struct scene_node *const *shape_nodes, *const *bsdf_nodes;
+	const struct scene_node *const *emitter_nodes; /* one per emitter */
+	const struct scene_node *sensor;	       /* NULL: the scene has none */
+	uint32_t max_depth;			       /* as requested; 0: the scene's value */
+	const struct box *boxes;		       /* one per shape, in any unit */
+	struct weighted_value *scratch;		       /* space for one per shape */
+	struct bsdf_visibility *bsdf_visibility;       /* space for one per BSDF */
 };
 
 /* Whether an emitter has power and is not enclosed. */
-bool visibility_bounds_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter);
-/* Fills in shape[], one entry per shape of w. max_depth: edges. */
+bool visibility_bounds_emitter_is_visible(const struct world *w, const enum visibility *shape, uint32_t emitter);
+/* Fills in shape_nodes[], one entry per shape of w. max_depth: edges. */
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
 			      enum visibility *shape);
 /* Returns the number of edges of the longest path that can carry light: 1 if nothing scatters; 2 if everything that

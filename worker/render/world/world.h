@@ -17,15 +17,15 @@
 struct emitter_choice;
 struct refracting_point;
 
-struct world_shape {
+struct shape_binding {
 	uint32_t bsdf;
 	int32_t emitter;	     /* -1: not an emitter */
 	uint32_t interior, exterior; /* number of the medium: 1 + its index; 0: none */
-	bool passable;		     /* a face of `null` that is not a vertex of paths: path/media.h */
+	bool is_null_face;	     /* a face of `null` that is not a vertex of paths: path/media.h */
 };
 
 /* Sets *medium to the medium on one side of a shape that states media. Returns false if the shape states none. */
-static inline bool world_medium_of_side(const struct world_shape *s, bool outside, uint32_t *medium)
+static inline bool world_medium_of_side(const struct shape_binding *s, bool outside, uint32_t *medium)
 {
 	if (!s->interior && !s->exterior)
 		return false;
@@ -45,17 +45,17 @@ struct world {
 	uint32_t shape_count, bsdf_count, emitter_count;
 	uint32_t instance_count; /* number of instances in the scene, whether or not they share meshes */
 	/* Number of shapes that share a mesh with others, and number of these meshes. */
-	uint32_t sharing_count, shared_mesh_count;
+	uint32_t sharing_shape_count, shared_mesh_count;
 	struct geom_shape *shapes;
-	struct world_shape *parts; /* one per shape */
+	struct shape_binding *shape_bindings; /* one per shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	/* camera_medium: 1 + its index, as in world_shape; 0: none. */
+	/* camera_medium: 1 + its index, as in shape_binding; 0: none. */
 	uint32_t media_count, camera_medium;
 	struct medium *media;
-	bool has_passable;     /* some shape is passable */
-	struct box passed;     /* bounds all surfaces that connections may look through; may be empty */
-	struct box refracting; /* bounds all surfaces that may refract connections; may be empty */
+	bool has_null_faces;	       /* some shape is passable */
+	struct box see_through_bounds; /* bounds all surfaces that connections may look through; may be empty */
+	struct box refracting_bounds;  /* bounds all surfaces that may refract connections; may be empty */
 	struct refracting_point *refracting_points; /* points on these surfaces: refracting.h */
 	uint32_t refracting_point_count;
 	/* The medium around each emitter whose shape states none; only where media scatter. */
@@ -66,9 +66,9 @@ struct world {
 	struct emitter_choice *emitter_choice;
 	/* Index of the emitter that escaping rays meet; -1: none. */
 	int32_t environment;
-	double grey_xyz[3];		     /* CIE XYZ of the grey value 1 */
-	struct coincidence *coincidence;     /* coinciding surfaces; NULL: none */
-	struct render_coincident coincident; /* notes about coinciding surfaces */
+	double grey_xyz[3];			    /* CIE XYZ of the grey value 1 */
+	struct coincidence *coincidence;	    /* coinciding surfaces; NULL: none */
+	struct coincidence_notes coincidence_notes; /* notes about coinciding surfaces */
 	struct world_notes notes;
 	struct accel *accel;
 };
@@ -85,30 +85,30 @@ struct world {
 static inline struct wavelengths world_wavelengths(const struct world *w, double u)
 {
 	if (!EFFECT_IS_ON(w, colour))
-		return (struct wavelengths){.grey = true};
+		return (struct wavelengths){.is_grey = true};
 	if (w->accuracy.colour > 0)
-		return (struct wavelengths){.rgb = true};
-	return wavelengths_sample_few(u, (unsigned)w->accuracy.wavelengths);
+		return (struct wavelengths){.is_rgb = true};
+	return wavelengths_sample_distinct(u, (unsigned)w->accuracy.wavelengths);
 }
 
 /* Whether the shutter rolls, so that the time of a path depends on its film point. */
-static inline bool world_rolls(const struct world *w)
+static inline bool world_has_rolling_shutter(const struct world *w)
 {
-	return EFFECT_IS_ON(w, motion) && w->settings.roll != ROLL_NONE;
+	return EFFECT_IS_ON(w, motion) && w->settings.rolling_shutter != ROLL_NONE;
 }
 
-/* Returns the camera at the time of a path's vertex; `room` is used if the camera moves. */
+/* Returns the camera at the time of a path's vertex; `storage` is used if the camera moves. */
 static inline const struct camera *world_camera(const struct world *w, const struct surface_point *x,
-						struct camera *room)
+						struct camera *storage)
 {
-	return camera_at(&w->camera, x->prim.time, room);
+	return camera_at(&w->camera, x->prim.time, storage);
 }
 
-/* Returns an emitter at the time of a path's vertex; `room` is used if the emitter moves. */
+/* Returns an emitter at the time of a path's vertex; `storage` is used if the emitter moves. */
 static inline const struct emitter *world_emitter(const struct world *w, int32_t emitter, double time,
-						  struct emitter_room *room)
+						  struct emitter_storage *storage)
 {
-	return emitter_at(&w->emitters[emitter], time, room);
+	return emitter_at(&w->emitters[emitter], time, storage);
 }
 
 /* Returns the emitter selected by a number in [0,1); -1 if there is none. */
@@ -130,8 +130,11 @@ static inline struct emitter_point world_emitter_point(const struct surface_poin
 static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
 						 enum transport transport)
 {
-	return (struct bsdf_point){
-		world_texture_point(x), w, transport, x->shape && x->shape->culled, {x, surface_frame_with}};
+	return (struct bsdf_point){world_texture_point(x),
+				   w,
+				   transport,
+				   x->shape && x->shape->culls_backfaces,
+				   {x, surface_frame_with_relief}};
 }
 
 #endif

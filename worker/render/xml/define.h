@@ -17,27 +17,27 @@ enum { DEFINE_MAX = 1024, DEFINE_MISSING_MAX = 64 };
 
 struct define_entry {
 	const char *name, *value;
-	bool given, used; /* given: on the command line */
+	bool from_command_line, is_used; /* given: on the command line */
 };
 
 struct define_table {
 	struct arena *arena;
 	struct define_entry *entries; /* DEFINE_MAX */
 	size_t count, missing_count;
-	bool incomplete; /* a file that may define more names is missing, so undefined names are not reported */
-	const char *missing[DEFINE_MISSING_MAX]; /* names used without being defined, each once */
+	bool is_incomplete; /* a file that may define more names is missing, so undefined names are not reported */
+	const char *missing_names[DEFINE_MISSING_MAX]; /* names used without being defined, each once */
 };
 
-int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
+int define_init(struct define_table *t, const struct scene_define *defines, size_t count, struct arena *arena,
 		struct error *e);
-int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
+int define_add_default(struct define_table *t, const char *name, const char *value, struct error *e);
 /* Records a <default> whose value uses an undefined name: uses of `name` are not reported as well. */
-int define_without_value(struct define_table *t, const char *name, struct error *e);
+int define_add_valueless(struct define_table *t, const char *name, struct error *e);
 
 /* Copies text into the arena with every $name replaced; values are not expanded again. The name is the longest run
- * of letters, digits and '_' after '$'; one that is not defined is kept if `keep_unknown` is set. Otherwise returns
+ * of letters, digits and '_' after '$'; one that is not defined is kept if `keep_undefined` is set. Otherwise returns
  * -ENOENT with a message the first time, and -EEXIST if it was already reported or need not be. */
-int define_substitute(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, const char **out,
+int define_substitute(struct define_table *t, const char *text, bool keep_undefined, size_t size_max, const char **out,
 		      struct error *e);
 
 /* Returns -EINVAL with a message if a name given on the command line was used by no file: it is taken for a mistake. */

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *xml_attribute(const struct xml_element *el, const char *name)
+const char *xml_attribute_value(const struct xml_element *el, const char *name)
 {
 	for (uint32_t i = 0; i < el->attribute_count; i++)
 		if (strcmp(el->attributes[i].name, name) == 0)
@@ -15,16 +15,16 @@ const char *xml_attribute(const struct xml_element *el, const char *name)
 	return NULL;
 }
 
-const char *element_spelling(const struct xml_element *el, const char *name)
+const char *element_written_name(const struct xml_element *el, const char *name)
 {
-	const char *written = el->snake ? xml_attribute(el, "name") : NULL;
+	const char *written = el->is_camel_case ? xml_attribute_value(el, "name") : NULL;
 	return written ? written : name;
 }
 
 bool element_is_unset(const struct xml_element *el)
 {
-	bool unset = el->unset;
-	for (const struct xml_element *c = el->first; c && !unset; c = c->next)
+	bool unset = el->is_unset;
+	for (const struct xml_element *c = el->first_child; c && !unset; c = c->next_sibling)
 		unset = element_is_unset(c);
 	return unset;
 }
@@ -36,7 +36,7 @@ int xml_error(const struct xml_element *el, struct error *e, int errno_value, co
 	va_start(ap, format);
 	vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
-	const char *type = xml_attribute(el, "type");
+	const char *type = xml_attribute_value(el, "type");
 	if (type)
 		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name,
 				 type, text);
@@ -65,16 +65,17 @@ static bool is_listed(const char *list, const char *wanted, struct spelling *s)
 	return false;
 }
 
-static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
+static int refuse_attribute(const struct xml_element *el, const char *allowed_attributes, const char *wanted,
+			    struct error *e)
 {
 	char hint[128];
 	struct spelling s = {.wanted = wanted};
-	is_listed(known, wanted, &s);
+	is_listed(allowed_attributes, wanted, &s);
 	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
-			 spelling_hint(&s, hint, sizeof hint), known);
+			 spelling_hint(&s, hint, sizeof hint), allowed_attributes);
 }
 
-int element_needs(const struct xml_element *el, const char *attribute, struct error *e)
+int element_refuse_missing_attribute(const struct xml_element *el, const char *attribute, struct error *e)
 {
 	struct spelling s = {.wanted = attribute};
 	for (uint32_t i = 0; i < el->attribute_count; i++)
@@ -83,14 +84,15 @@ int element_needs(const struct xml_element *el, const char *attribute, struct er
 			 s.best ? s.best : "", s.best ? "`" : "");
 }
 
-int element_check(const struct xml_element *el, const char *known, bool children, struct error *e)
+int element_check_contents(const struct xml_element *el, const char *allowed_attributes, bool allow_children,
+			   struct error *e)
 {
 	for (uint32_t i = 0; i < el->attribute_count; i++)
-		if (!is_listed(known, el->attributes[i].name, NULL))
-			return refuse_attribute(el, known, el->attributes[i].name, e);
-	if (el->text && !el->first && !xml_attribute(el, "value"))
+		if (!is_listed(allowed_attributes, el->attributes[i].name, NULL))
+			return refuse_attribute(el, allowed_attributes, el->attributes[i].name, e);
+	if (el->has_text && !el->first_child && !xml_attribute_value(el, "value"))
 		return xml_error(el, e, EINVAL, "text is not allowed here; values are given by attributes");
-	if (el->first && !children)
-		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);
+	if (el->first_child && !allow_children)
+		return xml_error(el->first_child, e, EINVAL, "has no place in <%.64s>", el->name);
 	return 0;
 }

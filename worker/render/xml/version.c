@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { NEWEST = 3, NOTE_MAX = 256 };
+enum { NEWEST_MAJOR = 3, NOTE_SIZE = 256 };
 
-bool version_read(const char *text, int64_t *major, int64_t *minor)
+bool version_parse(const char *text, int64_t *major, int64_t *minor)
 {
 	const char *end = text + strlen(text), *rest = number_scan_int(text, end, major);
 	*minor = 0;
@@ -19,12 +19,12 @@ bool version_read(const char *text, int64_t *major, int64_t *minor)
 	return true;
 }
 
-const char *version_newer(const struct xml_element *el, int64_t major, struct arena *arena)
+const char *version_newer_note(const struct xml_element *el, int64_t major, struct arena *arena)
 {
-	char text[NOTE_MAX];
-	if (major <= NEWEST)
+	char text[NOTE_SIZE];
+	if (major <= NEWEST_MAJOR)
 		return NULL;
 	snprintf(text, sizeof text, "version=\"%.32s\" in %.160s:%d is newer than any known: read as by Mitsuba %d",
-		 xml_attribute(el, "version"), el->file, el->line, NEWEST);
+		 xml_attribute_value(el, "version"), el->file, el->line, NEWEST_MAJOR);
 	return arena_strdup(arena, text);
 }

@@ -15,35 +15,35 @@
 #include <stdint.h>
 
 enum {
-	XML_DEPTH_MAX = 64,   /* nesting of elements, and of objects that refer to objects */
-	XML_INCLUDE_MAX = 15, /* files that include files */
-	XML_FILES_MAX = 1024, /* files included in total */
-	XML_PATHS_MAX = 16,   /* values of <path> */
-	XML_NOTES_MAX = 8,    /* notes that apply to a file as a whole */
+	XML_DEPTH_MAX = 64,	    /* nesting of elements, and of objects that refer to objects */
+	XML_INCLUDE_DEPTH_MAX = 15, /* files that include files */
+	XML_FILES_MAX = 1024,	    /* files included in total */
+	XML_PATHS_MAX = 16,	    /* values of <path> */
+	XML_NOTES_MAX = 8,	    /* notes that apply to a file as a whole */
 	XML_MISSING_MAX = DEFINE_MISSING_MAX,
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
-	XML_VALUE_MAX = 1 << 20,     /* bytes of an attribute's value */
-	XML_FILE_MAX = 64 << 20,     /* bytes of a scene file */
-	XML_FILES_BYTES = 256 << 20, /* total, counted once per inclusion */
-	XML_MEMORY_MAX = 1 << 30,    /* bytes of the tree */
+	XML_VALUE_MAX = 1 << 20,	 /* bytes of an attribute's value */
+	XML_FILE_MAX = 64 << 20,	 /* bytes of a scene file */
+	XML_TOTAL_BYTES_MAX = 256 << 20, /* total, counted once per inclusion */
+	XML_MEMORY_MAX = 1 << 30,	 /* bytes of the tree */
 };
 
 struct xml_tree {
 	struct xml_element *root; /* <scene>. The contents of an included file are children of its <include>; inside an
 				     object, the included object takes the <include>'s place. */
-	bool dialect_3;
-	bool black_backs; /* an XML file of version >= 2 was read: as in Mitsuba 3, one-sided materials are black from
-			     behind */
+	bool is_dialect_3;
+	bool has_black_backs; /* an XML file of version >= 2 was read: as in Mitsuba 3, one-sided materials are black
+			     from behind */
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
-	const char *includes[XML_FILES_MAX];  /* names of included files, with repetitions */
-	const char *notes[XML_NOTES_MAX];     /* notes for the user about the file */
+	const char *included_files[XML_FILES_MAX]; /* names of included files, with repetitions */
+	const char *notes[XML_NOTES_MAX];	   /* notes for the user about the file */
 	const char *missing[XML_MISSING_MAX]; /* a sentence for each $name without a value and each file that is missing
 						 or cannot be read to its end */
-	bool holes; /* some file is missing: unknown ids are not reported, because it may define them */
-	bool blind; /* a <path> has no value: the scene is not built, since files that are there would seem to be
-		       missing */
-	const char *paths[XML_PATHS_MAX]; /* of <path>, for the files named after it */
+	bool has_missing_files; /* some file is missing: unknown ids are not reported, because it may define them */
+	bool has_unset_path; /* a <path> has no value: the scene is not built, since files that are there would seem to
+		       be missing */
+	const char *search_paths[XML_PATHS_MAX]; /* of <path>, for the files named after it */
 };
 
 int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,

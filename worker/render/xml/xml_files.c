@@ -14,21 +14,21 @@
 #include <string.h>
 
 /* Returns the canonical form of FOLDER/NAME, or of NAME if the folder is "". NULL if out of memory. */
-static const char *canonical(struct arena *arena, const char *folder, const char *name)
+static const char *make_canonical_name(struct arena *arena, const char *folder, const char *name)
 {
 	size_t n = strlen(folder), size = n + 1 + strlen(name);
-	char *joined = arena_alloc(arena, size + 1, 1), *out = arena_alloc(arena, ASSET_NAME_ROOM(size), 1);
+	char *joined = arena_alloc(arena, size + 1, 1), *out = arena_alloc(arena, ASSET_NAME_SIZE_MAX(size), 1);
 	if (!joined || !out)
 		return NULL;
 	snprintf(joined, size + 1, "%s%s%s", folder, n ? "/" : "", name);
-	asset_name_canonical(joined, out);
+	asset_name_canonicalize(joined, out);
 	return out;
 }
 
-static bool leads_out(const char *canonical_name)
+static bool leads_outside(const char *canonical_name)
 {
 	const char *rest;
-	return asset_name_up(canonical_name, &rest) > 0;
+	return asset_name_levels_up(canonical_name, &rest) > 0;
 }
 
 /* Returns 0 if the file can be opened, otherwise the error: -EINVAL if it is outside the folders that may be read. */
@@ -43,35 +43,35 @@ static int try_open(const struct xml_files *f, const char *name)
 }
 
 /* Returns the canonical name of the file in that folder and stores whether it exists. NULL if out of memory. */
-static const char *look_in(const struct xml_files *f, const char *folder, const char *written, bool *found)
+static const char *search_folder(const struct xml_files *f, const char *folder, const char *written, bool *found)
 {
-	const char *there = canonical(f->arena, folder, written);
-	*found = there && try_open(f, there) == 0;
-	return there;
+	const char *candidate = make_canonical_name(f->arena, folder, written);
+	*found = candidate && try_open(f, candidate) == 0;
+	return candidate;
 }
 
 /* Searches as Mitsuba 3 does: beside the file that names it, then beside the one that includes that file, and so on;
  * the scene's own folder comes last. If the name leads out of the scene's folder and is not found, *name becomes the
  * first place tried, for the message. */
-static int look_around(const struct xml_files *f, const char *written, const char **name, bool *found)
+static int search_including_folders(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
-	const char *file = f->file;
-	bool instead = leads_out(*name);
-	for (const struct xml_element *by = f->hook; by && !*found;) {
+	const char *file = f->naming_file;
+	bool use_candidate = leads_outside(*name);
+	for (const struct xml_element *include = f->include; include && !*found;) {
 		const char *end = strrchr(file, '/');
 		char *folder = arena_strdup(f->arena, end ? file : "");
 		if (folder && end)
 			folder[end - file] = 0;
-		const char *there = folder ? look_in(f, folder, written, found) : NULL;
-		if (!there)
+		const char *candidate = folder ? search_folder(f, folder, written, found) : NULL;
+		if (!candidate)
 			return -ENOMEM;
-		if (*found || instead)
-			*name = there;
-		instead = false;
-		file = by->file;
+		if (*found || use_candidate)
+			*name = candidate;
+		use_candidate = false;
+		file = include->file;
 		do
-			by = by->parent;
-		while (by && strcmp(by->name, "include") != 0);
+			include = include->parent;
+		while (include && strcmp(include->name, "include") != 0);
 	}
 	return 0;
 }
@@ -79,82 +79,83 @@ static int look_around(const struct xml_files *f, const char *written, const cha
 /* Searches the folders of <path>, the last one first, as in Mitsuba 3. If the file is in no folder that may be read
  * but perhaps in one that may not, *name becomes its path there: opening it fails with the --path that would allow
  * it. */
-static int look_along_paths(const struct xml_files *f, const char *written, const char **name, bool *found)
+static int search_path_folders(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
-	const char *outside = NULL;
+	const char *outside_candidate = NULL;
 	for (uint32_t i = f->path_count; i-- > 0 && !*found;) {
-		const char *there = canonical(f->arena, f->paths[i], written);
-		if (!there)
+		const char *candidate = make_canonical_name(f->arena, f->search_paths[i], written);
+		if (!candidate)
 			return -ENOMEM;
-		int rc = try_open(f, there);
+		int rc = try_open(f, candidate);
 		*found = rc == 0;
-		*name = *found ? there : *name;
-		outside = !outside && rc == -EINVAL && leads_out(there) ? there : outside;
+		*name = *found ? candidate : *name;
+		outside_candidate =
+			!outside_candidate && rc == -EINVAL && leads_outside(candidate) ? candidate : outside_candidate;
 	}
-	if (!*found && outside && try_open(f, *name) != 0)
-		*name = outside;
+	if (!*found && outside_candidate && try_open(f, *name) != 0)
+		*name = outside_candidate;
 	return 0;
 }
 
 /* For the path of a file on another machine: looks for the longest end of it that is a file in the scene's folder. */
-static int look_by_end(const struct xml_files *f, const char *written, const char **name, bool *found)
+static int search_by_suffix(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
-	for (const char *end = strchr(written, '/'); end && !*found; end = strchr(end, '/')) {
-		end += strspn(end, "/");
-		const char *there = *end ? look_in(f, "", end, found) : written;
-		if (!there)
+	for (const char *suffix = strchr(written, '/'); suffix && !*found; suffix = strchr(suffix, '/')) {
+		suffix += strspn(suffix, "/");
+		const char *candidate = *suffix ? search_folder(f, "", suffix, found) : written;
+		if (!candidate)
 			return -ENOMEM;
-		*name = *found ? there : *name;
+		*name = *found ? candidate : *name;
 	}
 	return 0;
 }
 
 static bool is_absolute(const char *written)
 {
-	bool letter = (*written >= 'a' && *written <= 'z') || (*written >= 'A' && *written <= 'Z');
-	return *written == '/' || (letter && written[1] == ':' && written[2] == '/');
+	bool starts_with_letter = (*written >= 'a' && *written <= 'z') || (*written >= 'A' && *written <= 'Z');
+	return *written == '/' || (starts_with_letter && written[1] == ':' && written[2] == '/');
 }
 
 /* Finds the first folder that has the file, and stores whether there is one. */
-static int search(struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
+static int search_all(struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
 {
 	*found = false;
-	const char *own = *name = canonical(f->arena, "", written);
-	bool relative = !is_absolute(written);
-	if (!own || (nested && relative && look_around(f, written, name, found)) ||
-	    (relative && !*found && look_along_paths(f, written, name, found)))
+	const char *scene_name = *name = make_canonical_name(f->arena, "", written);
+	bool is_relative = !is_absolute(written);
+	if (!scene_name || (nested && is_relative && search_including_folders(f, written, name, found)) ||
+	    (is_relative && !*found && search_path_folders(f, written, name, found)))
 		return -ENOMEM;
 	if (*found)
 		return 0;
-	int rc = try_open(f, own);
+	int rc = try_open(f, scene_name);
 	*found = rc == 0;
-	*name = *found ? own : *name;
-	if (rc == 0 || rc == -EINVAL || relative)
+	*name = *found ? scene_name : *name;
+	if (rc == 0 || rc == -EINVAL || is_relative)
 		return 0;
-	if (look_by_end(f, written, name, found))
+	if (search_by_suffix(f, written, name, found))
 		return -ENOMEM;
-	f->by_end = *found ? *name : f->by_end;
+	f->found_by_suffix = *found ? *name : f->found_by_suffix;
 	return 0;
 }
 
 int xml_files_find(struct xml_files *f, const char **name, bool nested)
 {
-	bool found = false, windows = strchr(*name, '\\') != NULL;
+	bool found = false, has_backslash = strchr(*name, '\\') != NULL;
 	const char *written = *name;
-	f->by_end = NULL;
-	if (f->path_count == 0 && !windows && !is_absolute(written) && !(nested && f->hook))
-		return (*name = canonical(f->arena, "", written)) ? 0 : -ENOMEM;
-	int c = search(f, written, nested, name, &found);
-	if (c || found || !windows)
+	f->found_by_suffix = NULL;
+	if (f->path_count == 0 && !has_backslash && !is_absolute(written) && !(nested && f->include))
+		return (*name = make_canonical_name(f->arena, "", written)) ? 0 : -ENOMEM;
+	int c = search_all(f, written, nested, name, &found);
+	if (c || found || !has_backslash)
 		return c;
-	char *turned = arena_strdup(f->arena, written);
-	if (!turned)
+	char *slashed = arena_strdup(f->arena, written);
+	if (!slashed)
 		return -ENOMEM;
-	for (char *p = turned; *p; p++)
+	for (char *p = slashed; *p; p++)
 		*p = *p == '\\' ? '/' : *p;
-	const char *other;
-	c = search(f, turned, nested, &other, &found);
+	const char *slashed_name;
+	c = search_all(f, slashed, nested, &slashed_name, &found);
 	if (!c && found)
-		*name = other;
+		*name = slashed_name;
 	return c;
 }

@@ -16,12 +16,13 @@
 struct xml_files {
 	const struct asset_source *assets;
 	struct arena *arena;
-	const char *file;		/* the scene file that names the file */
-	const struct xml_element *hook; /* the <include> by which that scene file is read; NULL: it is the main file */
-	const char *const *paths;	/* values of <path> */
+	const char *naming_file; /* the scene file that names the file */
+	const struct xml_element
+		*include;		 /* the <include> by which that scene file is read; NULL: it is the main file */
+	const char *const *search_paths; /* values of <path> */
 	uint32_t path_count;
 	/* Result: the file's name if it was found only by the end of its path; otherwise NULL. */
-	const char *by_end;
+	const char *found_by_suffix;
 };
 
 /* Replaces *name by the file's canonical name. Returns 0 or -ENOMEM; a file found in no folder is reported by the

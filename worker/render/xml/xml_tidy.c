@@ -15,98 +15,98 @@
 #include <string.h>
 
 static const char amp[] = "&amp;";
-enum { LONGER = sizeof amp - 2 };
+enum { AMP_GROWTH = sizeof amp - 2 };
 
-struct pass {
-	const char *at, *end;
+struct tidy_pass {
+	const char *cursor, *end;
 	char *out;
-	bool begun; /* something other than comments and blanks has been copied */
+	bool has_content; /* something other than comments and blanks has been copied */
 	/* For each kind of markup: the rest of the text does not contain its closing, so it is not searched again. */
-	bool endless[4];
+	bool is_unterminated[4];
 };
 
 /* Markup that is skipped or copied as a whole. */
-enum kind { COMMENT, DECLARATION, CDATA, INSTRUCTION };
+enum markup_kind { COMMENT, DECLARATION, CDATA, INSTRUCTION };
 static const struct {
 	const char *opening, *closing;
 } markup[] = {{"<!--", "-->"}, {"<?xml ", "?>"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}};
 
-static bool starts(const struct pass *p, const char *with)
+static bool starts_with(const struct tidy_pass *p, const char *prefix)
 {
-	size_t n = strlen(with);
-	return (size_t)(p->end - p->at) >= n && memcmp(p->at, with, n) == 0;
+	size_t n = strlen(prefix);
+	return (size_t)(p->end - p->cursor) >= n && memcmp(p->cursor, prefix, n) == 0;
 }
 
 /* Returns the position after the markup of this kind that begins here; NULL if none begins here or it has no end. */
-static const char *end_of_markup(struct pass *p, enum kind kind)
+static const char *find_markup_end(struct tidy_pass *p, enum markup_kind kind)
 {
 	const char *closing = markup[kind].closing;
 	size_t n = strlen(closing);
-	if (p->endless[kind] || !starts(p, markup[kind].opening))
+	if (p->is_unterminated[kind] || !starts_with(p, markup[kind].opening))
 		return NULL;
-	for (const char *q = p->at + strlen(markup[kind].opening); (size_t)(p->end - q) >= n; q++)
+	for (const char *q = p->cursor + strlen(markup[kind].opening); (size_t)(p->end - q) >= n; q++)
 		if (memcmp(q, closing, n) == 0)
 			return q + n;
-	p->endless[kind] = true;
+	p->is_unterminated[kind] = true;
 	return NULL;
 }
 
-static void copy_to(struct pass *p, const char *to, bool as_blanks)
+static void copy_until(struct tidy_pass *p, const char *end, bool as_blanks)
 {
-	for (; p->at < to; p->at++)
-		*p->out++ = as_blanks && *p->at != '\n' ? ' ' : *p->at;
+	for (; p->cursor < end; p->cursor++)
+		*p->out++ = as_blanks && *p->cursor != '\n' ? ' ' : *p->cursor;
 }
 
-static bool is_entity(const struct pass *p)
+static bool is_entity(const struct tidy_pass *p)
 {
 	static const char *const names[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;", "&#"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (starts(p, names[i]))
+		if (starts_with(p, names[i]))
 			return true;
 	return false;
 }
 
 /* Copies one piece of markup or one character. */
-static void step(struct pass *p)
+static void copy_next(struct tidy_pass *p)
 {
-	const char *to = end_of_markup(p, COMMENT);
-	if (to) {
-		copy_to(p, to, true);
+	const char *markup_end = find_markup_end(p, COMMENT);
+	if (markup_end) {
+		copy_until(p, markup_end, true);
 		return;
 	}
-	bool blank = number_is_blank(*p->at);
-	if (!p->begun && (to = end_of_markup(p, DECLARATION))) {
-		copy_to(p, to, true);
-	} else if ((to = end_of_markup(p, CDATA)) || (to = end_of_markup(p, INSTRUCTION))) {
-		copy_to(p, to, false);
-	} else if (*p->at == '&' && !is_entity(p)) {
+	bool is_blank = number_is_blank(*p->cursor);
+	if (!p->has_content && (markup_end = find_markup_end(p, DECLARATION))) {
+		copy_until(p, markup_end, true);
+	} else if ((markup_end = find_markup_end(p, CDATA)) || (markup_end = find_markup_end(p, INSTRUCTION))) {
+		copy_until(p, markup_end, false);
+	} else if (*p->cursor == '&' && !is_entity(p)) {
 		memcpy(p->out, amp, sizeof amp - 1);
 		p->out += sizeof amp - 1;
-		p->at++;
+		p->cursor++;
 	} else {
-		copy_to(p, p->at + 1, false);
+		copy_until(p, p->cursor + 1, false);
 	}
-	p->begun |= !blank;
+	p->has_content |= !is_blank;
 }
 
 char *xml_tidy(const void *text, size_t *size)
 {
 	size_t ampersands = 0;
-	const char *from = *size ? text : "";
-	struct pass p = {.at = from, .end = from + *size};
-	for (const char *q = p.at; q < p.end; q++)
+	const char *source = *size ? text : "";
+	struct tidy_pass p = {.cursor = source, .end = source + *size};
+	for (const char *q = p.cursor; q < p.end; q++)
 		ampersands += *q == '&';
-	char *bytes = mem_alloc(*size + ampersands * LONGER + 1, 1);
+	char *bytes = mem_alloc(*size + ampersands * AMP_GROWTH + 1, 1);
 	if (!bytes)
 		return NULL;
 	p.out = bytes;
 	/* A declaration at the beginning is kept, because it may state an encoding. UTF-16, recognised by a zero byte
 	 * or a byte order mark, is copied unchanged. */
-	bool wide = *size > 1 && (!p.at[0] || !p.at[1] || (unsigned char)p.at[0] >= 0xfe);
-	p.begun = starts(&p, "<?xml") || starts(&p, "\xef\xbb\xbf");
-	while (p.at < p.end && !wide)
-		step(&p);
-	copy_to(&p, p.end, false);
+	bool is_utf16 = *size > 1 && (!p.cursor[0] || !p.cursor[1] || (unsigned char)p.cursor[0] >= 0xfe);
+	p.has_content = starts_with(&p, "<?xml") || starts_with(&p, "\xef\xbb\xbf");
+	while (p.cursor < p.end && !is_utf16)
+		copy_next(&p);
+	copy_until(&p, p.end, false);
 	*size = (size_t)(p.out - bytes);
 	return bytes;
 }

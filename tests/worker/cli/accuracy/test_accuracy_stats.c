@@ -12,29 +12,30 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-static void student_s_table(void **unused)
+static void student_quantiles_match_the_table(void **unused)
 {
 	(void)unused;
 	/* Two-sided 5 % quantiles, as in any printed table. */
 	static const double degrees[] = {1, 2, 5, 15, 30, 1e9}, t[] = {12.706, 4.303, 2.571, 2.131, 2.042, 1.960};
 	for (int i = 0; i < 6; i++)
-		assert_true(fabs(stats_t(0.05, degrees[i]) - t[i]) < 6e-4);
+		assert_true(fabs(stats_t_quantile(0.05, degrees[i]) - t[i]) < 6e-4);
 }
 
-static void a_difference_by_hand(void **unused)
+static void difference_matches_that_by_hand(void **unused)
 {
 	(void)unused;
 	const double a[] = {1, 2, 3, 4}, b[] = {2, 2, 2, 2}, one = 2, none = 0;
 	double t;
 	/* Mean 2.5, variance of the mean 5/12: a quarter above the other mean, standard deviation sqrt(5/12)/2, 3
 	 * degrees of freedom (3.182). */
-	struct interval d = stats_difference(a, 4, b, 4, 0.05, &t), exact = stats_difference(a, 4, &one, 1, 0.05, NULL);
+	struct interval d = stats_relative_difference(a, 4, b, 4, 0.05, &t),
+			exact = stats_relative_difference(a, 4, &one, 1, 0.05, NULL);
 	double half = 3.18245 * sqrt(5.0 / 12) / 2;
 	assert_true(fabs(d.value - 0.25) < 1e-12 && fabs(d.low - (0.25 - half)) < 1e-4 &&
 		    fabs(d.high - (0.25 + half)) < 1e-4);
 	assert_true(fabs(t - 0.25 / (sqrt(5.0 / 12) / 2)) < 1e-9);
 	assert_true(fabs(exact.low - d.low) < 1e-12);
-	assert_true(isnan(stats_difference(a, 4, &none, 1, 0.05, NULL).value));
+	assert_true(isnan(stats_relative_difference(a, 4, &none, 1, 0.05, NULL).value));
 }
 
 /*
@@ -45,22 +46,22 @@ static void a_difference_by_hand(void **unused)
 static void intervals_hold_the_truth(void **unused)
 {
 	(void)unused;
-	struct dice d = dice_of("intervals_hold_the_truth");
-	int held = 0;
+	struct dice d = dice_for_test("intervals_hold_the_truth");
+	int held_count = 0;
 	for (int k = 0; k < 4000; k++) {
 		double a[8], b[8];
 		for (int i = 0; i < 8; i++) {
 			a[i] = 1.03 + 0.02 * dice_normal(&d);
 			b[i] = 1 + 0.01 * dice_normal(&d);
 		}
-		struct interval x = stats_difference(a, 8, b, 8, 0.05, NULL);
-		held += x.low < 0.03 && 0.03 < x.high;
+		struct interval x = stats_relative_difference(a, 8, b, 8, 0.05, NULL);
+		held_count += x.low < 0.03 && 0.03 < x.high;
 	}
-	print_message("held by %d of 4,000\n", held);
-	assert_true(held > 3800 - 75 && held < 3800 + 75);
+	print_message("held by %d of 4,000\n", held_count);
+	assert_true(held_count > 3800 - 75 && held_count < 3800 + 75);
 }
 
-static void medians(void **unused)
+static void median_and_its_interval_are_order_statistics(void **unused)
 {
 	(void)unused;
 	double few[] = {3, 1, 2}, many[101];
@@ -73,7 +74,7 @@ static void medians(void **unused)
 	assert_true(isnan(stats_median(few, 0).value));
 }
 
-static void the_front(void **unused)
+static void front_has_the_settings_that_none_dominates(void **unused)
 {
 	(void)unused;
 	const struct stats_point p[] = {
@@ -85,45 +86,45 @@ static void the_front(void **unused)
 		{log(9.9), 0.02, 0.03, 0.03, 0.05, false}, /* as fast as the default, biased */
 		{log(7.0), 0.02, 0.06, 0.06, 0.08, false}, /* slower and no less biased than the fourth */
 	};
-	size_t by[7];
-	stats_front(p, 7, 0.05, by);
-	assert_true(by[0] == 0 && by[1] == 1 && by[3] == 3);
-	assert_int_equal(by[2], 0);
-	assert_int_equal(by[4], 3);
-	assert_int_equal(by[5], 0);
-	assert_int_equal(by[6], 3);
+	size_t dominators[7];
+	stats_front(p, 7, 0.05, dominators);
+	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[3] == 3);
+	assert_int_equal(dominators[2], 0);
+	assert_int_equal(dominators[4], 3);
+	assert_int_equal(dominators[5], 0);
+	assert_int_equal(dominators[6], 3);
 	const struct stats_point wide[] = {{log(10.0), 0.3, 0, 0, 0.01, false},
 					   {log(12.0), 0.3, 0, 0, 0.01, false},
 					   {log(5.0), 0.3, 0, 0, 0.5, false}};
-	stats_front(wide, 3, 0.05, by);
-	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
+	stats_front(wide, 3, 0.05, dominators);
+	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
 	/* Faster, but suspected of bias, or with too large an uncertainty: neither dominates. */
 	const struct stats_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5, false},
 					   {log(5.0), 0.02, 0.03, 0, 0.5, false},
 					   {log(5.0), 0.02, 0, 0, 0.9, false}};
-	stats_front(weak, 3, 0.05, by);
-	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
+	stats_front(weak, 3, 0.05, dominators);
+	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
 	/* Points known to make another image: they may be dominated, but dominate no other point. */
 	const struct stats_point other[] = {{log(10.0), 0.02, 0.01, 0, 0.05, false},
 					    {log(5.0), 0.02, 0, 0, 0.05, true},
 					    {log(20.0), 0.02, 0, 0, 0.05, true}};
-	stats_front(other, 3, 0.05, by);
-	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
+	stats_front(other, 3, 0.05, dominators);
+	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
 	const struct stats_point same[] = {{log(10.0), 0.02, 0, 0, 0.05, false}, {log(20.0), 0.02, 0, 0, 0.05, true}};
-	stats_front(same, 2, 0.05, by);
-	assert_true(by[0] == 0 && by[1] == 0);
-	stats_front(p, 1, 0.05, by);
-	assert_int_equal(by[0], 0);
+	stats_front(same, 2, 0.05, dominators);
+	assert_true(dominators[0] == 0 && dominators[1] == 0);
+	stats_front(p, 1, 0.05, dominators);
+	assert_int_equal(dominators[0], 0);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(student_s_table),
-		cmocka_unit_test(a_difference_by_hand),
+		cmocka_unit_test(student_quantiles_match_the_table),
+		cmocka_unit_test(difference_matches_that_by_hand),
 		cmocka_unit_test(intervals_hold_the_truth),
-		cmocka_unit_test(medians),
-		cmocka_unit_test(the_front),
+		cmocka_unit_test(median_and_its_interval_are_order_statistics),
+		cmocka_unit_test(front_has_the_settings_that_none_dominates),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,7 +27,7 @@ static struct picture make_picture(uint32_t width, uint32_t height, float value)
 				      .channel_count = 3,
 				      .full_width = width,
 				      .full_height = height,
-				      .names = {"B", "G", "R"}}};
+				      .channel_names = {"B", "G", "R"}}};
 	for (int k = 0; k < 3; k++) {
 		float *plane = p.image.planes[k] = mem_alloc((size_t)width * height, sizeof *plane);
 		for (size_t i = 0; i < (size_t)width * height; i++)
@@ -46,12 +46,12 @@ static struct compare_result compare_pictures(const struct picture *a, const str
 {
 	struct compare_result r;
 	struct error e;
-	if (compare(a, b, trim, &r, &e) != 0)
+	if (compare_to_reference(a, b, trim, &r, &e) != 0)
 		fail_msg("%s", e.text);
 	return r;
 }
 
-static bool near(double a, double b)
+static bool is_near(double a, double b)
 {
 	return fabs(a - b) <= 1e-12 * fabs(b);
 }
@@ -60,7 +60,7 @@ static bool near(double a, double b)
  * B is 1 everywhere except for one pixel of (2, 4, 6): over 4 pixels its mean is (9 + 12) / 12 = 1.75. A is wrong in
  * two values: 0.5 in one pixel's R, and 3 where B has 4.
  */
-static void figures_are_those_made_by_hand(void **unused)
+static void figures_match_those_by_hand(void **unused)
 {
 	(void)unused;
 	struct picture a = make_picture(2, 2, 1), b = make_picture(2, 2, 1);
@@ -70,33 +70,33 @@ static void figures_are_those_made_by_hand(void **unused)
 	*value_at(&a, 1, 3) = 3;
 	struct compare_result r = compare_pictures(&a, &b, 0);
 	double least = 0.0175 * 0.0175;
-	assert_true(near(r.rel_mse, (0.25 / (1 + least) + 1 / (16 + least)) / 12));
-	assert_true(near(r.relative_error, sqrt(r.rel_mse)));
-	assert_true(near(r.rmse, sqrt(1.25 / 12)));
-	assert_true(near(r.peak, 6)); /* rank ceil(0.995 * 12) = 12 of 12 */
-	assert_true(near(r.psnr, 10 * log10(36 / (1.25 / 12))));
-	assert_true(near(r.ratio[0], 4.5 / 5) && near(r.ratio[1], 6.0 / 7) && near(r.ratio[2], 1));
-	assert_true(near(r.luminance_ratio,
-			 (0.2126 * 4.5 + 0.7152 * 6 + 0.0722 * 9) / (0.2126 * 5 + 0.7152 * 7 + 0.0722 * 9)));
-	assert_true(r.pixels == 4 && r.left_out == 0 && r.not_finite == 0);
+	assert_true(is_near(r.rel_mse, (0.25 / (1 + least) + 1 / (16 + least)) / 12));
+	assert_true(is_near(r.relative_error, sqrt(r.rel_mse)));
+	assert_true(is_near(r.rmse, sqrt(1.25 / 12)));
+	assert_true(is_near(r.peak, 6)); /* rank ceil(0.995 * 12) = 12 of 12 */
+	assert_true(is_near(r.psnr, 10 * log10(36 / (1.25 / 12))));
+	assert_true(is_near(r.ratio[0], 4.5 / 5) && is_near(r.ratio[1], 6.0 / 7) && is_near(r.ratio[2], 1));
+	assert_true(is_near(r.luminance_ratio,
+			    (0.2126 * 4.5 + 0.7152 * 6 + 0.0722 * 9) / (0.2126 * 5 + 0.7152 * 7 + 0.0722 * 9)));
+	assert_true(r.pixels == 4 && r.trimmed == 0 && r.not_finite == 0);
 	picture_fini(&a);
 	picture_fini(&b);
 }
 
-static void the_peak_is_a_percentile(void **unused)
+static void peak_is_a_percentile(void **unused)
 {
 	(void)unused;
 	struct picture b = make_picture(20, 10, 1);
 	*value_at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves out the three largest */
 	*value_at(&b, 0, 30) = 90;
 	*value_at(&b, 2, 31) = 80;
-	assert_true(near(compare_pictures(&b, &b, 0).peak, 1));
+	assert_true(is_near(compare_pictures(&b, &b, 0).peak, 1));
 	*value_at(&b, 2, 32) = 70;
-	assert_true(near(compare_pictures(&b, &b, 0).peak, 70));
+	assert_true(is_near(compare_pictures(&b, &b, 0).peak, 70));
 	picture_fini(&b);
 }
 
-static void equal_pictures_are_infinitely_good(void **unused)
+static void equal_pictures_have_an_infinite_psnr(void **unused)
 {
 	(void)unused;
 	struct picture a = make_picture(3, 1, 0), b = make_picture(3, 1, 0);
@@ -117,34 +117,34 @@ static void trimming_leaves_out_the_worst_pixels(void **unused)
 	*value_at(&a, 1, 8) = 2.25f;
 	assert_true(compare_pictures(&a, &b, 0).rmse > 1e4);
 	struct compare_result r = compare_pictures(&a, &b, 0.001);
-	assert_int_equal(r.left_out, 1);
-	assert_true(near(r.rmse, sqrt((0.25 + 0.0625) / (999 * 3))));
-	assert_true(near(r.rel_mse, (0.25 + 0.0625) / (4 + 0.0004) / (999 * 3)));
+	assert_int_equal(r.trimmed, 1);
+	assert_true(is_near(r.rmse, sqrt((0.25 + 0.0625) / (999 * 3))));
+	assert_true(is_near(r.rel_mse, (0.25 + 0.0625) / (4 + 0.0004) / (999 * 3)));
 	assert_true(r.ratio[0] > 100); /* the means are over all pixels */
 	r = compare_pictures(&a, &b, 0.002);
-	assert_true(r.left_out == 2 && near(r.rmse, sqrt(0.0625 / (998 * 3))));
+	assert_true(r.trimmed == 2 && is_near(r.rmse, sqrt(0.0625 / (998 * 3))));
 	assert_true(compare_pictures(&a, &b, 0.003).rmse == 0);
 	*value_at(&a, 0, 500) = NAN;
 	*value_at(&a, 0, 501) = INFINITY;
 	r = compare_pictures(&a, &b, 0.002);
-	assert_true(r.not_finite == 2 && near(r.rmse, sqrt((0.25 + 0.0625) / (998 * 3))));
+	assert_true(r.not_finite == 2 && is_near(r.rmse, sqrt((0.25 + 0.0625) / (998 * 3))));
 	assert_true(isinf(compare_pictures(&a, &b, 0.001).rel_mse));
 	picture_fini(&a);
 	picture_fini(&b);
 }
 
-static void what_cannot_be_compared_is_said(void **unused)
+static void pictures_that_cannot_be_compared_are_refused(void **unused)
 {
 	(void)unused;
 	struct picture a = make_picture(4, 2, 1), b = make_picture(2, 4, 1);
 	struct compare_result r;
 	struct error e;
-	assert_int_equal(compare(&a, &b, 0, &r, &e), -EINVAL);
+	assert_int_equal(compare_to_reference(&a, &b, 0, &r, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "4x2"));
 	picture_fini(&b);
 	b = make_picture(4, 2, 1);
 	*value_at(&b, 1, 6) = NAN;
-	assert_int_equal(compare(&a, &b, 0, &r, &e), -EINVAL);
+	assert_int_equal(compare_to_reference(&a, &b, 0, &r, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "2,1"));
 	picture_fini(&a);
 	picture_fini(&b);
@@ -169,7 +169,7 @@ static void shrinking_takes_means_of_boxes(void **unused)
 
 /* ---- exactness, by way of files, as the program reads them ---- */
 
-static struct picture through_file(struct exr_image *img)
+static struct picture write_and_read(struct exr_image *img)
 {
 	char path[] = "/tmp/hslt-test-XXXXXX";
 	unsigned char *bytes;
@@ -196,18 +196,18 @@ static const struct exr_attribute attributes[] = {
 enum { ATTRIBUTES = sizeof attributes / sizeof *attributes };
 
 /* Returns whether the image counts as unchanged with these attributes. */
-static bool same_with(const struct exr_attribute *changed, size_t count, char *why)
+static bool is_same_with_attributes(const struct exr_attribute *changed, size_t count, char *why)
 {
 	struct exr_attribute copy[ATTRIBUTES];
 	struct picture a = make_picture(5, 3, 1), b = make_picture(5, 3, 1);
 	memcpy(copy, attributes, sizeof copy);
 	a.image.attributes = copy;
 	a.image.attribute_count = ATTRIBUTES;
-	struct picture one = through_file(&a.image);
+	struct picture one = write_and_read(&a.image);
 	memcpy(copy, changed, count * sizeof *changed);
 	b.image.attributes = copy;
 	b.image.attribute_count = count;
-	struct picture other = through_file(&b.image);
+	struct picture other = write_and_read(&b.image);
 	bool same = compare_exact(&one.image, &other.image, why, 256);
 	assert_int_equal(compare_exact(&other.image, &one.image, why, 256), same);
 	a.image.attributes = b.image.attributes = NULL;
@@ -218,7 +218,7 @@ static bool same_with(const struct exr_attribute *changed, size_t count, char *w
 	return same;
 }
 
-static void exact_sees_attributes_but_the_excluded(void **unused)
+static void exact_comparison_sees_all_but_excluded_attributes(void **unused)
 {
 	(void)unused;
 	char why[256];
@@ -230,17 +230,17 @@ static void exact_sees_attributes_but_the_excluded(void **unused)
 		changed[i].number = nextafter(changed[i].number, 9);
 		changed[i].integer++;
 		bool excluded = i >= 3;
-		assert_int_equal(same_with(changed, ATTRIBUTES, why), excluded);
+		assert_int_equal(is_same_with_attributes(changed, ATTRIBUTES, why), excluded);
 		if (!excluded)
 			assert_non_null(strstr(why, attributes[i].name));
 	}
-	assert_true(same_with(attributes, ATTRIBUTES, why));
-	assert_true(same_with(attributes, 3, why));  /* without the excluded attribute */
-	assert_false(same_with(attributes, 2, why)); /* without the group count */
+	assert_true(is_same_with_attributes(attributes, ATTRIBUTES, why));
+	assert_true(is_same_with_attributes(attributes, 3, why));  /* without the excluded attribute */
+	assert_false(is_same_with_attributes(attributes, 2, why)); /* without the group count */
 	assert_non_null(strstr(why, "hslt:groups"));
 }
 
-static void exact_sees_one_bit(void **unused)
+static void exact_comparison_sees_one_bit(void **unused)
 {
 	(void)unused;
 	char why[256];
@@ -258,7 +258,7 @@ static void exact_sees_one_bit(void **unused)
 	b.image.x = 1;
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
 	b.image.x = 0;
-	snprintf(b.image.names[0], sizeof b.image.names[0], "A");
+	snprintf(b.image.channel_names[0], sizeof b.image.channel_names[0], "A");
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
 	assert_non_null(strstr(why, "channel 0"));
 	picture_fini(&a);
@@ -276,7 +276,7 @@ static void a_picture_needs_red_green_and_blue(void **unused)
 	int fd = mkstemp(path);
 	assert_true(fd >= 0);
 	close(fd);
-	snprintf(a.image.names[1], sizeof a.image.names[1], "Y");
+	snprintf(a.image.channel_names[1], sizeof a.image.channel_names[1], "Y");
 	assert_int_equal(exr_write(&a.image, &bytes, &size, &e), 0);
 	assert_int_equal(image_file_write(path, bytes, size, &e), 0);
 	assert_int_equal(picture_read(&p, path, &e), -EINVAL);
@@ -290,7 +290,7 @@ static void a_picture_needs_red_green_and_blue(void **unused)
 	picture_fini(&a);
 }
 
-static void a_heatmap_is_a_png(void **unused)
+static void heatmap_is_written_as_png(void **unused)
 {
 	(void)unused;
 	char path[] = "/tmp/hslt-test-XXXXXX";
@@ -326,16 +326,16 @@ static void a_heatmap_is_a_png(void **unused)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(figures_are_those_made_by_hand),
-		cmocka_unit_test(the_peak_is_a_percentile),
-		cmocka_unit_test(equal_pictures_are_infinitely_good),
+		cmocka_unit_test(figures_match_those_by_hand),
+		cmocka_unit_test(peak_is_a_percentile),
+		cmocka_unit_test(equal_pictures_have_an_infinite_psnr),
 		cmocka_unit_test(trimming_leaves_out_the_worst_pixels),
-		cmocka_unit_test(what_cannot_be_compared_is_said),
+		cmocka_unit_test(pictures_that_cannot_be_compared_are_refused),
 		cmocka_unit_test(shrinking_takes_means_of_boxes),
-		cmocka_unit_test(exact_sees_attributes_but_the_excluded),
-		cmocka_unit_test(exact_sees_one_bit),
+		cmocka_unit_test(exact_comparison_sees_all_but_excluded_attributes),
+		cmocka_unit_test(exact_comparison_sees_one_bit),
 		cmocka_unit_test(a_picture_needs_red_green_and_blue),
-		cmocka_unit_test(a_heatmap_is_a_png),
+		cmocka_unit_test(heatmap_is_written_as_png),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

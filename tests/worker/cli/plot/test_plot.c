@@ -8,7 +8,7 @@
 #include "worker/cli/plot/plot_axis.h"
 
 #include "common/base/mem.h"
-#include "tests/support/folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <expat.h>
 #include <math.h>
@@ -22,24 +22,25 @@
 
 /* The contents of an SVG, as read by an XML parser in this test. */
 struct content {
-	char text[4096]; /* of <text> elements, separated by bars */
-	size_t text_size, uses, scripts;
+	char text[4096]; /* of <on_text> elements, separated by bars */
+	size_t text_size, use_count, script_count;
 	double use_x[64], use_y[64];
 	bool in_text;
 };
 
-static void begin(void *user, const XML_Char *name, const XML_Char **attributes)
+static void on_element_begin(void *user, const XML_Char *name, const XML_Char **attributes)
 {
 	struct content *c = user;
 	c->in_text |= strcmp(name, "text") == 0;
-	c->scripts += strcmp(name, "script") == 0;
+	c->script_count += strcmp(name, "script") == 0;
 	for (size_t i = 0; strcmp(name, "use") == 0 && attributes[i]; i += 2)
-		if (strcmp(attributes[i], "transform") == 0 && c->uses < 64 &&
-		    sscanf(attributes[i + 1], "translate(%lf,%lf)", &c->use_x[c->uses], &c->use_y[c->uses]) == 2)
-			c->uses++;
+		if (strcmp(attributes[i], "transform") == 0 && c->use_count < 64 &&
+		    sscanf(attributes[i + 1], "translate(%lf,%lf)", &c->use_x[c->use_count], &c->use_y[c->use_count]) ==
+			    2)
+			c->use_count++;
 }
 
-static void end(void *user, const XML_Char *name)
+static void on_element_end(void *user, const XML_Char *name)
 {
 	struct content *c = user;
 	if (strcmp(name, "text") == 0) {
@@ -48,7 +49,7 @@ static void end(void *user, const XML_Char *name)
 	}
 }
 
-static void text(void *user, const XML_Char *s, int n)
+static void on_text(void *user, const XML_Char *s, int n)
 {
 	struct content *c = user;
 	if (c->in_text && c->text_size + (size_t)n < sizeof c->text - 64) {
@@ -69,15 +70,15 @@ static void read_svg(const struct plot *p, struct content *c)
 	assert_null(strstr(svg, "scale(0.00)")); /* a singular matrix: some viewers then show nothing at all */
 	XML_Parser x = XML_ParserCreate(NULL);
 	XML_SetUserData(x, c);
-	XML_SetElementHandler(x, begin, end);
-	XML_SetCharacterDataHandler(x, text);
+	XML_SetElementHandler(x, on_element_begin, on_element_end);
+	XML_SetCharacterDataHandler(x, on_text);
 	if (XML_Parse(x, svg, (int)size, 1) != XML_STATUS_OK)
 		fail_msg("not XML: %s", XML_ErrorString(XML_GetErrorCode(x)));
 	XML_ParserFree(x);
 	mem_free(svg);
 }
 
-static void points_are_where_their_values_say(void **unused)
+static void points_lie_at_their_values(void **unused)
 {
 	(void)unused;
 	const double x[] = {1, 10, 100, 1000, NAN, 10}, y[] = {8, 4, 2, 1, 3, -1};
@@ -86,7 +87,7 @@ static void points_are_where_their_values_say(void **unused)
 	struct content c;
 	read_svg(&p, &c);
 	/* Four points are drawn; the fifth mark is the legend's. Equal ratios have equal distances. */
-	assert_int_equal(c.uses, 5);
+	assert_int_equal(c.use_count, 5);
 	size_t first = fabs((c.use_x[1] - c.use_x[0]) - (c.use_x[2] - c.use_x[1])) < 0.5 ? 0 : 1;
 	for (size_t i = first; i + 2 < first + 4; i++) {
 		assert_true(c.use_x[i + 1] > c.use_x[i] + 50 && c.use_y[i + 1] > c.use_y[i] + 20);
@@ -99,11 +100,11 @@ static void points_are_where_their_values_say(void **unused)
 			fail_msg("no %s in %s", wanted[i], c.text);
 }
 
-static void texts_stay_texts(void **unused)
+static void texts_survive_whatever_they_contain(void **unused)
 {
 	(void)unused;
 	char made[80], nasty[400];
-	snprintf(made, sizeof made, "%s/made", folder);
+	snprintf(made, sizeof made, "%s/made", temporary_folder);
 	snprintf(
 		nasty, sizeof nasty,
 		"a'b\"c $d $HOME @e `touch %s` {f}_g^2 <h>&amp;</svg>\\n\n!touch %s\n\x01\xff\xed\xa0\x80 \xc3\xa9 %%s",
@@ -122,7 +123,7 @@ static void texts_stay_texts(void **unused)
 	assert_non_null(strstr(c.text, "{f}_g^2 <h>&amp;</svg>\\n !touch "));
 	assert_non_null(strstr(c.text, "????"));
 	assert_non_null(strstr(c.text, "\xc3\xa9 %s"));
-	assert_int_equal(c.scripts, 0);
+	assert_int_equal(c.script_count, 0);
 	struct stat st;
 	assert_int_equal(stat(made, &st), -1);
 }
@@ -141,7 +142,7 @@ static void bars_and_bands_are_drawn(void **unused)
 	assert_true(ay.log && !ax.log && ay.low > 0 && ay.low < 2.5 && ay.high > 6 && ay.tic_count >= 3);
 }
 
-static void nothing_to_show_is_said(void **unused)
+static void empty_plot_is_an_error(void **unused)
 {
 	(void)unused;
 	const double x[] = {-1, NAN}, y[] = {1, 1};
@@ -157,7 +158,7 @@ static void nothing_to_show_is_said(void **unused)
 	assert_non_null(strstr(e.text, "plot.txt"));
 }
 
-static void axes_have_marks(void **unused)
+static void axes_have_tick_marks(void **unused)
 {
 	(void)unused;
 	for (double from = 1e-7; from < 1e7; from *= 7.3)
@@ -173,7 +174,7 @@ static void axes_have_marks(void **unused)
 		}
 }
 
-static void files_are_written(void **unused)
+static void plots_are_written_as_png_and_svg(void **unused)
 {
 	(void)unused;
 	const double x[] = {1, 2, 3}, y[] = {3, 1, 2};
@@ -184,7 +185,7 @@ static void files_are_written(void **unused)
 	static const char *const ending[2] = {"png", "svg"}, *const begins[2] = {"\x89PNG", "<?xml"};
 	for (int i = 0; i < 2; i++) {
 		char head[8] = {0};
-		snprintf(path, sizeof path, "%s/plot.%s", folder, ending[i]);
+		snprintf(path, sizeof path, "%s/plot.%s", temporary_folder, ending[i]);
 		if (plot_write(&p, path, &e))
 			fail_msg("%s", e.text);
 		FILE *f = fopen(path, "rb");
@@ -195,7 +196,7 @@ static void files_are_written(void **unused)
 	}
 }
 
-static void without_gnuplot_it_says_so(void **unused)
+static void missing_gnuplot_is_named(void **unused)
 {
 	(void)unused;
 	char *old = strdup(getenv("PATH"));
@@ -205,7 +206,7 @@ static void without_gnuplot_it_says_so(void **unused)
 	struct error e = {""};
 	char *svg;
 	size_t size;
-	setenv("PATH", folder, 1);
+	setenv("PATH", temporary_folder, 1);
 	int rc = plot_svg(&p, &svg, &size, &e);
 	setenv("PATH", old, 1);
 	free(old);
@@ -216,13 +217,16 @@ static void without_gnuplot_it_says_so(void **unused)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(points_are_where_their_values_say),
-		cmocka_unit_test_setup_teardown(texts_stay_texts, folder_set_up, folder_tear_down),
+		cmocka_unit_test(points_lie_at_their_values),
+		cmocka_unit_test_setup_teardown(texts_survive_whatever_they_contain, temporary_folder_set_up,
+						temporary_folder_tear_down),
 		cmocka_unit_test(bars_and_bands_are_drawn),
-		cmocka_unit_test(nothing_to_show_is_said),
-		cmocka_unit_test(axes_have_marks),
-		cmocka_unit_test_setup_teardown(files_are_written, folder_set_up, folder_tear_down),
-		cmocka_unit_test_setup_teardown(without_gnuplot_it_says_so, folder_set_up, folder_tear_down),
+		cmocka_unit_test(empty_plot_is_an_error),
+		cmocka_unit_test(axes_have_tick_marks),
+		cmocka_unit_test_setup_teardown(plots_are_written_as_png_and_svg, temporary_folder_set_up,
+						temporary_folder_tear_down),
+		cmocka_unit_test_setup_teardown(missing_gnuplot_is_named, temporary_folder_set_up,
+						temporary_folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 /* Returns the estimate as JSON, as printed to stdout. */
-static json_t *printed(const struct estimate *s)
+static json_t *print_to_json(const struct estimate *s)
 {
 	FILE *f = tmpfile();
 	struct error e;
@@ -38,19 +38,19 @@ static json_t *printed(const struct estimate *s)
 	return o;
 }
 
-/* Makes looks of an error of `at` after a million samples, which cost a microsecond each. */
-static struct forecast_history looks_of(double at)
+/* Makes looks of an error of `error` after a million samples, which cost a microsecond each. */
+static struct forecast_history make_history(double error)
 {
 	struct forecast_history h = {0};
 	for (double work = 1e4; work < 1.01e6; work *= 1.25) {
-		double square = at * at * 1e6 / work;
+		double square = error * error * 1e6 / work;
 		forecast_add_look(
 			&h, &(struct forecast_look){work, 1e-6 * work, 1e-6 * work, square, 1.05 * square, 3000, 0});
 	}
 	return h;
 }
 
-static double expected(json_t *row, const char *key)
+static double expected_number(json_t *row, const char *key)
 {
 	return json_number_value(json_object_get(json_object_get(row, key), "expected"));
 }
@@ -59,19 +59,19 @@ static void check_rows(const struct plan_request *request, double speed)
 {
 	struct plan render, pilot;
 	struct error e;
-	struct forecast_history looks = looks_of(0.004);
+	struct forecast_history looks = make_history(0.004);
 	assert_int_equal(pilot_render_plan(request, &render, &e), 0);
 	pilot = render;
 	pilot.epoch = 1;
-	json_t *o = printed(&(struct estimate){.scene = "s.xml",
-					       .where = "here",
-					       .request = request,
-					       .plan = &render,
-					       .pilot = &pilot,
-					       .looks = &looks,
-					       .bootstrap_cpu = 0.25,
-					       .bootstrap_seconds = 0.25,
-					       .speed = speed}),
+	json_t *o = print_to_json(&(struct estimate){.scene = "s.xml",
+						     .machine = "here",
+						     .request = request,
+						     .plan = &render,
+						     .pilot = &pilot,
+						     .looks = &looks,
+						     .bootstrap_cpu_seconds = 0.25,
+						     .bootstrap_seconds = 0.25,
+						     .speed = speed}),
 	       *rows = json_object_get(o, "targets"), *row;
 	assert_int_equal(json_array_size(rows), 4);
 	size_t i;
@@ -85,12 +85,12 @@ static void check_rows(const struct plan_request *request, double speed)
 			one.speed = speed;
 			assert_int_equal(plan_make(&one, &p, &e), 0);
 		}
-		double round = (double)plan_round_mutations(&p), work = expected(row, "mutations");
-		double least = 1e6 * 0.004 * 0.004 * 1.05 / (one.target_error * one.target_error);
+		double round = (double)plan_round_mutations(&p), work = expected_number(row, "mutations");
+		double min_work = 1e6 * 0.004 * 0.004 * 1.05 / (one.target_error * one.target_error);
 		assert_non_null(json_object_get(row, "reached"));
-		assert_true(work >= round && work < 2 * fmax(least, round));
+		assert_true(work >= round && work < 2 * fmax(min_work, round));
 		assert_true(fabs(remainder(work, round) / round) < 1e-9);
-		assert_true(fabs(expected(row, "cpuSeconds") / (1e-6 * work + 0.25) - 1) < 0.05);
+		assert_true(fabs(expected_number(row, "cpuSeconds") / (1e-6 * work + 0.25) - 1) < 0.05);
 	}
 	json_decref(o);
 }

@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-static void test_page(void **state)
+static void test_compatibility_page_is_up_to_date(void **state)
 {
 	(void)state;
 	char *text = NULL, line[8192];
@@ -21,14 +21,14 @@ static void test_page(void **state)
 	assert_true(out && page);
 	compatibility_print(out);
 	assert_int_equal(fclose(out), 0);
-	const char *at = text;
+	const char *rest = text;
 	for (int n = 1; fgets(line, sizeof line, page); n++) {
 		size_t length = strlen(line);
-		if (strncmp(at, line, length) != 0)
+		if (strncmp(rest, line, length) != 0)
 			fail_msg("line %d is stale (hslt-scene compatibility >docs/compatibility.md): %s", n, line);
-		at += length;
+		rest += length;
 	}
-	assert_string_equal(at, "");
+	assert_string_equal(rest, "");
 	/* One row of each kind that must be present. */
 	assert_non_null(strstr(text, "\n| `roughconductor` | `material`"));
 	assert_non_null(strstr(text, "\n| emitter | `astroobject` |"));
@@ -53,6 +53,6 @@ static void test_page(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_page)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_compatibility_page_is_up_to_date)};
 	return cmocka_run_group_tests_name("compatibility", tests, NULL, NULL);
 }

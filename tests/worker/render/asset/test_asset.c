@@ -73,7 +73,7 @@ static int tear_down(void **state)
 
 static void expect_content(const char *name, const char *text)
 {
-	struct asset_source s = asset_folder(folder);
+	struct asset_source s = asset_source_for_folder(folder);
 	struct asset a;
 	struct error e;
 	if (s.open(s.user, name, &a, &e))
@@ -86,7 +86,7 @@ static void expect_content(const char *name, const char *text)
 
 static void refuses(const char *name, const char *text)
 {
-	struct asset_source s = asset_folder(folder);
+	struct asset_source s = asset_source_for_folder(folder);
 	struct asset a;
 	struct error e = {""};
 	int r = s.open(s.user, name, &a, &e);
@@ -153,26 +153,26 @@ static void test_canonical_names(void **state)
 		{"a/%2e%2e/b", "b"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		char out[ASSET_NAME_ROOM(64)], again[ASSET_NAME_ROOM(64)];
-		asset_name_canonical(cases[i].written, out);
+		char out[ASSET_NAME_SIZE_MAX(64)], again[ASSET_NAME_SIZE_MAX(64)];
+		asset_name_canonicalize(cases[i].written, out);
 		assert_string_equal(out, cases[i].canonical);
-		asset_name_canonical(out, again);
+		asset_name_canonicalize(out, again);
 		assert_string_equal(again, out);
 	}
 	const char *rest;
-	assert_int_equal(asset_name_up("%2e%2e/%2e%2e/b/%2e%2e", &rest), 2);
+	assert_int_equal(asset_name_levels_up("%2e%2e/%2e%2e/b/%2e%2e", &rest), 2);
 	assert_string_equal(rest, "b/%2e%2e");
-	assert_int_equal(asset_name_up("%2e%2e", &rest), 0);
-	assert_int_equal(asset_name_up("%2f/b", &rest), ASSET_NAME_ABSOLUTE);
+	assert_int_equal(asset_name_levels_up("%2e%2e", &rest), 0);
+	assert_int_equal(asset_name_levels_up("%2f/b", &rest), ASSET_NAME_ABSOLUTE);
 	assert_string_equal(rest, "b");
-	assert_int_equal(asset_name_up("%2f", &rest), 0);
+	assert_int_equal(asset_name_levels_up("%2f", &rest), 0);
 	char shown[16], little[8];
-	assert_string_equal(asset_name_shown("%2f/a/b", shown, sizeof shown), "/a/b");
-	assert_string_equal(asset_name_shown("%2f/a/b/c.png", little, sizeof little), "/a/b/c.");
-	assert_string_equal(asset_name_shown("a/b", shown, sizeof shown), "a/b");
-	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b", shown, sizeof shown), "../../b");
-	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b.png", little, sizeof little), "../../b");
-	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/%2e%2e/b", little, sizeof little), "../../.");
+	assert_string_equal(asset_name_display("%2f/a/b", shown, sizeof shown), "/a/b");
+	assert_string_equal(asset_name_display("%2f/a/b/c.png", little, sizeof little), "/a/b/c.");
+	assert_string_equal(asset_name_display("a/b", shown, sizeof shown), "a/b");
+	assert_string_equal(asset_name_display("%2e%2e/%2e%2e/b", shown, sizeof shown), "../../b");
+	assert_string_equal(asset_name_display("%2e%2e/%2e%2e/b.png", little, sizeof little), "../../b");
+	assert_string_equal(asset_name_display("%2e%2e/%2e%2e/%2e%2e/b", little, sizeof little), "../../.");
 }
 
 /* A source that counts calls; its two files have handles that distinguish them. */
@@ -223,8 +223,8 @@ static void test_search(void **state)
 	char path[300];
 	snprintf(path, sizeof path, "%s/out", others[1]);
 	assert_int_equal(symlink("../outside", path), 0);
-	struct asset_folders folders = asset_folders_of(folder, list, 2);
-	struct asset_source s = asset_search(&folders);
+	struct asset_folders folders = asset_folders_make(folder, list, 2);
+	struct asset_source s = asset_source_for_folders(&folders);
 	static const struct {
 		const char *name, *bytes;
 		int rc;
@@ -260,7 +260,7 @@ static void test_search(void **state)
 			s.close(s.user, &a);
 		}
 	}
-	assert_int_equal(asset_folders_of(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
+	assert_int_equal(asset_folders_make(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
 }
 
 /* For a file outside the folder, the error names the folder to pass, and the file as the user wrote it. */
@@ -278,19 +278,19 @@ static void test_outside_is_said(void **state)
 	expect_content("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
 	/* a file that is nowhere, for a caller that can add search folders */
-	struct asset_folders f = asset_folders_of(folder, NULL, 0);
-	struct asset_source own = asset_search(&f), more;
+	struct asset_folders f = asset_folders_make(folder, NULL, 0);
+	struct asset_source own = asset_source_for_folders(&f), more;
 	struct asset a;
 	struct error e;
 	assert_int_equal(own.open(own.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder; --path FOLDER searches there, too");
 	const char *const others[] = {root};
-	f = asset_folders_of(folder, others, 1);
-	more = asset_search(&f);
+	f = asset_folders_make(folder, others, 1);
+	more = asset_source_for_folders(&f);
 	assert_int_equal(more.open(more.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder or those of --path");
 	/* a file in a folder around the scene's, or below the current one */
-	f = asset_folders_of(folder, NULL, 0);
+	f = asset_folders_make(folder, NULL, 0);
 	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
 	snprintf(wanted, sizeof wanted, "more/theirs: no such file in the scene's folder; --path %s finds it", real);
 	assert_string_equal(e.text, wanted);
@@ -309,8 +309,8 @@ static void test_outside_is_said(void **state)
 static void expect_not_found(const char *name, const char *text)
 {
 	const char *const others[] = {root};
-	struct asset_folders f = asset_folders_of(folder, others, 1);
-	struct asset_source own = asset_search(&f);
+	struct asset_folders f = asset_folders_make(folder, others, 1);
+	struct asset_source own = asset_source_for_folders(&f);
 	struct asset a;
 	struct error e;
 	char wanted[400];
@@ -358,8 +358,8 @@ static void test_absolute_names(void **state)
 	refuses(name, "/scene2/none: no such file on this machine");
 	snprintf(name, sizeof name, "%%2f%s/secret", root);
 	refuses(name, "/secret: leads out of the scene's folder; to allow that, give --path /");
-	const struct asset_folders linked = asset_folders_of(folder, (const char *const[]){link}, 1);
-	struct asset_source s = asset_search(&linked);
+	const struct asset_folders linked = asset_folders_make(folder, (const char *const[]){link}, 1);
+	struct asset_source s = asset_source_for_folders(&linked);
 	struct asset a;
 	struct error e;
 	snprintf(name, sizeof name, "%%2f%s/secret", link);
@@ -377,7 +377,7 @@ static void test_keeper(void **state)
 	(void)state;
 	struct counts c = {0, 0};
 	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
-	struct asset_keeper keeper = {.inner = &inner};
+	struct asset_keeper keeper = {.inner_source = &inner};
 	struct asset_source s = asset_keeper_source(&keeper);
 	struct asset first, second, other;
 	struct error e;
@@ -408,7 +408,7 @@ static void test_keeper_ends(void **state)
 	(void)state;
 	struct counts c = {0, 0};
 	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
-	struct asset_keeper keeper = {.inner = &inner, .read = ASSET_KEEPER_BYTES_MAX};
+	struct asset_keeper keeper = {.inner_source = &inner, .bytes_read = ASSET_KEEPER_BYTES_MAX};
 	struct asset_source s = asset_keeper_source(&keeper);
 	struct asset other;
 	struct error e;

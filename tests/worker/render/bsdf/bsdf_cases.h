@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The BSDFs of the generic tests, each with several sets of parameters, as text (see node_bsdf in
+ * The BSDFs of the generic tests, each with several sets of parameters, as text (see node_make_bsdf in
  * tests/support/nodes.h). The tests fail if a BSDF of the registry has no set here.
  */
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
@@ -51,7 +51,7 @@ static const char *const bsdf_cases[] = {
 	"dielectric int_cauchy_b=0.01 ext_cauchy_b=-0.002 ext_ior=1.2 specular_reflectance=0.9",
 	"roughdielectric int_ior=diamond ext_ior=water dispersion=true alpha=0.3",
 	"roughdielectric int_ior=1 ext_sellmeier=1.0396,0.2318,1.0105,0.006,0.02,103.56 alpha=0.2 distribution=ggx",
-	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 only at IOR_NM */
+	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 only at IOR_REFERENCE_NM */
 	"roughdiffuse reflectance=0.9",
 	"roughdiffuse alpha=1 reflectance=rgb(1,0.3,0.1)",
 	"roughdiffuse alpha=0.7 use_fast_approx=true",
@@ -187,9 +187,9 @@ enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 
 static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
 {
-	const struct asset_source assets = memory_assets(measured_files());
+	const struct asset_source assets = memory_assets(measured_file_all());
 	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3, .assets = &assets};
-	return bsdf_create(b, node_bsdf(a, text), &build, e);
+	return bsdf_create(b, node_make_bsdf(a, text), &build, e);
 }
 
 static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)

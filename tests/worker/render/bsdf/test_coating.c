@@ -16,7 +16,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 static vec3 direction(double z)
 {
@@ -67,7 +67,7 @@ static void test_nonlinear_loses_light_at_each_bounce(void **state)
 	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1", &linear);
 	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1 nonlinear=true", &nonlinear);
 	vec3 straight = {0, 0, 1};
-	double t = fresnel_dielectric(1, 1.7).transmitted,
+	double t = fresnel_dielectric(1, 1.7).transmittance,
 	       once = linear.ops->eval(&linear, &point, straight, straight).v[0];
 	double out = 0.5 * t * t / PI / once / (1.7 * 1.7); /* the share of diffuse light that leaves at each bounce */
 	double series = 0.5 * out / (1 - 0.5 * (1 - out));  /* 0.5 out + 0.5 (1 - out) 0.5 out + ... */
@@ -86,9 +86,9 @@ static void test_escape_is_what_fresnel_says_inside(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	bsdf_make(&a, "plastic diffuse_reflectance=1 int_ior=1.7 ext_ior=1", &b);
-	double out = 0, t = fresnel_dielectric(1, 1.7).transmitted;
+	double out = 0, t = fresnel_dielectric(1, 1.7).transmittance;
 	for (int i = 0; i < STEPS; i++)
-		out += fresnel_dielectric(sqrt((i + 0.5) / STEPS), 1 / 1.7).transmitted / STEPS;
+		out += fresnel_dielectric(sqrt((i + 0.5) / STEPS), 1 / 1.7).transmittance / STEPS;
 	vec3 straight = {0, 0, 1};
 	double f = b.ops->eval(&b, &point, straight, straight).v[0];
 	assert_true(fabs(f * PI * 1.7 * 1.7 * out / (t * t) - 1) < 1e-5);
@@ -145,10 +145,10 @@ static void test_a_sheet_is_a_series(void **state)
 	bsdf_make(&a, "thindielectric int_ior=1.8 ext_ior=1", &b);
 	for (double z = 0.02; z < 1; z += 0.07) {
 		struct fresnel f = fresnel_dielectric(z, 1.8);
-		double back = f.reflected, through = 0, inside = f.transmitted;
+		double back = f.reflectance, through = 0, inside = f.transmittance;
 		for (int i = 0; i < 2000; i++) {
-			*(i % 2 ? &back : &through) += inside * f.transmitted;
-			inside *= f.reflected;
+			*(i % 2 ? &back : &through) += inside * f.transmittance;
+			inside *= f.reflectance;
 		}
 		vec3 wi, wo = vec3_neg(direction(z));
 		double chance;
@@ -199,7 +199,8 @@ static void test_a_layer_is_what_goes_in_and_out(void **state)
 		  &coated);
 	for (double z = 0.1; z < 1; z += 0.2) {
 		vec3 wo = direction(z), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)}, out;
-		double to = fresnel_dielectric(z, eta).transmitted, ti = fresnel_dielectric(wi.z, eta).transmitted, one;
+		double to = fresnel_dielectric(z, eta).transmittance, ti = fresnel_dielectric(wi.z, eta).transmittance,
+		       one;
 		double want = to * ti / (eta * eta) * 0.7 / PI;
 		assert_true(fabs(coat.ops->eval(&coat, &point, wo, wi).v[0] / want - 1) < 1e-12);
 		double inside = sqrt(1 - (1 - z * z) / (eta * eta));
@@ -232,10 +233,11 @@ static void test_textured_coatings(void **state)
 			snprintf(text, sizeof text, "%s@alpha checkerboard color0=%g color1=%g", kind[k], rough[place],
 				 rough[place]);
 			bsdf_make(&a, text, &number);
-			p.where.u = place ? 0.75
-					  : 0.25; /* for numbers in 3.x, color0 where u and v are in different halves */
-			p.where.v = 0.25;
-			assert_true(map.textured && map.alpha == 0.05);
+			p.texture_point.u =
+				place ? 0.75
+				      : 0.25; /* for numbers in 3.x, color0 where u and v are in different halves */
+			p.texture_point.v = 0.25;
+			assert_true(map.is_textured && map.min_alpha == 0.05);
 			double m = map.ops->eval(&map, &p, wo, wi).v[0], n = number.ops->eval(&number, &p, wo, wi).v[0];
 			if (fabs(m / n - 1) > 1e-9)
 				fail_msg("%s at %d: %.12g is not %.12g", kind[k], place, m, n);
@@ -258,7 +260,7 @@ static void test_a_layer_on_both_sides(void **state)
 	assert_int_equal(bsdf_create(&b, n, &build, &e), 0);
 	const vec3 wo = direction(0.6), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)};
 	const vec3 under_o = {wo.x, wo.y, -wo.z}, under_i = {wi.x, wi.y, -wi.z};
-	assert_true(b.two_sided && b.ops->eval(&b, &point, wo, wi).v[0] > 0);
+	assert_true(b.is_two_sided && b.ops->eval(&b, &point, wo, wi).v[0] > 0);
 	assert_true(fabs(b.ops->eval(&b, &point, under_o, under_i).v[0] / b.ops->eval(&b, &point, wo, wi).v[0] - 1) <
 		    1e-13);
 	assert_true(b.ops->eval(&b, &point, wo, under_i).v[0] == 0);
@@ -295,21 +297,22 @@ static void test_equal_boundaries_share_a_table(void **state)
 	enum { COUNT = sizeof all / sizeof *all };
 	struct arena a = {0};
 	struct boundary_table *boundaries = NULL;
-	const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .boundaries = &boundaries},
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .boundary_tables = &boundaries},
 				alone = {.arena = &a, .dialect_3 = true};
 	struct rough_boundary r[COUNT], own;
 	for (int i = 0; i < COUNT; i++) {
-		struct bsdf b = {.alpha = INFINITY};
+		struct bsdf b = {.min_alpha = INFINITY};
 		struct error e;
-		struct scene_node *n = node_bsdf(&a, all[i].text);
+		struct scene_node *n = node_make_bsdf(&a, all[i].text);
 		assert_int_equal(rough_boundary_read(&r[i], all[i].eta, &b, n, &build, &e), 0);
 		assert_int_equal(rough_boundary_read(&own, all[i].eta, &b, n, &alone, &e), 0);
 		for (int k = 0; k < i; k++)
 			if ((r[k].table == r[i].table) !=
 			    (k == all[i].same_as || (all[i].same_as >= 0 && all[k].same_as == all[i].same_as)))
 				fail_msg("%s and %s", all[k].text, all[i].text);
-		assert_true(own.table != r[i].table && own.table->rows == r[i].table->rows);
-		assert_memory_equal(own.table->row, r[i].table->row, (size_t)own.table->rows * sizeof *own.table->row);
+		assert_true(own.table != r[i].table && own.table->row_count == r[i].table->row_count);
+		assert_memory_equal(own.table->row, r[i].table->row,
+				    (size_t)own.table->row_count * sizeof *own.table->row);
 	}
 	arena_fini(&a);
 }

@@ -77,17 +77,17 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 	(void)state;
 	size_t lobes[2] = {0, 0}, mirrored = 0;
 	for (int k = 0; k < BSDF_CASES + MIRRORS; k++) {
-		struct dice d = dice_of(case_text(k));
+		struct dice d = dice_for_test(case_text(k));
 		struct arena a = {0};
 		struct bsdf b;
 		double excess = 0, variance = 0;
 		bsdf_make(&a, case_text(k), &b);
 		for (int i = 0; i < 2000; i++) {
 			vec3 wo = any_direction(&d, i);
-			struct bsdf_point p = {.where = {.u = 0.3, .v = 0.7},
-					       .w = &wavelengths,
+			struct bsdf_point p = {.texture_point = {.u = 0.3, .v = 0.7},
+					       .wavelengths = &wavelengths,
 					       .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
-			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+			double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 			struct bsdf_sample s;
 			bool there = b.ops->sample(&b, &p, wo, u, &s);
 			bool specular = there && (s.mode & BSDF_DELTA);
@@ -121,12 +121,12 @@ static void test_a_mirrored_back_is_a_mirror(void **state)
 	struct error e;
 	vec3 wi, wo = {0.6, 0, -0.8};
 	double chance;
-	const struct bsdf_point p = {.w = &wavelengths};
+	const struct bsdf_point p = {.wavelengths = &wavelengths};
 	bsdf_make(&a, "conductor material=none specular_reflectance=0.5", &b);
 	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance)));
 	assert_int_equal(bsdf_mirror_back(&b, &(struct bsdf_build){.arena = &a}, &e), 0);
 	assert_true(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT | BSDF_DELTA, &wi, &chance).v[2] == 0.5);
-	assert_true(wi.x == -0.6 && wi.z == -0.8 && chance == 1 && b.alpha_mean == 0);
+	assert_true(wi.x == -0.6 && wi.z == -0.8 && chance == 1 && b.mean_alpha == 0);
 	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance)));
 	arena_fini(&a);
 }
@@ -138,7 +138,7 @@ static void test_nothing_passes_beyond_the_critical_angle(void **state)
 	struct bsdf b;
 	vec3 wi;
 	double chance, critical = sqrt(1 - 1 / 2.25);
-	const struct bsdf_point p = {.w = &wavelengths};
+	const struct bsdf_point p = {.wavelengths = &wavelengths};
 	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &b);
 	for (int i = -100; i <= 100; i++) {
 		double z = critical + 1e-4 * i + 1e-9;
@@ -164,14 +164,14 @@ static void test_filters_are_holes(void **state)
 		{"retarder", "mask opacity=0 | diffuse"},
 	};
 	const unsigned straight = BSDF_TRANSMIT | BSDF_STRAIGHT;
-	struct dice d = dice_of("filters");
+	struct dice d = dice_for_test("filters");
 	for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
 		struct arena a = {0};
 		struct bsdf filter, sheet;
 		bsdf_make(&a, pairs[i][0], &filter);
 		bsdf_make(&a, pairs[i][1], &sheet);
 		for (int k = 0; k < 20; k++) {
-			struct bsdf_point p = {.w = &wavelengths};
+			struct bsdf_point p = {.wavelengths = &wavelengths};
 			vec3 wo = any_direction(&d, k), through, also;
 			double chance;
 			spectrum weight = bsdf_eval_delta(&filter, &p, wo, straight, &through, &chance),
@@ -194,8 +194,8 @@ static void test_masked_glass_has_three_lobes(void **state)
 	(void)state;
 	struct arena a = {0};
 	struct bsdf glass, masked;
-	const struct bsdf_point p = {.w = &wavelengths};
-	struct dice d = dice_of("masked glass");
+	const struct bsdf_point p = {.wavelengths = &wavelengths};
+	struct dice d = dice_for_test("masked glass");
 	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &glass);
 	bsdf_make(&a, "mask opacity=0.25 | dielectric int_ior=1.5 ext_ior=1", &masked);
 	for (int k = 0; k < 100; k++) {
@@ -240,13 +240,13 @@ static void test_mean_roughness(void **state)
 	struct bsdf b;
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
 		bsdf_make(&a, expected[k].text, &b);
-		if (!(fabs(b.alpha_mean - expected[k].mean) < 1e-15))
-			fail_msg("%s: %.17g", expected[k].text, b.alpha_mean);
+		if (!(fabs(b.mean_alpha - expected[k].mean) < 1e-15))
+			fail_msg("%s: %.17g", expected[k].text, b.mean_alpha);
 	}
-	bsdf_default(&b);
-	assert_true(b.alpha_mean == 1);
-	bsdf_black(&b);
-	assert_true(b.alpha_mean == 0);
+	bsdf_make_default(&b);
+	assert_true(b.mean_alpha == 1);
+	bsdf_make_black(&b);
+	assert_true(b.mean_alpha == 0);
 	arena_fini(&a);
 }
 

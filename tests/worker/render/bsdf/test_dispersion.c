@@ -77,8 +77,8 @@ static void test_names_and_laws(void **state)
 		snprintf(law, sizeof law, "%s dispersion=true", plain);
 		bsdf_make(&a, plain, &b);
 		bsdf_make(&a, law, &c);
-		assert_true(b.eta == names[i].plain && !b.dispersive);
-		assert_true(fabs(c.eta - names[i].law) < 1e-5 && c.dispersive);
+		assert_true(b.eta == names[i].plain && !b.is_dispersive);
+		assert_true(fabs(c.eta - names[i].law) < 1e-5 && c.is_dispersive);
 		arena_fini(&a);
 	}
 }
@@ -90,30 +90,30 @@ static void test_what_is_dispersive_says_so(void **state)
 		const char *text;
 		double eta;
 		bool dispersive, smooth;
-		enum color_shape shape;
+		enum color_kind shape;
 	} expected[] = {
-		{"dielectric", 1.5046 / 1.000277, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=bk7 ext_ior=air", 1.5046 / 1.000277, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=bk7 ext_ior=1 dispersion=false", 1.5046, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0", 1.5, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric", 1.5046 / 1.000277, false, false, COLOR_KIND_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=air", 1.5046 / 1.000277, false, false, COLOR_KIND_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=1 dispersion=false", 1.5046, false, false, COLOR_KIND_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_KIND_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0", 1.5, false, false, COLOR_KIND_CONSTANT},
 		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0 dispersion=true", 1.5, false, false,
-		 COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.004", 1.5, true, false, COLOR_SHAPE_OTHER},
-		{"dielectric int_ior=3 ext_ior=2 ext_cauchy_b=0.01", 1.5, true, false, COLOR_SHAPE_OTHER},
-		{"roughdielectric int_ior=1.5 ext_ior=1.5", 1, false, false, COLOR_SHAPE_CONSTANT},
-		{"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.01", 1, true, true, COLOR_SHAPE_OTHER},
-		{"roughdielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.004", 1.5, true, false, COLOR_KIND_OTHER},
+		{"dielectric int_ior=3 ext_ior=2 ext_cauchy_b=0.01", 1.5, true, false, COLOR_KIND_OTHER},
+		{"roughdielectric int_ior=1.5 ext_ior=1.5", 1, false, false, COLOR_KIND_CONSTANT},
+		{"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.01", 1, true, true, COLOR_KIND_OTHER},
+		{"roughdielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_KIND_CONSTANT},
 	};
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, expected[k].text, &b);
-		if (!(fabs(b.eta - expected[k].eta) < 1e-15 && b.dispersive == expected[k].dispersive &&
+		if (!(fabs(b.eta - expected[k].eta) < 1e-15 && b.is_dispersive == expected[k].dispersive &&
 		      b.has_smooth == expected[k].smooth && b.has_delta != b.has_smooth &&
-		      b.shape == expected[k].shape))
+		      b.color_kind == expected[k].shape))
 			fail_msg("%s: eta %.17g, dispersive %d, smooth %d, shape %d", expected[k].text, b.eta,
-				 b.dispersive, b.has_smooth, (int)b.shape);
+				 b.is_dispersive, b.has_smooth, (int)b.color_kind);
 		arena_fini(&a);
 	}
 }
@@ -145,7 +145,7 @@ static void test_a_prism_spreads_light(void **state)
 	double before = INFINITY, spread = 0;
 	for (double nm = 365; nm < 830; nm += 25) {
 		struct wavelengths w = wavelength_of(nm);
-		struct bsdf_point p = {.w = &w};
+		struct bsdf_point p = {.wavelengths = &w};
 		vec3 in = {-sin(incidence), 0, cos(incidence)}, inside, out;
 		double chance, n = 0, l2 = nm * nm * 1e-6;
 		spectrum first = bsdf_eval_delta(&b, &p, in, BSDF_TRANSMIT, &inside, &chance);
@@ -184,14 +184,14 @@ static void test_lanes_and_nothing_left(void **state)
 		 "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2 int_cauchy_b=0"},
 	};
 	const struct wavelengths w = {.nm = {500, 600, 700, 800}}, hero = {.nm = {500, NAN, NAN, NAN}};
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	struct arena a = {0};
 	for (int i = 0; i < 4000; i++) {
 		struct bsdf plain, zero, bent;
 		struct bsdf_sample s, t;
-		struct bsdf_point p = {.w = &w}, q = {.w = &hero};
+		struct bsdf_point p = {.wavelengths = &w}, q = {.wavelengths = &hero};
 		vec3 wo = dice_direction(&d);
-		double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+		double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 		bsdf_make(&a, pairs[i % 2][0], &plain);
 		bsdf_make(&a, pairs[i % 2][1], &zero);
 		bsdf_make(&a,

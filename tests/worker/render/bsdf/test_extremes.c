@@ -127,7 +127,7 @@ static void try_text(const char *text)
 	struct bsdf b;
 	bsdf_make(&a, text, &b);
 	for (uint64_t i = 0; i < 10000; i++) {
-		const struct bsdf_point p = {.w = &w,
+		const struct bsdf_point p = {.wavelengths = &w,
 					     .transport = i % 7 < 3 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
 		check(text, &b, &p, i);
 	}

@@ -36,8 +36,8 @@ static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
 {
 	(void)state;
 	for (int i = 1; i <= 200; i++)
-		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflected - by_complex_numbers(i / 200.0, 1.5, 0)) <
-			    1e-12);
+		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflectance -
+				 by_complex_numbers(i / 200.0, 1.5, 0)) < 1e-12);
 }
 
 /* A mirror, no boundary at all, and the largest numbers that scenes may give. */

@@ -21,7 +21,7 @@ static const struct wavelengths wavelengths = {.nm = {430, 500, 570, 640}};
 
 static struct bsdf_point point_of(enum transport t)
 {
-	return (struct bsdf_point){.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = t};
+	return (struct bsdf_point){.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = t};
 }
 
 static void assert_near(double a, double b, double tolerance, const char *what)
@@ -38,7 +38,7 @@ static struct hair_angle at_angle(double theta)
 static struct hair_fibre fibre_of(double eta, double along, double around, double tilt)
 {
 	struct hair_fibre f;
-	hair_fibre_set(&f, eta, along, around, tilt);
+	hair_fibre_init(&f, eta, along, around, tilt);
 	return f;
 }
 
@@ -54,7 +54,7 @@ static void test_bessel(void **state)
 			double half = sin(PI * k / n);
 			sum += exp(-2 * x[i] * half * half) / n;
 		}
-		assert_near(hair_bessel(x[i]), sum, 2e-12, "Bessel");
+		assert_near(hair_scaled_bessel_i0(x[i]), sum, 2e-12, "Bessel");
 	}
 }
 
@@ -68,7 +68,7 @@ static double along_integral(const struct hair_fibre *f, int p, double theta)
 		sum += (i == 0 || i == N ? 1
 			: i % 2		 ? 4
 					 : 2) *
-		       hair_along(f, p, at_angle(theta), at_angle(t)) * fabs(cos(t));
+		       hair_longitudinal_pdf(f, p, at_angle(theta), at_angle(t)) * fabs(cos(t));
 	}
 	return sum * PI / N / 3;
 }
@@ -94,20 +94,20 @@ static void test_along_has_its_place_and_width(void **state)
 	static const double turns[HAIR_LOBES] = {2, -1, -4, 0}, times[HAIR_LOBES] = {1, 0.25, 4, 4};
 	const double tilt = 0.05, theta = 0.3, b = 0.08;
 	struct hair_fibre f = fibre_of(1.55, b, 0.3, tilt);
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	double root = 0.726 * b + 0.812 * b * b, v = root * root;
 	for (int p = 0; p < HAIR_LOBES; p++) {
 		double ideal = -theta + turns[p] * tilt, sum = 0, square = 0;
-		double there = hair_along(&f, p, at_angle(theta), at_angle(ideal)), s = sqrt(times[p] * v);
+		double there = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal)), s = sqrt(times[p] * v);
 		/* A narrow lobe is a normal distribution, except for the curvature. */
 		assert_near(there * cos(ideal), 1 / (sqrt(2 * PI) * s), 0.02, "height");
-		double left = hair_along(&f, p, at_angle(theta), at_angle(ideal - s)),
-		       right = hair_along(&f, p, at_angle(theta), at_angle(ideal + s));
+		double left = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal - s)),
+		       right = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal + s));
 		assert_near(sqrt(left * right) / there, exp(-0.5), 0.02, "width");
-		size_t n = dice_count(40000);
+		size_t n = dice_scaled_count(40000);
 		for (size_t i = 0; i < n; i++) {
-			double u[2] = {dice_throw(&d), dice_throw(&d)};
-			double t = asin(hair_along_sample(&f, p, at_angle(theta), u[0], u[1]).sin) - ideal;
+			double u[2] = {dice_uniform(&d), dice_uniform(&d)};
+			double t = asin(hair_sample_longitudinal(&f, p, at_angle(theta), u[0], u[1]).sin) - ideal;
 			sum += t;
 			square += t * t;
 		}
@@ -128,15 +128,15 @@ static void test_around_is_a_density(void **state)
 		double sum = 0, next = 0.1;
 		for (int k = 0; k < N; k++) {
 			double x = PI * (2 * (k + 0.5) / N - 1);
-			sum += hair_around(&f, x) * 2 * PI / N;
-			if (sum > next && next < 0.95) { /* hair_around_sample is its inverse */
-				double s = hair_around_sample(&f, next);
+			sum += hair_azimuthal_pdf(&f, x) * 2 * PI / N;
+			if (sum > next && next < 0.95) { /* hair_sample_azimuthal is its inverse */
+				double s = hair_sample_azimuthal(&f, next);
 				assert_true(fabs(s - x) < 4 * PI / N);
 				next += 0.1;
 			}
 		}
 		assert_near(sum, 1, 1e-8, "around");
-		assert_near(hair_around(&f, 1.3), hair_around(&f, 1.3 - 6 * PI), 1e-6, "a turn more");
+		assert_near(hair_azimuthal_pdf(&f, 1.3), hair_azimuthal_pdf(&f, 1.3 - 6 * PI), 1e-6, "a turn more");
 	}
 }
 
@@ -175,7 +175,7 @@ static double cross(struct ray *r)
 static void test_ideal_rays(void **state)
 {
 	(void)state;
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 300; i++) {
 		double eta = dice_between(&d, 1.2, 2), theta = dice_between(&d, -1.4, 1.4),
 		       gamma = dice_between(&d, -1.5, 1.5), phi = gamma + PI / 2;
@@ -186,13 +186,13 @@ static void test_ideal_rays(void **state)
 		vec3 outside[HAIR_LOBES - 1] = {reflected(r.d, normal_at(r.p))};
 		r.d = refracted(r.d, normal_at(r.p), eta);
 		for (int p = 1; p < HAIR_LOBES - 1; p++) {
-			assert_near(cross(&r), e.length, 1e-9, "length of a passage");
+			assert_near(cross(&r), e.passage_length, 1e-9, "length of a passage");
 			vec3 n = normal_at(r.p);
 			outside[p] = refracted(r.d, vec3_neg(n), 1 / eta);
 			r.d = reflected(r.d, n);
 		}
 		for (int p = 0; p < HAIR_LOBES - 1; p++) {
-			double to = phi + hair_turn(p, gamma, e.gamma_t);
+			double to = phi + hair_azimuth_change(p, gamma, e.gamma_t);
 			assert_true(fabs(outside[p].y + camera.y) < 1e-9);
 			assert_true(fabs(outside[p].x - cos(theta) * cos(to)) < 1e-9);
 			assert_true(fabs(outside[p].z - cos(theta) * sin(to)) < 1e-9);
@@ -205,14 +205,14 @@ static void test_ideal_rays(void **state)
 static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 {
 	struct ray r = {{0, 0, 1}, vec3_neg(camera)};
-	if (dice_throw(d) < fresnel_dielectric(camera.z, eta).reflected)
+	if (dice_uniform(d) < fresnel_dielectric(camera.z, eta).reflectance)
 		return 0;
 	r.d = refracted(r.d, normal_at(r.p), eta);
 	for (int p = 1;; p++) {
-		if (dice_throw(d) > exp(-sigma * cross(&r)))
+		if (dice_uniform(d) > exp(-sigma * cross(&r)))
 			return HAIR_LOBES;
 		vec3 n = normal_at(r.p);
-		if (dice_throw(d) >= fresnel_dielectric(vec3_dot(r.d, n), 1 / eta).reflected)
+		if (dice_uniform(d) >= fresnel_dielectric(vec3_dot(r.d, n), 1 / eta).reflectance)
 			return p < HAIR_LOBES ? p : HAIR_LOBES - 1;
 		r.d = reflected(r.d, n);
 	}
@@ -221,16 +221,16 @@ static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 static void test_shares(void **state)
 {
 	(void)state;
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 12; i++) {
 		double eta = 1.55, sigma = i % 3 ? dice_between(&d, 0.1, 1) : 0, theta = dice_between(&d, -1.3, 1.3),
 		       gamma = dice_between(&d, -1.5, 1.5);
 		struct hair_fibre f = fibre_of(eta, 0.3, 0.3, 0);
 		vec3 camera = {-cos(theta) * sin(gamma), sin(theta), cos(theta) * cos(gamma)};
 		struct hair_entry e = hair_enter(&f, camera.x, camera.z);
-		double share[HAIR_LOBES], sum = 0, t = exp(-sigma * e.length);
-		hair_shares(&e, t, share);
-		uint64_t n = dice_count(40000), seen[HAIR_LOBES + 1] = {0};
+		double share[HAIR_LOBES], sum = 0, t = exp(-sigma * e.passage_length);
+		hair_lobe_shares(&e, t, share);
+		uint64_t n = dice_scaled_count(40000), seen[HAIR_LOBES + 1] = {0};
 		for (uint64_t k = 0; k < n; k++) {
 			seen[count_passages(camera, eta, sigma, &d)]++;
 		}
@@ -240,7 +240,7 @@ static void test_shares(void **state)
 			sum += share[p];
 		}
 		expected[HAIR_LOBES] = fmax(0, 1 - sum) * (double)n + 1e-9;
-		double all = e.reflected + e.transmitted * e.transmitted * t / (1 - t * e.reflected);
+		double all = e.reflectance + e.transmittance * e.transmittance * t / (1 - t * e.reflectance);
 		assert_near(sum, all, 1e-13, "closed form");
 		if (sigma == 0)
 			assert_near(sum, 1, 1e-13, "nothing is lost");
@@ -270,9 +270,9 @@ static void test_lobes_lie_along_ideal_rays(void **state)
 		vec3 camera = {-cos(theta) * sin(gamma), sin(theta), cos(theta) * cos(gamma)};
 		struct hair_entry e = hair_enter(&f, camera.x, camera.z);
 		double share[HAIR_LOBES];
-		hair_shares(&e, exp(-sigma * e.length), share);
+		hair_lobe_shares(&e, exp(-sigma * e.passage_length), share);
 		for (int p = 0; p < HAIR_LOBES - 1; p++) {
-			double phi = gamma + PI / 2 + hair_turn(p, gamma, e.gamma_t);
+			double phi = gamma + PI / 2 + hair_azimuth_change(p, gamma, e.gamma_t);
 			vec3 light = {cos(theta) * cos(phi), -sin(theta), cos(theta) * sin(phi)};
 			double root = (0.726 * m + 0.812 * m * m) * (p == 1 ? 0.5 : p == 2 ? 2 : 1);
 			double s = sqrt(PI / 8) * (0.265 * n + 1.194 * n * n);
@@ -295,7 +295,7 @@ static void test_energy(void **state)
 	enum { GROUPS = 16 };
 	const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
 	struct hair_fibre f = fibre_of(1.55 / 1.000277, 0.3, 0.3, 0);
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
 		struct arena a = {0};
 		struct bsdf b;
@@ -307,11 +307,12 @@ static void test_energy(void **state)
 			if (i < 3) /* h = +-1, and almost along the fibre */
 				camera = vec3_normalize((vec3){i == 0 ? 1 : i == 1 ? -1 : 1e-6, 0.2 * i, 1e-9});
 			struct hair_entry e = hair_enter(&f, camera.x, camera.z);
-			double t = exp(-(k ? 0.4 : 0) * e.length),
-			       all = e.reflected + e.transmitted * e.transmitted * t / (1 - t + t * e.transmitted);
-			size_t n = dice_count(16000);
+			double t = exp(-(k ? 0.4 : 0) * e.passage_length),
+			       all = e.reflectance +
+				     e.transmittance * e.transmittance * t / (1 - t + t * e.transmittance);
+			size_t n = dice_scaled_count(16000);
 			for (size_t j = 0; j < n; j++) {
-				double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+				double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 				struct bsdf_sample s;
 				assert_true(b.ops->sample(&b, &at, camera, u, &s));
 				double weight = s.f.v[0] * fabs(s.wi.z) / s.pdf;
@@ -359,15 +360,15 @@ static void test_importance(void **state)
 	enum { ROWS = 12, COLUMNS = 12, INNER = 24, CELLS = ROWS * COLUMNS };
 	struct arena a = {0};
 	struct bsdf b;
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	struct bsdf_point at = point_of(TRANSPORT_IMPORTANCE), to_camera = point_of(TRANSPORT_RADIANCE);
 	bsdf_make(&a, "hair longitudinal_roughness=0.5 azimuthal_roughness=0.6", &b);
 	for (int i = 0; i < 12; i++) {
 		vec3 light = dice_direction(&d), wi;
-		at.culled = to_camera.culled = i >= 8;
-		if (at.culled)
+		at.culls_backfaces = to_camera.culls_backfaces = i >= 8;
+		if (at.culls_backfaces)
 			light.z = fabs(light.z);
-		uint64_t seen[CELLS + 1] = {0}, n = dice_count(40000);
+		uint64_t seen[CELLS + 1] = {0}, n = dice_scaled_count(40000);
 		double expected[CELLS + 1] = {0}, inside = 0, chance = 0;
 		for (int c = 0; c < CELLS * INNER * INNER; c++) {
 			int row = c / (COLUMNS * INNER * INNER), column = c / (INNER * INNER) % COLUMNS,
@@ -382,7 +383,7 @@ static void test_importance(void **state)
 			inside += expected[c];
 		expected[CELLS] = (double)n - inside;
 		for (uint64_t k = 0; k < n; k++) {
-			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+			double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 			struct bsdf_sample s;
 			bool there = b.ops->sample(&b, &at, light, u, &s);
 			if (!there || (s.mode & BSDF_DELTA)) {
@@ -398,9 +399,10 @@ static void test_importance(void **state)
 		if (!(p > LEVEL))
 			fail_msg("importance from z = %g: p = %g", light.z, p);
 		spectrum w = bsdf_eval_delta(&b, &at, light, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance);
-		assert_true(light.z > 0 && !at.culled ? w.v[0] == 1 && chance == 0.5 && wi.z == -light.z : w.v[0] == 0);
+		assert_true(light.z > 0 && !at.culls_backfaces ? w.v[0] == 1 && chance == 0.5 && wi.z == -light.z
+							       : w.v[0] == 0);
 		w = bsdf_eval_delta(&b, &to_camera, light, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance);
-		assert_true(light.z < 0 && !at.culled ? w.v[0] == 1 && chance == 1 : w.v[0] == 0);
+		assert_true(light.z < 0 && !at.culls_backfaces ? w.v[0] == 1 && chance == 1 : w.v[0] == 0);
 	}
 	arena_fini(&a);
 }
@@ -409,7 +411,7 @@ static spectrum value(const char *text, const struct wavelengths *w, vec3 wo, ve
 {
 	struct arena a = {0};
 	struct bsdf b;
-	const struct bsdf_point at = {.where = {.u = 0.3, .v = 0.7}, .w = w};
+	const struct bsdf_point at = {.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = w};
 	bsdf_make(&a, text, &b);
 	spectrum f = b.ops->eval(&b, &at, wo, wi);
 	arena_fini(&a);
@@ -419,7 +421,7 @@ static spectrum value(const char *text, const struct wavelengths *w, vec3 wo, ve
 static void test_colours(void **state)
 {
 	(void)state;
-	static const struct wavelengths rgb = {.rgb = true, .nm = {NAN, NAN, NAN, NAN}};
+	static const struct wavelengths rgb = {.is_rgb = true, .nm = {NAN, NAN, NAN, NAN}};
 	static const char *const same[][2] = {
 		{"hair eumelanin=2 pheomelanin=0", "hair sigma_a=rgb(0.838,1.394,2.74)"},
 		{"hair eumelanin=0 pheomelanin=0.5", "hair sigma_a=rgb(0.187,0.4,1.05) scale=0.5"},
@@ -447,7 +449,7 @@ static void test_colours(void **state)
 static void test_sides_are_equal(void **state)
 {
 	(void)state;
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 200; i++) {
 		vec3 wo = dice_direction(&d), wi = dice_direction(&d);
 		wo.z = fabs(wo.z);

@@ -14,7 +14,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
 
 typedef struct {
 	long double x, y, z;
@@ -73,7 +73,7 @@ static spectrum eval_one(const struct bsdf *b, const struct bsdf_point *p, vec3 
 {
 	(void)b, (void)wo, (void)wi;
 	assert_int_equal(p->transport, TRANSPORT_RADIANCE);
-	return spectrum_of(1);
+	return spectrum_constant(1);
 }
 
 /* Central differences of the slope: together, truncation and rounding of long double (next to eta = 1) are below
@@ -83,7 +83,7 @@ static void test_the_jacobian_is_the_derivative(void **state)
 	(void)state;
 	static const double indices[] = {1.5, 1 / 1.5, 2.4, 1.01, 1 + 1e-3, 1 - 1e-3, 1 + 1e-6, 1 - 1e-6};
 	static const struct bsdf_ops ops = {.decl.type = "one", .eval = eval_one};
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	double worst = 0;
 	size_t done[2] = {0, 0};
 	for (int i = 0; i < 40000; i++) {
@@ -121,7 +121,7 @@ static void test_the_jacobian_between_equal_indices(void **state)
 	(void)state;
 	static const struct bsdf_ops ops = {.decl.type = "one", .eval = eval_one};
 	const struct bsdf b = {.ops = &ops, .eta = 1};
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	size_t done = 0;
 	for (int i = 0; i < 2000; i++) {
 		wide wo = widen(dice_direction(&d)), wi = widen(dice_direction(&d)), side[4];
@@ -165,14 +165,14 @@ static void test_every_bsdf_against_its_product(void **state)
 	double worst = 0;
 	size_t positive = 0;
 	for (int k = 0; k < BSDF_CASES; k++) {
-		struct dice d = dice_of(bsdf_cases[k]);
+		struct dice d = dice_for_test(bsdf_cases[k]);
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, bsdf_cases[k], &b);
 		for (int i = 0; i < 3000; i++) {
 			struct bsdf_sample s;
 			vec3 wo = dice_direction(&d), wi = dice_direction(&d);
-			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+			double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 			if (i % 2 && b.ops->sample(&b, &point, wo, u, &s))
 				wi = s.wi;
 			spectrum x = bsdf_eval_halfvec(&b, &point, wo, wi);
@@ -263,7 +263,7 @@ static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to
 {
 	wide wo = widen(dice_direction(d)), wi;
 	uint32_t kind = dice_below(d, 5);
-	bool reflect = s->metal || dice_throw(d) < 0.3;
+	bool reflect = s->metal || dice_uniform(d) < 0.3;
 	if (s->metal)
 		wo.z = fabsl(wo.z);
 	long double eta = wo.z > 0 ? (long double)s->eta : 1 / (long double)s->eta;
@@ -339,7 +339,7 @@ static void test_microfacets_against_the_textbook(void **state)
 	static const double alphas[] = {1e-6, 1e-4, 1e-2, 0.1, 0.5, 1};
 	static const double ratios[] = {1, 0.125, 4};
 	static const double indices[] = {1.5, 1 / 1.5, 2.4, 1.01, 0.99, 1 + 1e-3, 1 - 1e-3, 1 + 1e-6, 1 - 1e-6};
-	struct dice d = dice_of(__func__);
+	struct dice d = dice_for_test(__func__);
 	struct extreme e = {0};
 	for (size_t i = 0; i < sizeof alphas / sizeof *alphas; i++)
 		for (int ggx = 0; ggx < 2; ggx++) {

@@ -3,7 +3,7 @@
  * hk is compared with its definition, the integral over the depth at which light is scattered, by Gauss's rule; with a
  * plate of the medium itself, in which paths scatter once; and with known limits.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
@@ -16,7 +16,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 static double henyey_greenstein(double g, double cosine)
 {
@@ -48,7 +48,7 @@ static void test_the_integral_over_the_depth(void **state)
 	} layers[] = {{2, 0.1, 0.1, 0.8}, {0.3, 0, 1, 0}, {5, 3, 2, -0.5}, {1e-6, 1e-7, 1, 0.3}};
 	for (size_t k = 0; k < sizeof layers / sizeof *layers; k++) {
 		struct arena a = {0};
-		struct dice d = dice_of("layer");
+		struct dice d = dice_for_test("layer");
 		struct bsdf by_both, by_albedo;
 		char text[160];
 		double s = layers[k].sigma_s, t = s + layers[k].sigma_a, h = layers[k].thickness, g = layers[k].g;
@@ -128,16 +128,17 @@ static void test_materials(void **state)
 	struct arena a = {0};
 	struct bsdf named, stated;
 	char list[300], text[200];
-	const struct measured_medium *m = measured_find("ketchup", list, sizeof list);
+	const struct measured_medium *m = measured_medium_find("ketchup", list, sizeof list);
 	vec3 wo = {0.6, 0, 0.8}, wi = {0, -0.8, 0.6};
 	snprintf(text, sizeof text, "hk thickness=0.01 sigma_a=0.4 sigma_s=rgb(%.17g,%.17g,%.17g)",
-		 MEASURED_SCALE * m->sigma_s[0], MEASURED_SCALE * m->sigma_s[1], MEASURED_SCALE * m->sigma_s[2]);
+		 MEASURED_MEDIUM_SCALE * m->sigma_s[0], MEASURED_MEDIUM_SCALE * m->sigma_s[1],
+		 MEASURED_MEDIUM_SCALE * m->sigma_s[2]);
 	bsdf_make(&a, "hk thickness=0.01 material=ketchup sigma_a=0.4", &named);
 	bsdf_make(&a, text, &stated);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		assert_true(named.ops->eval(&named, &point, wo, wi).v[i] ==
 			    stated.ops->eval(&stated, &point, wo, wi).v[i]);
-	assert_true(named.shape == COLOR_SHAPE_OTHER);
+	assert_true(named.color_kind == COLOR_KIND_OTHER);
 	arena_fini(&a);
 }
 
@@ -160,7 +161,7 @@ static void test_refused(void **state)
 			fail_msg("%s: %s", cases[i].text, e.text);
 		arena_fini(&a);
 	}
-	world_refused(
+	world_check_refused(
 		"<shape type='sphere'><bsdf type='hk'><phase type='sggx'><volume type='constvolume' name='S'><string "
 		"name='value' value='0.15, 1, 0.8, 0, 0, 0'/></volume></phase></bsdf></shape>",
 		"microflakes are not supported in a layer");
@@ -180,24 +181,24 @@ static void test_a_plate_of_the_medium(void **state)
 	(void)state;
 	enum { SIDE = 16 };
 	static const char camera[] = SENSOR("0,20,30", "0,0,0");
-	static struct agree_image layer, plate;
-	struct world *w = world_of_text(
+	static struct agreement_image layer, plate;
+	struct world *w = world_from_text(
 		SIDE, SIDE,
 		LIGHT
 		"%s<shape type='rectangle'><transform name='to_world'><scale value='1e4'/></transform><bsdf type='hk'>" FOG
 		"</bsdf></shape>",
 		camera);
-	agree_render(w, "layer", "layer", &(struct agree_side){"path", 1536, 16, 1, 2}, &layer);
+	agreement_render(w, "layer", "layer", &(struct agreement_options){"path", 1536, 16, 1, 2}, &layer);
 	world_free(w);
-	w = world_of_text(
+	w = world_from_text(
 		SIDE, SIDE,
 		LIGHT
 		"%s<shape type='cube'><transform name='to_world'><scale x='1e4' y='1e4' z='0.5'/></transform><bsdf type='null'/>"
 		"<medium type='homogeneous' name='interior'>" FOG "</medium></shape>",
 		camera);
-	agree_render(w, "layer", "plate", &(struct agree_side){"path", 6144, 16, 1, 2}, &plate);
+	agreement_render(w, "layer", "plate", &(struct agreement_options){"path", 6144, 16, 1, 2}, &plate);
 	world_free(w);
-	agree_check("layer", &layer, &plate);
+	agreement_check("layer", &layer, &plate);
 }
 
 int main(void)

@@ -18,7 +18,7 @@
 enum { BINS = 8, PATHS = 200000 };
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
-static const struct bsdf_point point = {.w = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
+static const struct bsdf_point point = {.wavelengths = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
 
 struct bins {
 	double sum[BINS], square[BINS];
@@ -26,7 +26,7 @@ struct bins {
 
 static vec3 cosine_upwards(struct dice *d)
 {
-	double r = sqrt(dice_throw(d)), phi = 2 * PI * dice_throw(d);
+	double r = sqrt(dice_uniform(d)), phi = 2 * PI * dice_uniform(d);
 	return (vec3){r * cos(phi), r * sin(phi), sqrt(fmax(0, 1 - r * r))};
 }
 
@@ -34,7 +34,7 @@ static vec3 cosine_upwards(struct dice *d)
 static bool pass_on(const struct bsdf *boundary, struct dice *d, vec3 v, vec3 *next, double *weight)
 {
 	struct bsdf_sample s;
-	const double u[3] = {dice_throw(d), dice_throw(d), dice_throw(d)};
+	const double u[3] = {dice_uniform(d), dice_uniform(d), dice_uniform(d)};
 	if (!boundary->ops->sample(boundary, &point, v, u, &s))
 		return false;
 	*weight *= s.f.v[0] * fabs(s.wi.z) / s.pdf;
@@ -91,7 +91,7 @@ static void test_roughplastic_is_its_layers(void **state)
 {
 	(void)state;
 	struct arena a = {0};
-	struct dice d = dice_of("light in layers");
+	struct dice d = dice_for_test("light in layers");
 	struct bsdf boundary, plastic, brighter;
 	bsdf_make(&a, "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.05", &boundary);
 	bsdf_make(&a, COAT "diffuse_reflectance=0.7", &plastic);

@@ -24,17 +24,17 @@
 
 #define PI 3.14159265358979323846
 
-static const struct measured_kind fine = {.name = "fine.bsdf",
-					  .alpha_u = 0.3,
-					  .alpha_v = 0.3,
-					  .azimuths = 1,
-					  .symmetry = 1,
-					  .elevations = 5,
-					  .fine = 96,
-					  .side = 24};
+static const struct measured_file_material fine = {.name = "fine.bsdf",
+						   .alpha_u = 0.3,
+						   .alpha_v = 0.3,
+						   .azimuths = 1,
+						   .symmetry = 1,
+						   .elevations = 5,
+						   .normal_nodes = 96,
+						   .color_nodes = 24};
 
 static const struct wavelengths nm = {.nm = {380, 550, 600, 790}};
-static const struct wavelengths rgb = {.rgb = true};
+static const struct wavelengths rgb = {.is_rgb = true};
 
 struct made {
 	struct memory_file files[2];
@@ -50,10 +50,10 @@ static int try_bytes(struct made *m, const void *bytes, size_t size)
 	*m = (struct made){.files = {{"m.bsdf", bytes, size}, {0}}};
 	m->assets = memory_assets(m->files);
 	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &m->assets};
-	return bsdf_create(&m->b, node_bsdf(&m->arena, "measured filename=m.bsdf"), &build, &m->e);
+	return bsdf_create(&m->b, node_make_bsdf(&m->arena, "measured filename=m.bsdf"), &build, &m->e);
 }
 
-static void make_or_fail(struct made *m, const struct measured_kind *k)
+static void make_or_fail(struct made *m, const struct measured_file_material *k)
 {
 	size_t size;
 	unsigned char *bytes = measured_file_make(k, &size);
@@ -68,23 +68,23 @@ static vec3 spherical(double theta, double phi)
 }
 
 /* Pairs with wo at elevations and azimuths of the file, and half vectors as samples find them. */
-static double root_mean_square(const struct made *m, const struct measured_kind *k, double phi, double least,
+static double root_mean_square(const struct made *m, const struct measured_file_material *k, double phi, double least,
 			       const struct wavelengths *w, const double tint[SPECTRUM_LANES])
 {
-	const struct bsdf_point p = {.w = w, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = w, .transport = TRANSPORT_RADIANCE};
 	double sum = 0;
 	int count = 0;
 	for (int i = 0; i < k->elevations - 1; i++)
 		for (uint64_t j = 0; j < 400; j++) {
 			double u[4];
 			struct bsdf_sample s;
-			vec3 wo = spherical(measured_kind_theta(k, i), phi);
+			vec3 wo = spherical(measured_file_theta(k, i), phi);
 			rng_uniform4(stats_seed(__func__), RNG_TEST, j, (uint64_t)i, 0, u);
 			if (!m->b.ops->sample(&m->b, &p, wo, u, &s) || !(s.wi.z > least))
 				continue;
 			spectrum f = m->b.ops->eval(&m->b, &p, wo, s.wi);
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
-				double wanted = measured_kind_reflected(k, tint[l], wo, s.wi);
+				double wanted = measured_file_reflected(k, tint[l], wo, s.wi);
 				double off = f.v[l] * s.wi.z / wanted - 1;
 				sum += off * off;
 				count++;
@@ -97,7 +97,7 @@ static double root_mean_square(const struct made *m, const struct measured_kind 
 static void tints_of(const struct wavelengths *w, double tint[SPECTRUM_LANES])
 {
 	for (int l = 0; l < SPECTRUM_LANES; l++)
-		tint[l] = measured_tint(w->nm[l]);
+		tint[l] = measured_file_tint(w->nm[l]);
 }
 
 /* Tables of normals are bilinear, and so are colours as functions of the warped numbers: a fine file has small
@@ -125,15 +125,15 @@ static void test_anisotropic_symmetries(void **state)
 	double tint[SPECTRUM_LANES];
 	tints_of(&nm, tint);
 	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-		struct measured_kind k = fine;
+		struct measured_file_material k = fine;
 		struct made m;
 		k.alpha_v = 0.5;
 		k.azimuths = ways[i].azimuths;
 		k.symmetry = ways[i].symmetry;
-		k.turn = k.symmetry == 4 ? 0 : 0.4; /* so that one half is not the mirror image of the other */
+		k.rotation = k.symmetry == 4 ? 0 : 0.4; /* so that one half is not the mirror image of the other */
 		k.elevations = 4;
-		k.fine = 64;
-		k.side = 16;
+		k.normal_nodes = 64;
+		k.color_nodes = 16;
 		make_or_fail(&m, &k);
 		assert_true(m.b.uses_tangents);
 		for (int q = -3; q <= 4; q++) {
@@ -151,7 +151,7 @@ static void test_isotropic_turns(void **state)
 	(void)state;
 	struct made m;
 	make_or_fail(&m, &fine);
-	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
 	spectrum a = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3), spherical(0.6, 3));
 	for (int i = 1; i < 12; i++) {
 		spectrum b = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3 + i), spherical(0.6, 3 + i));
@@ -166,12 +166,12 @@ static void test_isotropic_turns(void **state)
 static void test_samples_follow_the_facets(void **state)
 {
 	(void)state;
-	struct measured_kind k = fine;
+	struct measured_file_material k = fine;
 	struct made m;
-	k.white = true;
+	k.is_white = true;
 	k.alpha_u = k.alpha_v = 0.1;
 	make_or_fail(&m, &k);
-	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
 	double mean = 0, square = 0;
 	int count = 0;
 	for (uint64_t j = 0; j < 4000; j++) {
@@ -201,24 +201,24 @@ static void test_rgb(void **state)
 {
 	(void)state;
 	enum { SAMPLES = 101 };
-	struct measured_kind k = fine;
+	struct measured_file_material k = fine;
 	struct made spectral, three;
 	k.elevations = 3;
 	make_or_fail(&spectral, &k);
-	k.rgb = true;
+	k.is_rgb = true;
 	make_or_fail(&three, &k);
-	const double tint[SPECTRUM_LANES] = {measured_tint(600), measured_tint(550), measured_tint(450),
-					     measured_tint(550)};
+	const double tint[SPECTRUM_LANES] = {measured_file_tint(600), measured_file_tint(550), measured_file_tint(450),
+					     measured_file_tint(550)};
 	assert_true(root_mean_square(&three, &k, 0, 0.2, &rgb, tint) < 0.03);
-	/* Spectra as RGB: as color_of_table() converts the formula's values. */
-	const struct bsdf_point p = {.w = &rgb}, q = {.w = &nm};
-	vec3 wo = spherical(measured_kind_theta(&k, 1), 0), wi = spherical(0.5, 3);
+	/* Spectra as RGB: as color_from_samples() converts the formula's values. */
+	const struct bsdf_point p = {.wavelengths = &rgb}, q = {.wavelengths = &nm};
+	vec3 wo = spherical(measured_file_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	double at[SAMPLES], value[SAMPLES];
 	for (int i = 0; i < SAMPLES; i++) {
 		at[i] = 340 + 5 * i;
-		value[i] = measured_kind_reflected(&k, measured_tint(at[i]), wo, wi) / wi.z;
+		value[i] = measured_file_reflected(&k, measured_file_tint(at[i]), wo, wi) / wi.z;
 	}
-	struct color wanted = color_of_table(SAMPLES, at, value, false, true);
+	struct color wanted = color_from_samples(SAMPLES, at, value, false, true);
 	spectrum a = spectral.b.ops->eval(&spectral.b, &p, wo, wi), b = three.b.ops->eval(&three.b, &p, wo, wi),
 		 c = three.b.ops->eval(&three.b, &q, wo, wi), d = color_eval(&wanted, &rgb);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
@@ -239,15 +239,15 @@ static void test_rgb(void **state)
 static void test_white_is_white(void **state)
 {
 	(void)state;
-	struct measured_kind k = fine;
+	struct measured_file_material k = fine;
 	struct made m;
 	k.elevations = 3;
-	k.white = k.absolute = true;
+	k.is_white = k.is_absolute = true;
 	make_or_fail(&m, &k);
-	const struct bsdf_point p = {.w = &rgb};
-	vec3 wo = spherical(measured_kind_theta(&k, 1), 0), wi = spherical(0.5, 3);
+	const struct bsdf_point p = {.wavelengths = &rgb};
+	vec3 wo = spherical(measured_file_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	spectrum f = m.b.ops->eval(&m.b, &p, wo, wi);
-	double wanted = measured_kind_reflected(&k, 1, wo, wi) / wi.z;
+	double wanted = measured_file_reflected(&k, 1, wo, wi) / wi.z;
 	for (int l = 0; l < 3; l++)
 		if (!(fabs(f.v[l] / f.v[0] - 1) < 1e-5 && fabs(f.v[l] / wanted - 1) < 0.03))
 			fail_msg("%.9g %.9g %.9g, wanted %g", f.v[0], f.v[1], f.v[2], wanted);
@@ -260,7 +260,7 @@ static void test_roughness(void **state)
 	(void)state;
 	struct made m;
 	make_or_fail(&m, &fine);
-	assert_true(fabs(m.b.alpha / 0.3 - 1) < 0.02 && m.b.alpha_mean == m.b.alpha);
+	assert_true(fabs(m.b.min_alpha / 0.3 - 1) < 0.02 && m.b.mean_alpha == m.b.min_alpha);
 	arena_fini(&m.arena);
 }
 
@@ -270,7 +270,7 @@ static void test_roughness(void **state)
 static void test_truncated(void **state)
 {
 	(void)state;
-	const struct memory_file *f = measured_files();
+	const struct memory_file *f = measured_file_all();
 	size_t step = 1;
 	for (size_t size = 0; size < f->size; size += step) {
 		struct made m;
@@ -289,7 +289,7 @@ static void test_truncated(void **state)
 static void test_mangled(void **state)
 {
 	(void)state;
-	const struct memory_file *f = measured_files();
+	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	int refused = 0;
 	for (size_t i = 0; i < 500; i++)
@@ -308,7 +308,7 @@ static void test_mangled(void **state)
 
 static void replace(const char *array, size_t i, const unsigned char number[4], const char *what)
 {
-	const struct memory_file *f = measured_files();
+	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	struct tensor t;
 	struct made m;
@@ -361,7 +361,7 @@ static void test_sizes(void **state)
 		{"wavelengths", 0, "needs one entry for each of the wavelengths"},
 		{"jacobian", 0, "a side of 0"},
 	};
-	const struct memory_file *f = measured_files();
+	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct made m;
@@ -382,7 +382,7 @@ static void test_sizes(void **state)
 static void test_other_files(void **state)
 {
 	(void)state;
-	const struct memory_file *f = measured_files();
+	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	struct made m;
 	assert_int_equal(try_bytes(&m, "ply\n", 4), -EINVAL);

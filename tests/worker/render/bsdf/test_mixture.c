@@ -14,7 +14,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 static vec3 direction_above(struct dice *d)
 {
@@ -48,7 +48,7 @@ static void test_ward_is_its_formula(void **state)
 	static const char *const variants[] = {"balanced", "ward", "ward-duer"};
 	for (size_t k = 0; k < 3; k++) {
 		struct arena a = {0};
-		struct dice d = dice_of(variants[k]);
+		struct dice d = dice_for_test(variants[k]);
 		struct bsdf b;
 		char text[160];
 		size_t seen = 0;
@@ -75,7 +75,7 @@ static void test_ward_defaults_and_scale(void **state)
 	struct bsdf b;
 	const vec3 up = {0, 0, 1};
 	bsdf_make(&a, "ward", &b);
-	assert_true(fabs(value(&b, up, up) / (0.5 / PI + 0.2 / (4 * PI * 0.01)) - 1) < 1e-12 && b.alpha == 0.1);
+	assert_true(fabs(value(&b, up, up) / (0.5 / PI + 0.2 / (4 * PI * 0.01)) - 1) < 1e-12 && b.min_alpha == 0.1);
 	bsdf_make(&a, "ward diffuse_reflectance=0.8 specular_reflectance=0.4", &b);
 	assert_true(fabs(value(&b, up, up) / (0.99 / 1.2 * (0.8 / PI + 0.4 / (4 * PI * 0.01))) - 1) < 1e-12);
 	arena_fini(&a);
@@ -107,7 +107,7 @@ static void test_a_mixture_is_a_sum(void **state)
 	for (int i = 0; i < 3; i++)
 		bsdf_make(&a, parts[i], &part[i]);
 	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-		struct dice d = dice_of(cases[k].text);
+		struct dice d = dice_for_test(cases[k].text);
 		bsdf_make(&a, cases[k].text, &b);
 		for (int i = 0; i < 500; i++) {
 			vec3 wo = direction_above(&d), wi = direction_above(&d);
@@ -131,7 +131,7 @@ static void test_parts_that_let_light_through(void **state)
 	vec3 wi;
 	double chance, whole;
 	bsdf_make(&a, "blendbsdf weight=0.25 | diffuse reflectance=0.8 | difftrans transmittance=0.4", &leaf);
-	assert_true(leaf.two_sided && leaf.modes == (BSDF_REFLECT | BSDF_TRANSMIT) && leaf.eta == 1);
+	assert_true(leaf.is_two_sided && leaf.modes == (BSDF_REFLECT | BSDF_TRANSMIT) && leaf.eta == 1);
 	assert_true(fabs(value(&leaf, wo, front) - 0.75 * 0.8 / PI) < 1e-15);
 	assert_true(fabs(value(&leaf, wo, back) - 0.25 * 0.4 / PI) < 1e-15);
 	assert_true(value(&leaf, vec3_neg(wo), back) == value(&leaf, wo, front));
@@ -151,12 +151,12 @@ static void test_two_sides_of_two_sides(void **state)
 	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
 	struct bsdf front, coated, nested, coat;
 	struct error e;
-	struct dice d = dice_of("two sides");
+	struct dice d = dice_for_test("two sides");
 	size_t seen = 0;
-	struct scene_node *outer = node_bsdf(&a, "twosided"), *layer = node_bsdf(&a, "coating int_ior=1.3"),
-			  *over = node_bsdf(&a, "twosided");
-	node_add_child(&a, outer, node_bsdf(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
-	node_add_child(&a, layer, node_bsdf(&a, "twosided | roughconductor alpha=0.3"));
+	struct scene_node *outer = node_make_bsdf(&a, "twosided"), *layer = node_make_bsdf(&a, "coating int_ior=1.3"),
+			  *over = node_make_bsdf(&a, "twosided");
+	node_add_child(&a, outer, node_make_bsdf(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
+	node_add_child(&a, layer, node_make_bsdf(&a, "twosided | roughconductor alpha=0.3"));
 	node_add_child(&a, over, layer);
 	bsdf_make(&a, "twosided | roughconductor alpha=0.3", &front);
 	bsdf_make(&a, "coating int_ior=1.3 | roughconductor alpha=0.3", &coated);
@@ -243,7 +243,8 @@ static void test_a_coloured_opacity(void **state)
 		const struct bsdf_build build = {.arena = &a, .dialect_3 = dialect_3, .assets = &assets};
 		struct bsdf b;
 		struct error e;
-		if (bsdf_create(&b, node_bsdf(&a, "mask | diffuse reflectance=1 | @opacity bitmap filename=red.ppm"),
+		if (bsdf_create(&b,
+				node_make_bsdf(&a, "mask | diffuse reflectance=1 | @opacity bitmap filename=red.ppm"),
 				&build, &e))
 			fail_msg("%s", e.text);
 		spectrum f = b.ops->eval(&b, &point, (vec3){0, 0, 1}, (vec3){0, 0, 1});

@@ -17,7 +17,7 @@ static struct relief_value value_of(const char *map, struct asset_source *assets
 	struct error e;
 	if (bsdf_create(&b, n, &build, &e))
 		fail_msg("%s", e.text);
-	b.relief->at(b.relief->data, 0.4, 0.55, &v);
+	b.relief->eval(b.relief->data, 0.4, 0.55, &v);
 	return v;
 }
 
@@ -63,28 +63,28 @@ static void test_one_color(void **state)
 	struct error e;
 	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap scale=2", even, "diffuse"), &build, &e), 0);
 	assert_int_equal(bsdf_create(&of_color,
-				     node_bsdf(&a, "normalmap normalmap=rgb(0.75,0.5,0.875) scale=2 | diffuse"), &build,
-				     &e),
+				     node_make_bsdf(&a, "normalmap normalmap=rgb(0.75,0.5,0.875) scale=2 | diffuse"),
+				     &build, &e),
 			 0);
-	of_texture.relief->at(of_texture.relief->data, 0.4, 0.55, &wanted);
-	of_color.relief->at(of_color.relief->data, 0.7, 0.1, &got);
+	of_texture.relief->eval(of_texture.relief->data, 0.4, 0.55, &wanted);
+	of_color.relief->eval(of_color.relief->data, 0.7, 0.1, &got);
 	assert_vec(got.x, wanted.x.x, wanted.x.y, wanted.x.z);
 	assert_vec(got.du, wanted.du.x, wanted.du.y, wanted.du.z);
 	assert_vec(got.dv, wanted.dv.x, wanted.dv.y, wanted.dv.z);
 	assert_vec(got.x, 1, 0, 0.75);
-	assert_false(of_texture.relief->handed);
+	assert_false(of_texture.relief->uses_handedness);
 	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap handedness=true", even, "diffuse"), &build, &e),
 			 0);
-	assert_true(of_texture.relief->handed);
+	assert_true(of_texture.relief->uses_handedness);
 	arena_fini(&a);
 }
 
 static int blend_of(const struct scene_node *first, const struct scene_node *second, struct arena *a, struct bsdf *b,
 		    struct error *e)
 {
-	struct bend *bends = NULL;
+	struct relief_map *bends = NULL;
 	/* Bump maps of 0.6, which have no shadowing function, because that depends on further frames. */
-	const struct bsdf_build build = {.arena = a, .bends = &bends};
+	const struct bsdf_build build = {.arena = a, .relief_maps = &bends};
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, "blendbsdf weight=0.3");
 	node_add_child(a, n, first);
 	node_add_child(a, n, second);
@@ -109,15 +109,15 @@ static void test_parts_that_bend_alike(void **state)
 	struct relief_value v, one;
 	struct scene_node *first = bent(&a, map, tiles, "diffuse");
 	assert_int_equal(blend_of(first, bent(&a, map, tiles, "phong"), &a, &b, &e), 0);
-	b.relief->at(b.relief->data, 0.4, 0.55, &v);
+	b.relief->eval(b.relief->data, 0.4, 0.55, &v);
 	assert_int_equal(blend_of(first, first, &a, &b, &e), 0);
-	b.relief->at(b.relief->data, 0.4, 0.55, &one);
+	b.relief->eval(b.relief->data, 0.4, 0.55, &one);
 	assert_memory_equal(&v, &one, sizeof v);
-	assert_false(b.uses_place);
+	assert_false(b.uses_relief_frames);
 	const struct scene_node *specular = bent(&a, map, tiles, "plastic");
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		assert_int_equal(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e), 0);
-		assert_true(b.uses_place);
+		assert_true(b.uses_relief_frames);
 		assert_true(blend_of(specular, bent(&a, others[i].map, others[i].texture, "conductor"), &a, &b, &e) <
 			    0);
 		assert_non_null(strstr(e.text, "bend normals differently"));
@@ -127,26 +127,26 @@ static void test_parts_that_bend_alike(void **state)
 	for (size_t i = 0; i < 3; i++) {
 		char text[80];
 		snprintf(text, sizeof text, "normalmap normalmap=rgb(%s) scale=0.5 | phong", colors[i]);
-		even[i] = node_bsdf(&a, text);
+		even[i] = node_make_bsdf(&a, text);
 	}
 	assert_int_equal(blend_of(even[0], even[1], &a, &b, &e), 0);
-	assert_false(b.uses_place);
+	assert_false(b.uses_relief_frames);
 	assert_int_equal(blend_of(even[0], even[2], &a, &b, &e), 0);
-	assert_true(b.uses_place);
+	assert_true(b.uses_relief_frames);
 	assert_int_equal(blend_of(even[0], bent(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
-	assert_true(b.uses_place);
+	assert_true(b.uses_relief_frames);
 	/* The surface has the normal of the part with the narrowest lobe; a part that lets light pass straight on needs
 	 * no normal. */
 	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
-	assert_false(b.uses_place);
+	assert_false(b.uses_relief_frames);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);
-	assert_true(b.uses_place && b.relief);
+	assert_true(b.uses_relief_frames && b.relief);
 	assert_int_equal(blend_of(first, node_make(&a, PLUGIN_BSDF, "conductor"), &a, &b, &e), 0);
-	assert_true(b.uses_place && !b.relief);
+	assert_true(b.uses_relief_frames && !b.relief);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
-	assert_true(!b.uses_place && b.relief);
+	assert_true(!b.uses_relief_frames && b.relief);
 	struct scene_node *twice = node_make(&a, PLUGIN_BSDF, map),
-			  *both = node_bsdf(&a, "blendbsdf weight=0.5 | diffuse");
+			  *both = node_make_bsdf(&a, "blendbsdf weight=0.5 | diffuse");
 	node_add_child(&a, both, first);
 	node_add_child(&a, twice, node_make(&a, PLUGIN_TEXTURE, tiles));
 	node_add_child(&a, twice, both);

@@ -22,7 +22,7 @@
 #include <cmocka.h>
 
 static const struct wavelengths nm = {.nm = {440, 510, 575, 700}};
-static const struct wavelengths rgb = {.rgb = true};
+static const struct wavelengths rgb = {.is_rgb = true};
 
 struct made {
 	struct memory_file files[2];
@@ -39,10 +39,10 @@ static int try_bytes(struct made *m, const void *bytes, size_t size, const char 
 	m->assets = memory_assets(m->files);
 	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &m->assets};
 	snprintf(text, sizeof text, "measured_polarized filename=m.pbsdf%s", more);
-	return bsdf_create(&m->b, node_bsdf(&m->arena, text), &build, &m->e);
+	return bsdf_create(&m->b, node_make_bsdf(&m->arena, text), &build, &m->e);
 }
 
-static void make_or_fail(struct made *m, polarized_f *f, int phis, int thetas, const char *more)
+static void make_or_fail(struct made *m, polarized_function *f, int phis, int thetas, const char *more)
 {
 	size_t size;
 	unsigned char *bytes = polarized_file_make(f, phis, thetas, &size);
@@ -53,7 +53,7 @@ static void make_or_fail(struct made *m, polarized_f *f, int phis, int thetas, c
 
 static spectrum value_of(const struct made *m, vec3 camera, vec3 light, const struct wavelengths *w)
 {
-	const struct bsdf_point p = {.w = w, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = w, .transport = TRANSPORT_RADIANCE};
 	return m->b.ops->eval(&m->b, &p, camera, light);
 }
 
@@ -76,9 +76,9 @@ static void test_lambert(void **state)
 {
 	(void)state;
 	struct made m;
-	struct dice d = dice_of("a constant table");
-	const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_RADIANCE};
-	size_t samples = dice_count(40000);
+	struct dice d = dice_for_test("a constant table");
+	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
+	size_t samples = dice_scaled_count(40000);
 	double sum = 0, square = 0;
 	make_or_fail(&m, chalk_value, 3, 3, " alpha_sample=0.3");
 	for (int i = 0; i < 1000; i++) {
@@ -91,7 +91,7 @@ static void test_lambert(void **state)
 	}
 	/* The reflected share of all light. */
 	for (size_t i = 0; i < samples; i++) {
-		const double u[] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+		const double u[] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 		struct bsdf_sample s;
 		double weight = m.b.ops->sample(&m.b, &p, (vec3){0.6, 0, 0.8}, u, &s) ? s.f.v[0] * s.wi.z / s.pdf : 0;
 		sum += weight;
@@ -145,10 +145,10 @@ static void rusinkiewicz(vec3 light, vec3 camera, double angle[3])
 static void test_angles(void **state)
 {
 	(void)state;
-	static polarized_f *const tables[] = {by_phi_d, by_theta_d, by_theta_h};
+	static polarized_function *const tables[] = {by_phi_d, by_theta_d, by_theta_h};
 	for (int k = 0; k < 3; k++) {
 		struct made m;
-		struct dice d = dice_of("angles of a table");
+		struct dice d = dice_for_test("angles of a table");
 		make_or_fail(&m, tables[k], 13, 7, "");
 		for (int i = 0; i < 1000; i++) {
 			vec3 light = direction_above(&d), camera = direction_above(&d);
@@ -158,7 +158,7 @@ static void test_angles(void **state)
 			spectrum f = value_of(&m, camera, light, &nm);
 			assert_true(fabs(f.v[0] - wanted) < 1e-5);
 			/* From a light, with the directions exchanged. */
-			const struct bsdf_point p = {.w = &nm, .transport = TRANSPORT_IMPORTANCE};
+			const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_IMPORTANCE};
 			assert_true(m.b.ops->eval(&m.b, &p, light, camera).v[0] == f.v[0]);
 		}
 		/* Directions for which angles are undefined: h along the normal, and the light at the camera. */
@@ -181,7 +181,7 @@ static void test_wavelengths(void **state)
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		assert_true(fabs(f.v[l] / wanted[l] - 1) < 1e-6);
 	assert_true(colour.v[0] > colour.v[1] && colour.v[1] > colour.v[2]);
-	assert_true(m.b.shape == COLOR_SHAPE_OTHER);
+	assert_true(m.b.color_kind == COLOR_KIND_OTHER);
 	arena_fini(&m.arena);
 	static const struct {
 		const char *more;
@@ -193,7 +193,7 @@ static void test_wavelengths(void **state)
 		colour = value_of(&m, a, b, &rgb);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			assert_true(fabs(f.v[l] / single[i].value - 1) < 1e-6 && colour.v[l] == f.v[l]);
-		assert_true(m.b.shape == COLOR_SHAPE_CONSTANT);
+		assert_true(m.b.color_kind == COLOR_KIND_CONSTANT);
 		arena_fini(&m.arena);
 	}
 }

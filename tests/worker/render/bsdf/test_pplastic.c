@@ -6,7 +6,7 @@
 
 static const struct wavelengths wavelengths = {.nm = {430, 500, 570, 640}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 static vec3 direction(double z, double phi)
 {

@@ -7,8 +7,8 @@
 
 #include <math.h>
 
-static const struct wavelengths rgb_lanes = {.rgb = true};
-static const struct bsdf_point point = {.w = &rgb_lanes, .transport = TRANSPORT_RADIANCE};
+static const struct wavelengths rgb_lanes = {.is_rgb = true};
+static const struct bsdf_point point = {.wavelengths = &rgb_lanes, .transport = TRANSPORT_RADIANCE};
 
 /* n and k of silver, as others computed them by Mitsuba's rules from its tables. */
 static void test_silver(void **state)
@@ -38,9 +38,9 @@ static void test_two_tables(void **state)
 {
 	(void)state;
 	static const double nm[] = {400, 500, 600, 700}, n[] = {1, 0.5, 0.3, 0.2}, k[] = {2, 3, 4, 5};
-	struct color a = color_of_table(4, nm, n, false, false), b = color_of_table(4, nm, k, false, false);
+	struct color a = color_from_samples(4, nm, n, false, false), b = color_from_samples(4, nm, k, false, false);
 	spectrum both[2], sa = color_eval(&a, &rgb_lanes), sb = color_eval(&b, &rgb_lanes);
-	color_eval_both(&a, &b, &rgb_lanes, both);
+	color_eval_pair(&a, &b, &rgb_lanes, both);
 	assert_memory_equal(&both[0], &sa, sizeof sa);
 	assert_memory_equal(&both[1], &sb, sizeof sb);
 }
@@ -75,11 +75,11 @@ static void test_indices_that_vary(void **state)
 		struct bsdf_point at = point;
 		struct bsdf b;
 		struct error e;
-		if (bsdf_create(&b, node_bsdf(&a, cases[i].text), &build, &e))
+		if (bsdf_create(&b, node_make_bsdf(&a, cases[i].text), &build, &e))
 			fail_msg("%s: %s", cases[i].text, e.text);
-		assert_true(b.textured == (strchr(cases[i].text, '@') != NULL));
-		at.where.u = cases[i].u;
-		at.where.v = 0.3;
+		assert_true(b.is_textured == (strchr(cases[i].text, '@') != NULL));
+		at.texture_point.u = cases[i].u;
+		at.texture_point.v = 0.3;
 		vec3 wi;
 		double chance;
 		spectrum f = bsdf_eval_delta(&b, &at, (vec3){0.6, 0, 0.8}, BSDF_REFLECT, &wi, &chance);

@@ -5,7 +5,7 @@
  * Level: 1e-7 per test, about 350 tests, so below 1e-4 for all. Power: a separate test shows that a roughness wrong by
  * 10 % is found with certainty. Seeds: the name of the test.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/math/rng.h"
@@ -17,7 +17,7 @@ enum { DIRECTIONS = 16, SAMPLES = 20000, POLAR = 24, AZIMUTH = 16, CELLS = 2 * P
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {
-	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 /* Directions from the normal to 1 degree above the plane; half of them from below if light can arrive from there. */
 static vec3 direction(int i, bool two_sided)
@@ -189,8 +189,8 @@ static void test_samples_follow_the_density(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, bsdf_cases[k], &b);
-		for (int i = 0; i < DIRECTIONS; i += test_scaled() ? 5 : 1) {
-			vec3 wo = direction(i, b.two_sided);
+		for (int i = 0; i < DIRECTIONS; i += test_is_scaled() ? 5 : 1) {
+			vec3 wo = direction(i, b.is_two_sided);
 			double integral, p = chi_square(&b, &b, wo, stats_seed(bsdf_cases[k]) + (uint64_t)i, &integral);
 			if (!(p > LEVEL) || !(integral < 1 + 2e-3))
 				fail_msg("%s, direction %d: p = %g, integral = %g", bsdf_cases[k], i, p, integral);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Laws that every BSDF obeys, for all of bsdf_cases.h: reciprocity unless `directed`, no gain of energy, white
+ * Laws that every BSDF obeys, for all of bsdf_cases.h: reciprocity unless `is_nonreciprocal`, no gain of energy, white
  * furnaces, the same values without wavelengths and in any frame. Then closed forms of simple BSDFs, microfacet values
  * computed by hand, textured roughness, and errors: invalid parameters, and lack of memory.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/math/rng.h"
@@ -16,7 +16,7 @@ static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
 
 static struct bsdf_point point_of(enum transport t)
 {
-	return (struct bsdf_point){.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = t};
+	return (struct bsdf_point){.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = &wavelengths, .transport = t};
 }
 
 static vec3 uniform_direction(double u0, double u1)
@@ -59,7 +59,7 @@ static void test_reciprocity(void **state)
 			spectrum importance = b.ops->eval(&b, &m, wo, wi);
 			double no = index_on(&b, wo), ni = index_on(&b, wi);
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
-				if (b.directed) {
+				if (b.is_nonreciprocal) {
 					assert_near(back.v[l], importance.v[l], 1e-12, bsdf_cases[k]);
 					continue;
 				}
@@ -134,12 +134,12 @@ static void test_no_energy_is_gained(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, bsdf_cases[k], &b);
-		for (int i = 0; i < 16; i += test_scaled() ? 5 : 1) {
+		for (int i = 0; i < 16; i += test_is_scaled() ? 5 : 1) {
 			double z = (1 - 2 * (i & 1)) * (0.05 + 0.95 * (i / 2) / 7.0);
 			vec3 wo = {sqrt(1 - fmin(z * z, 1)), 0, z};
 			/* Not reciprocal: all of the light that leaves comes from somewhere, but what one direction
 			 * brings leaves at many places. */
-			int last = b.directed ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
+			int last = b.is_nonreciprocal ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 			for (int t = TRANSPORT_RADIANCE; t <= last; t++) {
 				struct stats_mean m = albedo(&b, wo, (enum transport)t, stats_seed(bsdf_cases[k]));
 				/* The principled model adds its lobes (worker/render/bsdf/principled.c). */
@@ -208,7 +208,7 @@ static void test_white_furnace(void **state)
 		bsdf_make(&a, white[k].text, &b);
 		for (int i = 0; i < 6; i++) {
 			double z = -0.95 + 0.38 * i;
-			if (z < 0 && !b.two_sided)
+			if (z < 0 && !b.is_two_sided)
 				continue;
 			struct stats_mean m = albedo(&b, (vec3){0, sqrt(1 - z * z), z}, TRANSPORT_RADIANCE, k);
 			if (m.mean < white[k].least - 8 * m.error || (white[k].least > 0.999999 && m.error > 1e-12))
@@ -324,46 +324,47 @@ static void test_flags(void **state)
 		unsigned modes;
 		double alpha, eta;
 		bool smooth, delta, two_sided;
-		enum color_shape shape;
+		enum color_kind shape;
 	} expected[] = {
-		{"diffuse", BSDF_REFLECT, INFINITY, 1, true, false, false, COLOR_SHAPE_CONSTANT},
+		{"diffuse", BSDF_REFLECT, INFINITY, 1, true, false, false, COLOR_KIND_CONSTANT},
 		{"diffuse reflectance=rgb(0.5,0.5,0.4)", BSDF_REFLECT, INFINITY, 1, true, false, false,
-		 COLOR_SHAPE_OTHER},
-		{"conductor material=none", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_SHAPE_CONSTANT},
-		{"conductor material=Al", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_SHAPE_OTHER},
-		{"roughconductor eta=0.2 k=3", BSDF_REFLECT, 0.1, 1, true, false, false, COLOR_SHAPE_CONSTANT},
-		{"roughconductor eta=0.2 k=3 alpha=0", BSDF_REFLECT, 1e-6, 1, true, false, false, COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_OTHER},
+		{"conductor material=none", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_KIND_CONSTANT},
+		{"conductor material=Al", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_KIND_OTHER},
+		{"roughconductor eta=0.2 k=3", BSDF_REFLECT, 0.1, 1, true, false, false, COLOR_KIND_CONSTANT},
+		{"roughconductor eta=0.2 k=3 alpha=0", BSDF_REFLECT, 1e-6, 1, true, false, false, COLOR_KIND_CONSTANT},
 		{"dielectric int_ior=1.5 ext_ior=1.2", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.25, false, true,
-		 true, COLOR_SHAPE_CONSTANT},
+		 true, COLOR_KIND_CONSTANT},
 		{"dielectric int_ior=bk7 ext_ior=vacuum", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.5046, false,
-		 true, true, COLOR_SHAPE_CONSTANT},
+		 true, true, COLOR_KIND_CONSTANT},
 		{"dielectric ext_ior=1", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.5046, false, true, true,
-		 COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_CONSTANT},
 		{"roughdielectric int_ior=2 ext_ior=1 alpha=0.3", BSDF_REFLECT | BSDF_TRANSMIT, 0.3, 2, true, false,
-		 true, COLOR_SHAPE_CONSTANT},
+		 true, COLOR_KIND_CONSTANT},
 		{"thindielectric", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT, 0, 1, false, true, true,
-		 COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_CONSTANT},
 		{"mask | dielectric int_ior=1.5 ext_ior=1", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT,
-		 0, 1.5, false, true, true, COLOR_SHAPE_CONSTANT},
+		 0, 1.5, false, true, true, COLOR_KIND_CONSTANT},
 		{"blendbsdf | thindielectric | roughdielectric int_ior=2 ext_ior=1 alpha=0.3",
 		 BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT, 0.3, 2, true, true, true,
-		 COLOR_SHAPE_CONSTANT},
-		{"phong exponent=6", BSDF_REFLECT, 0.5, 1, true, false, false, COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_CONSTANT},
+		{"phong exponent=6", BSDF_REFLECT, 0.5, 1, true, false, false, COLOR_KIND_CONSTANT},
 		{"twosided | diffuse | roughconductor alpha=0.2 material=none", BSDF_REFLECT, 0.2, 1, true, false, true,
-		 COLOR_SHAPE_CONSTANT},
+		 COLOR_KIND_CONSTANT},
 		{"twosided | diffuse | conductor material=Ag", BSDF_REFLECT | BSDF_DELTA, INFINITY, 1, true, true, true,
-		 COLOR_SHAPE_OTHER},
+		 COLOR_KIND_OTHER},
 	};
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, expected[k].text, &b);
-		bool same = b.modes == expected[k].modes && b.alpha == expected[k].alpha && b.eta == expected[k].eta &&
-			    b.has_smooth == expected[k].smooth && b.has_delta == expected[k].delta &&
-			    b.two_sided == expected[k].two_sided && b.shape == expected[k].shape && !b.textured;
+		bool same = b.modes == expected[k].modes && b.min_alpha == expected[k].alpha &&
+			    b.eta == expected[k].eta && b.has_smooth == expected[k].smooth &&
+			    b.has_delta == expected[k].delta && b.is_two_sided == expected[k].two_sided &&
+			    b.color_kind == expected[k].shape && !b.is_textured;
 		if (!same)
-			fail_msg("%s: modes %x alpha %g eta %g shape %d", expected[k].text, b.modes, b.alpha, b.eta,
-				 (int)b.shape);
+			fail_msg("%s: modes %x alpha %g eta %g shape %d", expected[k].text, b.modes, b.min_alpha, b.eta,
+				 (int)b.color_kind);
 		arena_fini(&a);
 	}
 }
@@ -371,14 +372,14 @@ static void test_flags(void **state)
 static void test_grey_is_the_same_without_wavelengths(void **state)
 {
 	(void)state;
-	const struct wavelengths grey = {.grey = true, .nm = {NAN, NAN, NAN, NAN}};
+	const struct wavelengths grey = {.is_grey = true, .nm = {NAN, NAN, NAN, NAN}};
 	const struct bsdf_point in_colour = point_of(TRANSPORT_RADIANCE),
-				in_grey = {.where = in_colour.where, .w = &grey};
+				in_grey = {.texture_point = in_colour.texture_point, .wavelengths = &grey};
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, bsdf_cases[k], &b);
-		for (uint64_t i = 0; i < 50 && b.shape == COLOR_SHAPE_CONSTANT; i++) {
+		for (uint64_t i = 0; i < 50 && b.color_kind == COLOR_KIND_CONSTANT; i++) {
 			double u[4];
 			struct bsdf_sample s, t;
 			rng_uniform4(1, RNG_TEST, i, 0, 0, u);
@@ -477,15 +478,15 @@ static void test_textured_roughness(void **state)
 		bsdf_make(&a, same[k][0], &number);
 		bsdf_make(&a, same[k][1], &map);
 		struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
-		p.where.u = 0.75;
-		p.where.v = 0.25;
-		assert_true(map.textured && !number.textured);
+		p.texture_point.u = 0.75;
+		p.texture_point.v = 0.25;
+		assert_true(map.is_textured && !number.is_textured);
 		assert_near(map.ops->eval(&map, &p, wo, wi).v[0], number.ops->eval(&number, &p, wo, wi).v[0], 1e-12,
 			    same[k][0]);
 		assert_near(map.ops->pdf_solid(&map, &p, wo, wi), number.ops->pdf_solid(&number, &p, wo, wi), 1e-12,
 			    same[k][0]);
 		if (k == 2) {
-			p.where.u = 0.25;
+			p.texture_point.u = 0.25;
 			assert_true(
 				fabs(map.ops->pdf_solid(&map, &p, wo, wi) / number.ops->pdf_solid(&number, &p, wo, wi) -
 				     1) > 0.1);
@@ -498,9 +499,9 @@ static void test_out_of_memory_is_an_answer(void **state)
 {
 	(void)state;
 	struct arena nodes = {0};
-	const struct asset_source assets = memory_assets(measured_files());
+	const struct asset_source assets = memory_assets(measured_file_all());
 	for (int k = 0; k < BSDF_CASES; k++) {
-		const struct scene_node *n = node_bsdf(&nodes, bsdf_cases[k]);
+		const struct scene_node *n = node_make_bsdf(&nodes, bsdf_cases[k]);
 		int code = -ENOMEM;
 		for (size_t limit = 1; code; limit += 64 + limit / 64) {
 			struct arena a = {.limit = limit};
@@ -522,11 +523,11 @@ static void test_black_and_default(void **state)
 	const vec3 up = {0, 0, 1};
 	struct bsdf b;
 	struct bsdf_sample s;
-	bsdf_black(&b);
+	bsdf_make_black(&b);
 	assert_true(spectrum_is_zero(b.ops->eval(&b, &p, up, up)) && b.ops->pdf_solid(&b, &p, up, up) == 0);
 	assert_false(b.ops->sample(&b, &p, up, (double[]){0.1, 0.2, 0.3}, &s));
 	assert_true(!b.has_smooth && !b.has_delta && b.modes == 0);
-	bsdf_default(&b);
+	bsdf_make_default(&b);
 	assert_near(b.ops->eval(&b, &p, up, up).v[0], 0.5 / PI, 1e-15, "default");
 }
 

@@ -25,12 +25,13 @@ enum { QUANTITIES = sizeof quantities / sizeof *quantities };
 
 static void expect_same(const char *text, const struct bsdf *got, const struct bsdf *want, double u)
 {
-	struct dice d = dice_of(text);
-	const struct bsdf_point p = {.where = {.u = u, .v = 0.2}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+	struct dice d = dice_for_test(text);
+	const struct bsdf_point p = {
+		.texture_point = {.u = u, .v = 0.2}, .wavelengths = &wavelengths, .transport = TRANSPORT_RADIANCE};
 	int seen = 0;
 	for (int i = 0; i < 1000; i++) {
 		vec3 wo = dice_direction(&d), wi = dice_direction(&d);
-		const double x[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+		const double x[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 		spectrum a = got->ops->eval(got, &p, wo, wi), b = want->ops->eval(want, &p, wo, wi);
 		spectrum ah = bsdf_eval_halfvec(got, &p, wo, wi), bh = bsdf_eval_halfvec(want, &p, wo, wi);
 		if (memcmp(&a, &b, sizeof a) != 0 || memcmp(&ah, &bh, sizeof ah) != 0)
@@ -65,11 +66,12 @@ static void test_a_texture_is_its_value_at_each_point(void **state)
 					 quantities[q].before, quantities[q].after, quantities[q].name,
 					 varies ? quantities[q].low : value, varies ? quantities[q].high : value);
 				bsdf_make(&a, text, &textured);
-				assert_true(textured.textured);
+				assert_true(textured.is_textured);
 				assert_int_equal(textured.modes, constant.modes);
 				expect_same(text, &textured, &constant, place ? 0.7 : 0.2);
-				if (!varies && textured.alpha != constant.alpha)
-					fail_msg("%s: alpha is %g, not %g", text, textured.alpha, constant.alpha);
+				if (!varies && textured.min_alpha != constant.min_alpha)
+					fail_msg("%s: alpha is %g, not %g", text, textured.min_alpha,
+						 constant.min_alpha);
 				arena_fini(&a);
 			}
 }
@@ -91,8 +93,8 @@ static void test_the_narrowest_lobe_counts(void **state)
 		struct bsdf got, want;
 		bsdf_make(&a, of[i][0], &got);
 		bsdf_make(&a, of[i][1], &want);
-		if (got.alpha != want.alpha)
-			fail_msg("%s: %g is not %g", of[i][0], got.alpha, want.alpha);
+		if (got.min_alpha != want.min_alpha)
+			fail_msg("%s: %g is not %g", of[i][0], got.min_alpha, want.min_alpha);
 		arena_fini(&a);
 	}
 }

@@ -29,7 +29,7 @@ static int make_table(void **state)
 		rng_uniform4(stats_seed("warp"), RNG_TEST, i, 0, 0, u);
 		value[i] = u[0] < 0.3 ? 0 : u[1] * (double)(1 + i / NODES); /* slices with different sums */
 	}
-	return warp_table_make(&table, SLICES, WIDTH, HEIGHT, value, &arena);
+	return warp_table_init(&table, SLICES, WIDTH, HEIGHT, value, &arena);
 }
 
 static int free_table(void **state)
@@ -132,10 +132,10 @@ static void test_refused(void **state)
 	struct arena a = {.limit = 0};
 	struct warp_table t;
 	double zero[8] = {0}, minus[8] = {1, 1, 1, 1, 1, 1, -1, 1}, half[8] = {1, 1, 1, 1};
-	assert_int_equal(warp_table_make(&t, 2, 2, 2, zero, &a), -22);
-	assert_int_equal(warp_table_make(&t, 2, 2, 2, minus, &a), -22);
-	assert_int_equal(warp_table_make(&t, 2, 2, 2, half, &a), -22); /* the second slice is 0 everywhere */
-	assert_int_equal(warp_table_make(&t, 1, 2, 2, half, &a), 0);
+	assert_int_equal(warp_table_init(&t, 2, 2, 2, zero, &a), -22);
+	assert_int_equal(warp_table_init(&t, 2, 2, 2, minus, &a), -22);
+	assert_int_equal(warp_table_init(&t, 2, 2, 2, half, &a), -22); /* the second slice is 0 everywhere */
+	assert_int_equal(warp_table_init(&t, 1, 2, 2, half, &a), 0);
 	arena_fini(&a);
 }
 

@@ -28,7 +28,7 @@ static struct camera camera_of(uint32_t width, uint32_t height, double fov, cons
 static void test_project_direction(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("project direction");
+	struct dice d = dice_for_test("project direction");
 	const double fovs[] = {1e-3, 20, 90, 150, 179};
 	for (int i = 0; i < 20000; i++) {
 		vec3 o = vec3_scale(3, dice_direction(&d)), t = dice_direction(&d);
@@ -37,8 +37,8 @@ static void test_project_direction(void **state)
 		vec3 w = camera_direction(&c, c.position, x, y);
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15);
 		assert_true(camera_project(&c, c.position, w, 1, &px, &py));
-		/* Rounding of the direction amounts to `scale` / cos^2 pixels. */
-		double slack = 8e-16 * (c.scale / pow(vec3_dot(c.axes.n, w), 2) + 400);
+		/* Rounding of the direction amounts to `pixels_per_slope` / cos^2 pixels. */
+		double slack = 8e-16 * (c.pixels_per_slope / pow(vec3_dot(c.axes.n, w), 2) + 400);
 		assert_true(fabs(px - x) < slack && fabs(py - y) < slack);
 		assert_false(camera_project(&c, c.position, vec3_neg(w), 1, &px, &py));
 	}
@@ -69,7 +69,7 @@ static void test_principal_point(void **state)
 static void test_jacobian(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("camera jacobian");
+	struct dice d = dice_for_test("camera jacobian");
 	for (int i = 0; i < 5000; i++) {
 		struct camera c = camera_of(64, 48, dice_between(&d, 5, 150), "smaller",
 					    vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
@@ -155,7 +155,7 @@ static void test_clip(void **state)
 	assert_true(c.position.x == -0.25 && c.position.y == -0.25 && c.position.z == -0.25);
 	vec3 w = camera_direction(&c, c.position, 0, 100);
 	double t0, t1, x, y;
-	camera_clip(&c, w, &t0, &t1);
+	camera_clip_range(&c, w, &t0, &t1);
 	assert_true(fabs(t0 * vec3_dot(w, c.axes.n) - 0.5) < 1e-15 && fabs(t1 * vec3_dot(w, c.axes.n) - 2) < 1e-15);
 	assert_true(camera_project(&c, c.position, w, t0 * (1 + 1e-12), &x, &y) &&
 		    camera_project(&c, c.position, w, t1 * (1 - 1e-12), &x, &y));
@@ -180,34 +180,34 @@ static struct camera lens_of(struct dice *d, vec3 *x_k)
 	if (camera_init(&c, &s, dice_direction(d), dice_between(d, 0.1, 1), &e))
 		fail_msg("%s", e.text);
 	assert_true(camera_has_aperture(&c));
-	*x_k = camera_point(&c, (double[]){dice_throw(d), dice_throw(d)});
+	*x_k = camera_sample_point(&c, (double[]){dice_uniform(d), dice_uniform(d)});
 	return c;
 }
 
 static void test_aperture(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("aperture");
+	struct dice d = dice_for_test("aperture");
 	for (int i = 0; i < 20000; i++) {
 		vec3 p;
 		struct camera c = lens_of(&d, &p);
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, back[2], h = 1e-5;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, back[2], h = 1e-5;
 		/* Not near the diagonals, where the map has a crease. */
 		if (fabs(fabs(u[0] - 0.5) - fabs(u[1] - 0.5)) < 2 * h)
 			continue;
-		p = camera_point(&c, u);
+		p = camera_sample_point(&c, u);
 		vec3 offset = vec3_sub(p, c.position);
-		assert_true(vec3_length(offset) <= c.aperture * (1 + 1e-11) &&
+		assert_true(vec3_length(offset) <= c.aperture_radius * (1 + 1e-11) &&
 			    fabs(vec3_dot(offset, c.axes.n)) < 1e-14);
 		camera_point_inverse(&c, p, back);
-		assert_true(fabs(back[0] - u[0]) < 1e-15 / c.aperture + 1e-14 &&
-			    fabs(back[1] - u[1]) < 1e-15 / c.aperture + 1e-14);
-		vec3 du = vec3_sub(camera_point(&c, (double[]){u[0] + h, u[1]}),
-				   camera_point(&c, (double[]){u[0] - h, u[1]}));
-		vec3 dv = vec3_sub(camera_point(&c, (double[]){u[0], u[1] + h}),
-				   camera_point(&c, (double[]){u[0], u[1] - h}));
+		assert_true(fabs(back[0] - u[0]) < 1e-15 / c.aperture_radius + 1e-14 &&
+			    fabs(back[1] - u[1]) < 1e-15 / c.aperture_radius + 1e-14);
+		vec3 du = vec3_sub(camera_sample_point(&c, (double[]){u[0] + h, u[1]}),
+				   camera_sample_point(&c, (double[]){u[0] - h, u[1]}));
+		vec3 dv = vec3_sub(camera_sample_point(&c, (double[]){u[0], u[1] + h}),
+				   camera_sample_point(&c, (double[]){u[0], u[1] - h}));
 		double area = vec3_length(vec3_cross(du, dv)) / (4 * h * h);
-		assert_true(fabs(area / (M_PI * c.aperture * c.aperture) - 1) < 1e-4);
+		assert_true(fabs(area / (M_PI * c.aperture_radius * c.aperture_radius) - 1) < 1e-4);
 	}
 	/* Corners and centre stay within [0,1). */
 	vec3 p;
@@ -215,7 +215,7 @@ static void test_aperture(void **state)
 	const double ends[] = {0, 0.5, 1 - 0x1p-53};
 	for (int i = 0; i < 9; i++) {
 		double u[2];
-		camera_point_inverse(&c, camera_point(&c, (double[]){ends[i % 3], ends[i / 3]}), u);
+		camera_point_inverse(&c, camera_sample_point(&c, (double[]){ends[i % 3], ends[i / 3]}), u);
 		assert_true(u[0] >= 0 && u[0] < 1 && u[1] >= 0 && u[1] < 1);
 		assert_true(fabs(u[0] - ends[i % 3]) < 1e-9 && fabs(u[1] - ends[i / 3]) < 1e-9);
 	}
@@ -226,18 +226,20 @@ static void test_aperture(void **state)
 static void test_lens(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("lens");
+	struct dice d = dice_for_test("lens");
 	for (int i = 0; i < 20000; i++) {
 		vec3 x_k;
 		struct camera c = lens_of(&d, &x_k);
 		double x = dice_between(&d, -5, 70), y = dice_between(&d, -5, 50), px, py, h = 1e-4;
 		vec3 w = camera_direction(&c, x_k, x, y), through = camera_direction(&c, c.position, x, y);
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15 && vec3_dot(w, c.axes.n) > 0);
-		vec3 a = vec3_madd(x_k, c.focus / vec3_dot(w, c.axes.n), w);
-		vec3 b = vec3_madd(c.position, c.focus / vec3_dot(through, c.axes.n), through);
+		vec3 a = vec3_madd(x_k, c.focus_distance / vec3_dot(w, c.axes.n), w);
+		vec3 b = vec3_madd(c.position, c.focus_distance / vec3_dot(through, c.axes.n), through);
 		assert_true(vec3_length(vec3_sub(a, b)) <
-			    1e-12 * (c.focus + c.aperture) / fmin(vec3_dot(through, c.axes.n), vec3_dot(w, c.axes.n)));
-		double slack = 1e-14 * (c.scale / pow(vec3_dot(c.axes.n, w), 2) + 400 + c.scale * c.aperture / c.focus);
+			    1e-12 * (c.focus_distance + c.aperture_radius) /
+				    fmin(vec3_dot(through, c.axes.n), vec3_dot(w, c.axes.n)));
+		double slack = 1e-14 * (c.pixels_per_slope / pow(vec3_dot(c.axes.n, w), 2) + 400 +
+					c.pixels_per_slope * c.aperture_radius / c.focus_distance);
 		assert_true(camera_project(&c, x_k, w, 1, &px, &py));
 		assert_true(fabs(px - x) < slack && fabs(py - y) < slack);
 		if (vec3_dot(w, c.axes.n) < 0.05)
@@ -261,11 +263,11 @@ static void test_closed_lens(void **state)
 	s.focus_distance = 0.7;
 	assert_int_equal(camera_init(&lens, &s, (vec3){0.3, 0, 0}, 0.5, NULL), 0);
 	assert_false(camera_has_aperture(&lens));
-	struct dice d = dice_of("closed lens");
+	struct dice d = dice_for_test("closed lens");
 	for (int i = 0; i < 1000; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, x = dice_between(&d, 0, 64),
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, x = dice_between(&d, 0, 64),
 		       y = dice_between(&d, 0, 48), p[2], q[2];
-		vec3 x_k = camera_point(&lens, u), v = camera_direction(&pinhole, pinhole.position, x, y),
+		vec3 x_k = camera_sample_point(&lens, u), v = camera_direction(&pinhole, pinhole.position, x, y),
 		     w = camera_direction(&lens, x_k, x, y);
 		assert_true(x_k.x == pinhole.position.x && x_k.y == pinhole.position.y && x_k.z == pinhole.position.z);
 		assert_true(v.x == w.x && v.y == w.y && v.z == w.z);

@@ -28,7 +28,7 @@ static struct scene_settings settings_of(enum scene_projection projection, doubl
 				       .near_clip = 1e-3,
 				       .far_clip = 1e4,
 				       .projection = projection,
-				       .kc = {k0, k1},
+				       .distortion = {k0, k1},
 				       .to_world = mat4_identity()};
 }
 
@@ -49,12 +49,13 @@ static vec3 direction_seen(const struct camera *c, double x, double y)
 /* The map between film points and directions is one-to-one; the density is that of small squares of the film. */
 static void check_map(const struct camera *c, const char *name)
 {
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	for (int i = 0; i < 5000; i++) {
 		double x = dice_between(&d, 0.01, WIDTH - 0.01), y = dice_between(&d, 0.01, HEIGHT - 0.01), px, py,
 		       h = 1e-5;
 		vec3 w = direction_seen(c, x, y);
-		assert_true(camera_has(c, x, y) && camera_looks(c, w) && fabs(vec3_length(w) - 1) < 1e-15);
+		assert_true(camera_film_point_is_valid(c, x, y) && camera_sees_direction(c, w) &&
+			    fabs(vec3_length(w) - 1) < 1e-15);
 		assert_true(camera_project(c, c->position, w, 1, &px, &py));
 		double slack = 1e-14 * (1 + camera_jac_film_from_solid(c, w));
 		if (!(fabs(px - x) < slack && fabs(py - y) < slack))
@@ -102,11 +103,11 @@ static void test_panorama(void **state)
 	check_map(&c, "panorama");
 	check_map(&turned, "panorama, turned");
 	assert_true(fabs(film_solid_angle(&c) / (4 * M_PI) - 1) < 1e-5);
-	assert_false(camera_has(&c, -0.1, 3) || camera_has(&c, WIDTH, 3) || camera_has(&c, 3, -0.1) ||
-		     camera_has(&c, 3, HEIGHT));
+	assert_false(camera_film_point_is_valid(&c, -0.1, 3) || camera_film_point_is_valid(&c, WIDTH, 3) ||
+		     camera_film_point_is_valid(&c, 3, -0.1) || camera_film_point_is_valid(&c, 3, HEIGHT));
 	/* There are no clipping planes. */
 	double low, high, x = 0, y = 0;
-	camera_clip(&c, (vec3){0, 0, -1}, &low, &high);
+	camera_clip_range(&c, (vec3){0, 0, -1}, &low, &high);
 	assert_true(low == 0 && high == INFINITY && camera_project(&c, c.position, (vec3){0, 0.6, -0.8}, 1e-9, &x, &y));
 	assert_true(x == 0 && y > 0 && y < 0.5 * HEIGHT);
 }
@@ -117,12 +118,12 @@ static void test_pixels(void **state)
 	(void)state;
 	struct scene_settings s = settings_of(PROJECTION_SPHERE, 0, 0), plane = settings_of(PROJECTION_PLANE, 0, 0);
 	const struct camera cameras[] = {camera_of(&s), camera_of(&plane)};
-	struct dice d = dice_of("pixels");
+	struct dice d = dice_for_test("pixels");
 	for (int i = 0; i < 4000; i++) {
 		const struct camera *c = &cameras[i % 2];
 		double x = dice_between(&d, 1, WIDTH - 1), y = dice_between(&d, 1, HEIGHT - 1), h = 1e-4, length[2];
 		vec3 w = direction_seen(c, x, y), axis[2];
-		camera_pixel(c, w, 3, axis, length);
+		camera_pixel_footprint(c, w, 3, axis, length);
 		const vec3 is[2] = {vec3_sub(direction_seen(c, x + h, y), direction_seen(c, x - h, y)),
 				    vec3_sub(direction_seen(c, x, y + h), direction_seen(c, x, y - h))};
 		for (int k = 0; k < 2; k++) {
@@ -144,7 +145,7 @@ static void test_distortion(void **state)
 	struct scene_settings s = settings_of(PROJECTION_PLANE, 0, 0);
 	struct camera plain = camera_of(&s);
 	for (size_t k = 0; k < sizeof kc / sizeof *kc; k++) {
-		struct dice d = dice_of("distortion");
+		struct dice d = dice_for_test("distortion");
 		s = settings_of(PROJECTION_DISTORTED, kc[k][0], kc[k][1]);
 		s.principal_x = 0.05;
 		struct camera c = camera_of(&s);
@@ -152,7 +153,7 @@ static void test_distortion(void **state)
 		for (int i = 0; i < 2000; i++) {
 			double r = dice_between(&d, 0, 0.8), turn = dice_between(&d, 0, 7), px, py;
 			vec3 w = vec3_normalize((vec3){r * cos(turn), r * sin(turn), 1});
-			double at = r * (1 + kc[k][0] * r * r + kc[k][1] * r * r * r * r) * plain.scale;
+			double at = r * (1 + kc[k][0] * r * r + kc[k][1] * r * r * r * r) * plain.pixels_per_slope;
 			assert_true(camera_project(&c, c.position, w, 1, &px, &py));
 			assert_true(fabs(px - (0.45 * WIDTH - at * cos(turn))) < 1e-12 * WIDTH &&
 				    fabs(py - (0.5 * HEIGHT - at * sin(turn))) < 1e-12 * WIDTH);
@@ -185,12 +186,12 @@ static void test_telecentric(void **state)
 	const double unit = 0.5, at[] = {0, 1.5, 4, 7};
 	assert_true(camera_has_aperture(&c));
 	for (int k = 0; k < 4; k++) {
-		struct dice d = dice_of("telecentric");
+		struct dice d = dice_for_test("telecentric");
 		double x = 13, y = 29, radius = 0.3 * fabs(1 - at[k] / 4), moments[3] = {0}, most = 0;
 		/* +x is to the left in the image; the film is 4 units wide. */
 		vec3 middle = {2 - 4 * x / WIDTH, 4 * (0.5 * HEIGHT - y) / WIDTH, at[k]};
 		for (int i = 0; i < RAYS; i++) {
-			vec3 p = camera_point(&c, (double[]){dice_throw(&d), dice_throw(&d)});
+			vec3 p = camera_sample_point(&c, (double[]){dice_uniform(&d), dice_uniform(&d)});
 			vec3 w = camera_direction(&c, p, x, y);
 			double t = (at[k] * unit - p.z) / w.z;
 			vec3 q = vec3_scale(1 / unit, vec3_madd(p, t, w));
@@ -213,7 +214,7 @@ static void test_telecentric(void **state)
 	}
 	/* Pixels per solid angle are those of the plane of focus, seen from the lens. */
 	vec3 axis = {0, 0, 1};
-	double distance = c.focus, per_area = camera_jac_film_from_solid(&c, axis) / (distance * distance);
+	double distance = c.focus_distance, per_area = camera_jac_film_from_solid(&c, axis) / (distance * distance);
 	assert_true(fabs(per_area * 4 * 4 * unit * unit / (WIDTH * WIDTH) - 1) < 1e-5);
 }
 
@@ -221,7 +222,7 @@ static void refuses(const char *body, const char *sentence)
 {
 	char xml[1024];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", body);
-	world_of_files_refused((const struct memory_file[]){{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}}, sentence);
+	world_check_files_refused((const struct memory_file[]){{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}}, sentence);
 }
 
 static void test_refused(void **state)

@@ -13,7 +13,7 @@
 #include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/chain.h"
 #include "worker/render/path/integrator.h"
-#include "worker/render/chain/path_place.h"
+#include "worker/render/chain/path_state.h"
 #include "worker/render/math/fptrap.h"
 #include "tests/support/path_check.h"
 
@@ -34,8 +34,12 @@ static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_
 
 static void begin(struct chain *c, struct film_sums *film)
 {
-	*c = (struct chain){
-		.context = &context, .film = film, .mixture = mixture, .strategy = strategies, .seed = 7, .id = 3};
+	*c = (struct chain){.context = &context,
+			    .film = film,
+			    .mixture = mixture,
+			    .strategy_counters = strategies,
+			    .seed = 7,
+			    .id = 3};
 }
 
 /* Starts the chain at the first bootstrap sample that carries light. */
@@ -82,7 +86,7 @@ static void check_resume(struct chain *c, struct chain *d)
 	assert_false(chain_path.resume(d, &s));
 	put64(s.bytes + 16, c->rejected_run);
 	assert_int_equal(c->step, d->step);
-	assert_true(path_read(&context, s.bytes + CHAIN_STATE_HEAD, s.size - CHAIN_STATE_HEAD, &x));
+	assert_true(path_read(&context, s.bytes + CHAIN_STATE_HEADER_BYTES, s.size - CHAIN_STATE_HEADER_BYTES, &x));
 	if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded"))
 		fail_msg("resumed: %s", text);
 	d->id++;
@@ -116,7 +120,7 @@ static double bad_number(struct dice *dice)
 
 static void damage_state(struct chain_state *s, struct dice *dice, int i)
 {
-	uint32_t head = CHAIN_STATE_HEAD, left = s->size - head;
+	uint32_t head = CHAIN_STATE_HEADER_BYTES, left = s->size - head;
 	if (i % 7 == 0)
 		s->size -= 1 + (uint32_t)dice_below(dice, 40);
 	else if (i % 3 == 0)
@@ -142,7 +146,8 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 		d->step = c->step;
 		if (!chain_path.resume(d, &changed)) {
 			refused++;
-		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEAD, changed.size - CHAIN_STATE_HEAD, &x) &&
+		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEADER_BYTES,
+				     changed.size - CHAIN_STATE_HEADER_BYTES, &x) &&
 			   x.edges) {
 			/* The path may break two rules, because reading a state checks neither occlusion nor exactly
 			 * specular directions. */
@@ -165,8 +170,8 @@ static void check_room(const struct room *room)
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
 	struct film_sums a, b, waste;
 	struct world *w = room->build();
-	struct dice dice = dice_of(room->name);
-	starts_context(&context, w, 1, EDGES, counters);
+	struct dice dice = dice_for_test(room->name);
+	starts_init_context(&context, w, 1, EDGES, counters);
 	assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
 	assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
 	assert_int_equal(film_sums_init(&waste, &plan, &settings, NULL), 0);
@@ -214,18 +219,19 @@ static void test_black(void **state)
 	struct film_sums film;
 	struct chain_state s;
 	struct world *w = rooms[0].build();
-	starts_context(&context, w, 1, EDGES, counters);
+	starts_init_context(&context, w, 1, EDGES, counters);
 	assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
 	begin(c, &film);
 	assert_true(chain_path.start(c, UINT64_MAX));
 	assert_int_equal(chain_path.save(c, &s), 0);
-	assert_int_equal(s.size, CHAIN_STATE_HEAD + 8);
+	assert_int_equal(s.size, CHAIN_STATE_HEADER_BYTES + 8);
 	assert_true(chain_path.resume(c, &s));
 	mem_free(s.bytes);
 	steps(c, 200);
 	assert_int_equal(chain_path.save(c, &s), 0);
 	/* A wavelength and a point on the aperture only if the scene has them. */
-	uint32_t without = CHAIN_STATE_HEAD + 16 + (w->effects.colour ? 8u : 0) + (w->effects.aperture ? 40u : 0);
+	uint32_t without =
+		CHAIN_STATE_HEADER_BYTES + 16 + (w->effects.colour ? 8u : 0) + (w->effects.aperture ? 40u : 0);
 	assert_true(s.size > without && (s.size - without) % 40 == 0);
 	mem_free(s.bytes);
 	film_sums_fini(&film);
@@ -237,7 +243,7 @@ static void test_black(void **state)
 static struct world *on_floor(double floor)
 {
 	/* clang-format off */
-	return world_of_text(SIDE, SIDE,
+	return world_from_text(SIDE, SIDE,
 		SENSOR("0,3,8", "0,0.7,0")
 		"<shape type='rectangle'>"
 			"<transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
@@ -299,9 +305,9 @@ static void check_scale(double floor)
 	struct world *w = on_floor(floor);
 	uint8_t bytes[PATH_BYTES_MAX];
 	unsigned paths = 0, unwritten = 0;
-	starts_context(&context, w, 1, EDGES, counters);
+	starts_init_context(&context, w, 1, EDGES, counters);
 	for (uint64_t i = 0; i < 2000; i++) {
-		if (!path_start(&context, 7, i, &x) || x.edges == 0)
+		if (!path_choose_seed(&context, 7, i, &x) || x.edges == 0)
 			continue;
 		size_t size = path_write(&context, &x, &y, bytes);
 		paths++;

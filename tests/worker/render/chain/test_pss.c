@@ -31,13 +31,13 @@ static void test_small_step(void **state)
 	(void)state;
 	enum { CELLS = 32 };
 	const double from[] = {0, 0x1p-53, 1e-9, 0.001, 0.3, 0.5, 0.999, 1 - 0x1p-53};
-	struct dice d = dice_of("small step");
+	struct dice d = dice_for_test("small step");
 	for (size_t k = 0; k < sizeof from / sizeof from[0]; k++) {
 		uint64_t counts[2 * CELLS] = {0};
 		double expected[2 * CELLS];
-		size_t n = dice_count(100000);
+		size_t n = dice_scaled_count(100000);
 		for (size_t i = 0; i < n; i++) {
-			double to = pss_small_step(from[k], dice_throw(&d));
+			double to = pss_small_step(from[k], dice_uniform(&d));
 			assert_true(to >= 0 && to < 1);
 			double step = to - from[k];
 			step -= rint(step);
@@ -62,10 +62,10 @@ static void test_both_ways(void **state)
 	(void)state;
 	enum { CELLS = 64 };
 	static uint64_t moves[CELLS][CELLS];
-	struct dice d = dice_of("both ways");
-	size_t n = dice_count(2000000);
+	struct dice d = dice_for_test("both ways");
+	size_t n = dice_scaled_count(2000000);
 	for (size_t i = 0; i < n; i++) {
-		double u = dice_throw(&d), v = pss_small_step(u, dice_throw(&d));
+		double u = dice_uniform(&d), v = pss_small_step(u, dice_uniform(&d));
 		moves[(int)(u * CELLS)][(int)(v * CELLS)]++;
 	}
 	double chi2 = 0, degrees = 0;
@@ -84,12 +84,12 @@ static void test_both_ways(void **state)
 static void fill(struct pss_point *p, unsigned camera, unsigned light, struct dice *d)
 {
 	memset(p, 0, sizeof *p);
-	p->used[0] = camera;
-	p->used[1] = light;
+	p->block_count[0] = camera;
+	p->block_count[1] = light;
 	for (int s = 0; s < SAMPLER_SIDES; s++)
-		for (unsigned v = 0; v < p->used[s]; v++)
-			for (int i = 0; i < SAMPLER_BLOCK; i++)
-				p->u[s][v][i] = dice_throw(d);
+		for (unsigned v = 0; v < p->block_count[s]; v++)
+			for (int i = 0; i < SAMPLER_BLOCK_SIZE; i++)
+				p->u[s][v][i] = dice_uniform(d);
 }
 
 static void test_bytes(void **state)
@@ -97,12 +97,12 @@ static void test_bytes(void **state)
 	(void)state;
 	static uint8_t bytes[CHAIN_STATE_MAX];
 	static struct pss_point p, q;
-	struct dice d = dice_of("bytes");
+	struct dice d = dice_for_test("bytes");
 	for (unsigned i = 0; i < 200; i++) {
-		unsigned camera = i == 0 ? 0 : i == 1 ? PSS_MAX_VERTICES : dice_below(&d, PSS_MAX_VERTICES + 1);
-		fill(&p, camera, i == 1 ? PSS_MAX_VERTICES : dice_below(&d, PSS_MAX_VERTICES + 1), &d);
+		unsigned camera = i == 0 ? 0 : i == 1 ? PSS_VERTICES_MAX : dice_below(&d, PSS_VERTICES_MAX + 1);
+		fill(&p, camera, i == 1 ? PSS_VERTICES_MAX : dice_below(&d, PSS_VERTICES_MAX + 1), &d);
 		size_t n = pss_write(&p, bytes, sizeof bytes);
-		assert_int_equal(n, 8 + 64 * (p.used[0] + p.used[1]));
+		assert_int_equal(n, 8 + 64 * (p.block_count[0] + p.block_count[1]));
 		assert_int_equal(pss_write(&p, bytes, n), n);
 		assert_int_equal(pss_write(&p, bytes, n - 1), 0);
 		memset(&q, 0, sizeof q);
@@ -123,7 +123,7 @@ static void test_bytes(void **state)
 		assert_int_equal(pss_read(&q, bytes, n), 0);
 	}
 	/* Counts beyond the arrays, and counts whose product overflows. */
-	const uint32_t counts[] = {PSS_MAX_VERTICES + 1, 1000, 1u << 26, 1u << 31, UINT32_MAX};
+	const uint32_t counts[] = {PSS_VERTICES_MAX + 1, 1000, 1u << 26, 1u << 31, UINT32_MAX};
 	for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
 		for (int side = 0; side < 2; side++) {
 			fill(&p, 3, 2, &d);
@@ -132,7 +132,7 @@ static void test_bytes(void **state)
 				bytes[4 * side + k] = (uint8_t)(counts[i] >> (8 * k));
 			assert_int_equal(pss_read(&q, bytes, sizeof bytes), 0);
 		}
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		size_t n = dice_below(&d, 400);
 		for (size_t k = 0; k < n; k++)
 			bytes[k] = k % 4 && k < 8 ? 0 : (uint8_t)dice_below(&d, 256);
@@ -141,8 +141,8 @@ static void test_bytes(void **state)
 		if (!used)
 			continue;
 		for (int s = 0; s < SAMPLER_SIDES; s++)
-			for (unsigned v = 0; v < q.used[s]; v++)
-				for (int k = 0; k < SAMPLER_BLOCK; k++)
+			for (unsigned v = 0; v < q.block_count[s]; v++)
+				for (int k = 0; k < SAMPLER_BLOCK_SIZE; k++)
 					assert_true(q.u[s][v][k] >= 0 && q.u[s][v][k] < 1);
 	}
 }
@@ -152,7 +152,7 @@ static void test_bytes(void **state)
 static void test_bytes_stay(void **state)
 {
 	(void)state;
-	static const double u[SAMPLER_BLOCK] = {0.5, 0.25, 0x1p-53, 0, 0.75, 0, 0, 1 - 0x1p-53};
+	static const double u[SAMPLER_BLOCK_SIZE] = {0.5, 0.25, 0x1p-53, 0, 0.75, 0, 0, 1 - 0x1p-53};
 	static const uint8_t want[8 + 64] = {
 		1, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0,	  0,	0,    0,    0xe0, 0x3f, 0,    0,
 		0, 0, 0, 0, 0xd0, 0x3f, 0, 0, 0, 0, 0,	  0,	0xa0, 0x3c, 0,	  0,	0,    0,
@@ -160,7 +160,7 @@ static void test_bytes_stay(void **state)
 		0, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xef, 0x3f};
 	static struct pss_point p, q;
 	uint8_t bytes[sizeof want];
-	p.used[SIDE_CAMERA] = 1;
+	p.block_count[SIDE_CAMERA] = 1;
 	memcpy(p.u[SIDE_CAMERA][0], u, sizeof u);
 	assert_int_equal(pss_write(&p, bytes, sizeof bytes), sizeof bytes);
 	assert_memory_equal(bytes, want, sizeof want);
@@ -180,7 +180,7 @@ static double profile(double x, double y)
 
 static void add_splat(struct path_sample *out, double x, double y, double value)
 {
-	struct splat *s = &out->splats[out->count++];
+	struct splat *s = &out->splats[out->splat_count++];
 	*s = (struct splat){x * SIDE, y * SIDE, {value / 2, value / 3, value / 6}};
 	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
 }
@@ -188,9 +188,9 @@ static void add_splat(struct path_sample *out, double x, double y, double value)
 static void evaluate_plain(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
-	out->count = 0;
+	out->splat_count = 0;
 	out->intensity = 0;
-	out->classes = 0;
+	out->class_mask = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	add_splat(out, u[0], u[1], profile(u[0], u[1]));
 }
@@ -198,9 +198,9 @@ static void evaluate_plain(struct path_context *c, struct sampler *s, struct pat
 static void evaluate_lengths(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
-	out->count = 0;
+	out->splat_count = 0;
 	out->intensity = 0;
-	out->classes = 0;
+	out->class_mask = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	double x = u[0], y = u[1], value = profile(x, y);
 	for (unsigned v = 1; v < 12; v++) {
@@ -216,9 +216,9 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 static void evaluate_holes(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
-	out->count = 0;
+	out->splat_count = 0;
 	out->intensity = 0;
-	out->classes = 0;
+	out->class_mask = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	double x = u[0], y = u[1], w = u[5];
 	if (w < 0.4)
@@ -243,7 +243,7 @@ static void check_target(const char *name,
 	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate};
 	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
-	size_t steps = dice_count(400000);
+	size_t steps = dice_scaled_count(400000);
 	for (int k = 0; k < CELLS * CELLS; k++) {
 		enum { SUB = 200 };
 		exact[k] = 0;
@@ -315,13 +315,13 @@ static double magnitudes[2];
 static void evaluate_extremes(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
-	out->count = 0;
+	out->splat_count = 0;
 	out->intensity = 0;
-	out->classes = 1;
+	out->class_mask = 1;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	add_splat(out, u[0], u[1], 6 * magnitudes[u[5] < 0.5]);
 	add_splat(out, u[0], u[1], 0);
-	out->of_class[0] = out->intensity;
+	out->class_intensity[0] = out->intensity;
 }
 
 static void check_finite(const struct film_sums *film, double weight)
@@ -334,7 +334,7 @@ static void check_finite(const struct film_sums *film, double weight)
 		sum += film->xyz[i];
 	}
 	double classes[PATH_CLASSES];
-	chain_moments_end(&m, &second, classes);
+	chain_moments_end_lease(&m, &second, classes);
 	chain_moments_end_sequence(&m, &first);
 	assert_true(fabs(sum / weight - 1) < 1e-9);
 	assert_true(fabs((double)first / weight - 1) < 1e-6 && fabs((double)second / weight - 1) < 1e-6);
@@ -371,7 +371,7 @@ static void test_extreme_intensities(void **state)
 			blind += counters[COUNT_ACCEPTED] == 0;
 		}
 		chain_pss.flush(c);
-		assert_true(isfinite(sums.sum) && isfinite(sums.square) && sums.sum > 0);
+		assert_true(isfinite(sums.sum) && isfinite(sums.square_sum) && sums.sum > 0);
 		check_finite(&film, (double)(STEPS - blind));
 		film_sums_fini(&film);
 	}
@@ -427,11 +427,11 @@ static void test_resume(void **state)
 			parts->id++;
 			assert_false(chain_pss.resume(parts, &s));
 			parts->id--;
-			if (s.size > CHAIN_STATE_HEAD + 8) { /* a signalling NaN: refused without a trap */
+			if (s.size > CHAIN_STATE_HEADER_BYTES + 8) { /* a signalling NaN: refused without a trap */
 				const uint64_t nan = UINT64_C(0x7ff4000000000000);
 				struct chain_state bad = {mem_alloc(s.size, 1), s.size};
 				memcpy(bad.bytes, s.bytes, s.size);
-				memcpy(bad.bytes + CHAIN_STATE_HEAD + 8, &nan, sizeof nan);
+				memcpy(bad.bytes + CHAIN_STATE_HEADER_BYTES + 8, &nan, sizeof nan);
 				bool watched = fptrap_watch();
 				assert_false(chain_pss.resume(parts, &bad));
 				fptrap_unwatch(watched);

@@ -3,13 +3,13 @@
  * Energy redistribution. The image remains that of bdpt, whatever the share of light that chains spread: all of it,
  * or the part above a threshold. Both images are made of the same samples, so that they differ only by the noise of
  * the chains; test_integrators.c shows against `path` that bdpt, and with it erpt, is right. Statistics as in
- * tests/support/agree.h.
+ * tests/support/agreement.h.
  */
 #include "worker/render/chain/redistribution.h"
 #include "worker/render/film/sums.h"
 
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/halfvec/refract.h"
@@ -42,15 +42,15 @@ enum { SIDE = 32, GROUPS = 32, MAP_SAMPLES = 1 << 12 };
 
 static struct world *room_of_balls(void)
 {
-	return world_of_text(SIDE, SIDE,
-			     DEPTH ROOM LAMP("1.6") BALL("-0.7,-1.2,-0.6", "0.7", GLASS)
-				     BALL("0.8,-1.3,0", "0.6", METAL("0.2")));
+	return world_from_text(SIDE, SIDE,
+			       DEPTH ROOM LAMP("1.6") BALL("-0.7,-1.2,-0.6", "0.7", GLASS)
+				       BALL("0.8,-1.3,0", "0.6", METAL("0.2")));
 }
 
 /* Dark regions beside bright ones: light that moved between them in one direction only would be visible at once. */
 static struct world *lamp_over_ground(void)
 {
-	return world_of_text(
+	return world_from_text(
 		SIDE, SIDE,
 		DEPTH SENSOR("0,1.5,5", "0,0,0") "<shape type='rectangle'>" AT(
 			"<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.5'/>") "<bsdf type='diffuse'/></shape>" LAMP("1.6")
@@ -79,15 +79,15 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	t->w = w;
 	t->plan = (struct plan){.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	t->context = (struct path_context){.w = w,
-					   .window = film_window_of(&t->plan),
+					   .window = film_window_from_plan(&t->plan),
 					   .min_depth = 1,
 					   .max_depth = w->settings.max_depth,
-					   .roulette = PATH_ROULETTE,
-					   .unclassed = true,
+					   .max_survival = PATH_SURVIVAL_MAX,
+					   .skips_classes = true,
 					   .counters = t->counters,
 					   .refract = halfvec_refract};
-	assert_int_equal(brightness_of_samples(&t->map, &t->context, path_trace_both_ways, seed, RNG_BRIGHTNESS, 0,
-					       MAP_SAMPLES, &e),
+	assert_int_equal(brightness_init_from_samples(&t->map, &t->context, path_trace_bidirectional, seed,
+						      RNG_BRIGHTNESS, 0, MAP_SAMPLES, &e),
 			 0);
 	assert_int_equal(film_sums_init(&t->film, &t->plan, &w->settings, &e), 0);
 	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
@@ -110,16 +110,16 @@ static void evaluate(struct trial *t, uint64_t seed, uint64_t index, struct path
 	struct sampler_random s;
 	sampler_random_init(&s, seed, RNG_ERPT, index, 0);
 	t->context.split = split;
-	path_trace_both_ways(&t->context, &s.base, &t->sample);
-	for (uint32_t k = 0; k < t->sample.count; k++)
+	path_trace_bidirectional(&t->context, &s.base, &t->sample);
+	for (uint32_t k = 0; k < t->sample.splat_count; k++)
 		film_sums_splat(film, &t->sample.splats[k], 1.0 / (SIDE * SIDE));
 }
 
 static void trial_sample(struct trial *t, uint64_t seed, uint64_t index)
 {
 	evaluate(t, seed, index, redistribution_begin(t->r, index, 0), &t->film);
-	t->intensity += t->sample.intensity + redistribution_taken(t->r);
-	t->taken += redistribution_taken(t->r);
+	t->intensity += t->sample.intensity + redistribution_spread_intensity(t->r);
+	t->taken += redistribution_spread_intensity(t->r);
 }
 
 /* Evaluates the same sample as bdpt does, and returns its intensity. */
@@ -130,27 +130,27 @@ static double unspread_sample(struct trial *t, uint64_t seed, uint64_t index)
 }
 
 /* Stores the means of the blocks of the film and of the whole film. */
-static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREE_CELLS + 1])
+static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREEMENT_CELLS + 1])
 {
-	double sum[AGREE_CELLS + 1] = {0};
+	double sum[AGREEMENT_CELLS + 1] = {0};
 	for (unsigned y = 0; y < SIDE; y++)
 		for (unsigned x = 0; x < SIDE; x++) {
 			const double *p = &f->xyz[((size_t)y * SIDE + x) * 3];
-			unsigned cell = y * AGREE_BLOCKS / SIDE * AGREE_BLOCKS + x * AGREE_BLOCKS / SIDE;
+			unsigned cell = y * AGREEMENT_BLOCKS / SIDE * AGREEMENT_BLOCKS + x * AGREEMENT_BLOCKS / SIDE;
 			sum[cell] += p[0] + p[1] + p[2];
-			sum[AGREE_CELLS] += p[0] + p[1] + p[2];
+			sum[AGREEMENT_CELLS] += p[0] + p[1] + p[2];
 		}
-	for (int c = 0; c <= AGREE_CELLS; c++)
-		mean[c] = sum[c] / (double)spp / (SIDE * SIDE) * (c < AGREE_CELLS ? AGREE_CELLS : 1);
+	for (int c = 0; c <= AGREEMENT_CELLS; c++)
+		mean[c] = sum[c] / (double)spp / (SIDE * SIDE) * (c < AGREEMENT_CELLS ? AGREEMENT_CELLS : 1);
 }
 
 /* Stores for each group and cell 1 + the difference of the two images, divided by bdpt's mean in the cell. Returns
  * the number of mutations per sample. */
 static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule,
-		      uint32_t light_every, uint64_t spp, struct agree_image *out)
+		      uint32_t light_every, uint64_t spp, struct agreement_image *out)
 {
 	static struct trial t;
-	double mutations = 0, unspread[GROUPS][AGREE_CELLS + 1], all[AGREE_CELLS + 1] = {0};
+	double mutations = 0, unspread[GROUPS][AGREEMENT_CELLS + 1], all[AGREEMENT_CELLS + 1] = {0};
 	memset(out, 0, sizeof *out);
 	out->groups = GROUPS;
 	for (uint32_t g = 0; g < GROUPS; g++) {
@@ -162,13 +162,13 @@ static double compare(const char *test, const struct world *w, const struct redi
 		}
 		take_means(&t.film, spp, out->mean[g]);
 		take_means(&t.unspread, spp, unspread[g]);
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			all[c] += unspread[g][c] / GROUPS;
 		mutations += (double)t.counters[COUNT_SPREAD_MUTATIONS] / (double)(spp * SIDE * SIDE * GROUPS);
 		trial_end(&t);
 	}
 	for (uint32_t g = 0; g < GROUPS; g++)
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			out->mean[g][c] = 1 + (out->mean[g][c] - unspread[g][c]) / all[c];
 	return mutations;
 }
@@ -176,20 +176,20 @@ static double compare(const char *test, const struct world *w, const struct redi
 static void expect_the_same(const char *test, struct world *w, const struct redistribution_rule *rule,
 			    uint32_t light_every, uint64_t spp)
 {
-	static struct agree_image image;
-	assert_true(compare(test, w, rule, light_every, test_scaled() ? spp / 8 : spp, &image) > 1);
-	agree_expect(test, &image, 1);
+	static struct agreement_image image;
+	assert_true(compare(test, w, rule, light_every, test_is_scaled() ? spp / 8 : spp, &image) > 1);
+	agreement_check_constant(test, &image, 1);
 	world_free(w);
 }
 
 static void all_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
-	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 8, .length = 2};
+	const struct redistribution_rule all = {.threshold = 1e-6, .mutations_per_unit = 8, .chain_length = 2};
 	expect_the_same(__func__, lamp_over_ground(), &all, 1, 16);
 }
 
-static const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
+static const struct redistribution_rule some = {.threshold = 0.5, .mutations_per_unit = 8, .chain_length = 2};
 
 /* Most paths lie near the threshold, where the number of chains varies. */
 static void some_light_by_chains_is_the_same_image(void **state)
@@ -210,16 +210,16 @@ static void a_light_sub_path_in_one_of_four_samples_is_the_same_image(void **sta
 static void no_splat_is_brighter_than_the_threshold(void **state)
 {
 	(void)state;
-	const struct redistribution_rule rule = {.threshold = 0.5, .mutations = 1, .length = 1};
+	const struct redistribution_rule rule = {.threshold = 0.5, .mutations_per_unit = 1, .chain_length = 1};
 	static struct trial t;
 	struct world *w = room_of_balls();
 	for (uint32_t light_every = 1; light_every <= 4; light_every *= 4) {
 		double most = 0;
 		trial_begin(&t, w, &rule, light_every, stats_seed(__func__));
-		t.context.roulette = 0;
+		t.context.max_survival = 0;
 		for (uint64_t i = 0; i < 4096; i++) {
 			trial_sample(&t, stats_seed(__func__), i);
-			for (uint32_t k = 1; k < t.sample.count; k++) {
+			for (uint32_t k = 1; k < t.sample.splat_count; k++) {
 				const struct splat *s = &t.sample.splats[k];
 				most = fmax(most,
 					    (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&t.map, s->x, s->y));
@@ -236,14 +236,14 @@ static void no_splat_is_brighter_than_the_threshold(void **state)
 static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 {
 	(void)state;
-	const struct redistribution_rule endless = {.threshold = 0.5, .mutations = 1e12, .length = 3};
+	const struct redistribution_rule endless = {.threshold = 0.5, .mutations_per_unit = 1e12, .chain_length = 3};
 	static struct trial t;
 	struct world *w = room_of_balls();
 	trial_begin(&t, w, &endless, 1, stats_seed(__func__));
 	for (uint64_t i = 0; i < 256; i++)
 		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.counters[COUNT_SPREAD] > 16);
-	assert_int_equal(t.counters[COUNT_SPREAD_MUTATIONS], t.counters[COUNT_SPREAD] * 3 * REDISTRIBUTION_CHAINS);
+	assert_int_equal(t.counters[COUNT_SPREAD_MUTATIONS], t.counters[COUNT_SPREAD] * 3 * REDISTRIBUTION_CHAINS_MAX);
 	trial_end(&t);
 	world_free(w);
 }
@@ -254,19 +254,19 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 static void nothing_is_lost_of_the_sum(void **state)
 {
 	(void)state;
-	const struct redistribution_rule half = {.threshold = 0.1, .mutations = 0.1, .length = 2};
+	const struct redistribution_rule half = {.threshold = 0.1, .mutations_per_unit = 0.1, .chain_length = 2};
 	static struct trial t;
 	struct world *w = room_of_balls();
 	trial_begin(&t, w, &half, 1, stats_seed(__func__));
-	t.context.unclassed = false;
+	t.context.skips_classes = false;
 	double whole = 0, of_class[PATH_CLASSES] = {0}, taken = 0;
 	uint64_t rays = 0;
 	for (uint64_t i = 0; i < 512; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
-		rays += batch_rays(t.counters);
+		rays += batch_ray_count(t.counters);
 		whole += unspread_sample(&t, stats_seed(__func__), i);
 		for (int k = 0; k < PATH_CLASSES; k++)
-			of_class[k] += t.sample.of_class[k];
+			of_class[k] += t.sample.class_intensity[k];
 	}
 	for (int k = 0; k < PATH_CLASSES; k++) {
 		assert_true(t.classes[k] <= of_class[k] * (1 + 1e-9));
@@ -285,10 +285,10 @@ static void nothing_is_lost_of_the_sum(void **state)
 static void what_is_seen_directly_is_not_spread(void **state)
 {
 	(void)state;
-	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 1, .length = 1};
+	const struct redistribution_rule all = {.threshold = 1e-6, .mutations_per_unit = 1, .chain_length = 1};
 	static struct trial t;
 	/* clang-format off */
-	struct world *w = world_of_text(SIDE, SIDE,
+	struct world *w = world_from_text(SIDE, SIDE,
 		DEPTH
 		SENSOR("0,0,5", "0,0,0")
 		"<emitter type='constant'><rgb name='radiance' value='1'/></emitter>"

@@ -21,7 +21,7 @@ enum { CELLS = 16 }; /* squared */
 
 static struct world *sphere_light(const char *flip)
 {
-	return world_of_text(
+	return world_from_text(
 		8, 8,
 		SENSOR("0,0,9",
 		       "0,0,0") "<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/>"
@@ -41,7 +41,7 @@ static struct world *mesh_light(void)
 		"f 1 2 3\nf 4 5 6\nf 7 8 9\n";
 	const struct memory_file files[] = {
 		{"three.xml", scene, sizeof scene - 1}, {"three.obj", three, sizeof three - 1}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 static void check_counts(const char *what, const uint64_t *counts, const double *expected, size_t cells)
@@ -116,10 +116,10 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 	static uint64_t counts[CELLS * CELLS];
 	static double expected[CELLS * CELLS];
 	memset(counts, 0, sizeof counts);
-	struct dice d = dice_of(what);
-	size_t n = dice_count(200000), taken = 0;
+	struct dice d = dice_for_test(what);
+	size_t n = dice_scaled_count(200000), taken = 0;
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		struct emitter_point x = {0};
 		bool ok = toward ? emitter_sample_toward(s->em, s->ref, u, &x, &pdf)
 				 : s->em->ops->sample_point(s->em, u, &x, &pdf);
@@ -170,10 +170,10 @@ static void check_cone(const char *what, const struct seen *s)
 	vec3 to = vec3_sub(s->shape->center, s->ref);
 	double distance = vec3_length(to);
 	vec3 axis = vec3_scale(1 / distance, to);
-	struct dice d = dice_of(what);
-	size_t n = dice_count(200000), refused = 0;
+	struct dice d = dice_for_test(what);
+	size_t n = dice_scaled_count(200000), refused = 0;
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		struct emitter_point x;
 		if (!emitter_sample_toward(s->em, s->ref, u, &x, &pdf)) {
 			refused++;
@@ -244,12 +244,12 @@ static void check_direction(const char *what, struct world *w, double back)
 	memset(counts, 0, sizeof counts);
 	struct seen s = {&w->emitters[0], NULL, vec3_normalize((vec3){0.3, -0.8, 0.4})};
 	struct emitter_point x = {.n = s.ref};
-	struct wavelengths wl = {.grey = true};
-	struct dice d = dice_of(what);
-	size_t n = dice_count(400000);
+	struct wavelengths wl = {.is_grey = true};
+	struct dice d = dice_for_test(what);
+	size_t n = dice_scaled_count(400000);
 	double behind = 0;
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		vec3 dir;
 		assert_true(s.em->ops->sample_direction(s.em, &x, u, &dir, &pdf));
 		assert_true(fabs(vec3_length(dir) - 1) < 1e-12);
@@ -278,19 +278,19 @@ static void test_direction(void **state)
 {
 	(void)state;
 	check_direction("direction", sphere_light("false"), 0);
-	check_direction("direction, two sides of a rectangle", world_of_text(8, 8, TWO_SIDED("rectangle")), 0.5);
-	check_direction("direction, two sides of a cube", world_of_text(8, 8, TWO_SIDED("cube")), 0.0625);
+	check_direction("direction, two sides of a rectangle", world_from_text(8, 8, TWO_SIDED("rectangle")), 0.5);
+	check_direction("direction, two sides of a cube", world_from_text(8, 8, TWO_SIDED("cube")), 0.0625);
 	check_direction(
 		"direction, two sides of a dome",
-		world_of_text(
+		world_from_text(
 			8, 8,
 			SENSOR("0,0,3",
 			       "0,0,0") "<shape type='sphere'><float name='radius' value='4'/><emitter type='area'>"
 					"<boolean name='twosided' value='true'/></emitter></shape>"),
 		0.5);
 	struct world *w[2] = {
-		world_of_text(8, 8, TWO_SIDED("cube")),
-		world_of_text(
+		world_from_text(8, 8, TWO_SIDED("cube")),
+		world_from_text(
 			8, 8,
 			SENSOR("0,0,3", "0,0,0") "<shape type='cube'><emitter type='area'/></shape>"
 						 "<shape type='sphere'><float name='radius' value='4'/></shape>")};
@@ -321,17 +321,17 @@ static void test_mesh(void **state)
 		total += area[i];
 	}
 	assert_true(area[2] > 50 * area[1] && area[1] > 5 * area[0]);
-	struct dice d = dice_of("mesh");
-	size_t n = dice_count(1000000);
+	struct dice d = dice_for_test("mesh");
+	size_t n = dice_scaled_count(1000000);
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		struct emitter_point x;
 		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf)
 				   : emitter_sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
-		assert_true(x.where.prim < 3);
+		assert_true(x.texture_point.prim < 3);
 		assert_true(fabs(pdf * total - 1) < 1e-12 && fabs(em->ops->pdf_point(em, &x) * total - 1) < 1e-12);
 		assert_true(emitter_pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
-		vec3 *c = corner[x.where.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
+		vec3 *c = corner[x.texture_point.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
 		double l2 = vec3_dot(normal, normal), b[3];
 		assert_true(fabs(vec3_dot(vec3_sub(x.p, c[0]), normal)) < 1e-12 * sqrt(l2));
 		assert_true(vec3_length(vec3_sub(x.n, vec3_scale(1 / sqrt(l2), normal))) < 1e-12);
@@ -341,7 +341,7 @@ static void test_mesh(void **state)
 			       l2;
 			assert_true(b[k] > -1e-9);
 		}
-		counts[4 * x.where.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
+		counts[4 * x.texture_point.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
 	}
 	for (int i = 0; i < 12; i++)
 		expected[i] = (double)n * area[i / 4] / (4 * total);
@@ -377,7 +377,7 @@ static void test_corners(void **state)
 static void test_texture_coordinates(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		8, 8,
 		SENSOR("0,0,9",
 		       "0,0,0") "<shape type='sphere'><transform name='to_world'>"
@@ -395,7 +395,8 @@ static void test_texture_coordinates(void **state)
 		for (int k = 0; k < 2; k++) {
 			surface_on_sphere(s, (struct prim_ref){0, 0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
 					  &there);
-			assert_true(fabs(there.u - x[k].where.u) < 1e-9 && fabs(there.v - x[k].where.v) < 1e-9);
+			assert_true(fabs(there.u - x[k].texture_point.u) < 1e-9 &&
+				    fabs(there.v - x[k].texture_point.v) < 1e-9);
 		}
 	}
 	world_free(w);

@@ -36,36 +36,36 @@ static void test_where_the_sun_stands(void **state)
 	for (size_t i = 0; i < 3; i++) {
 		struct daylight_time t = {.latitude = 50,
 					  .longitude = 0,
-					  .zone = 0,
+					  .utc_offset = 0,
 					  .hour = 12,
 					  .year = 2023,
 					  .month = days[i].month,
 					  .day = days[i].day};
-		vec3 noon = daylight_position(&t);
+		vec3 noon = daylight_sun_direction(&t);
 		assert_true(fabs(vec3_length(noon) - 1) < 1e-12);
 		assert_true(fabs(asin(noon.y) * 180 / PI - (40 + days[i].declination)) < 1);
 		assert_true(noon.z > 0.4 && fabs(noon.x) < 0.08);
 		t.hour = 9;
-		assert_true(daylight_position(&t).x > 0.4);
+		assert_true(daylight_sun_direction(&t).x > 0.4);
 		t.hour = 15;
-		assert_true(daylight_position(&t).x < -0.4);
+		assert_true(daylight_sun_direction(&t).x < -0.4);
 	}
 	/* Tokyo, 139.7 degrees east: noon is 19 minutes before 12 o'clock, minus the equation of time. */
 	struct daylight_time t = {.latitude = 35.7,
 				  .longitude = 139.7,
-				  .zone = 9,
+				  .utc_offset = 9,
 				  .hour = 11 + 46.0 / 60,
 				  .year = 2010,
 				  .month = 7,
 				  .day = 10};
-	assert_true(fabs(daylight_position(&t).x) < 0.02);
+	assert_true(fabs(daylight_sun_direction(&t).x) < 0.02);
 }
 
 /* By the Astronomical Almanac's approximate formulas (section C, "Low precision formulas for the Sun"), whose
  * coefficients differ: hour angle from mean longitude, anomaly and Greenwich sidereal time, all in degrees. */
 static vec3 by_the_almanac(const struct daylight_time *t, double days)
 {
-	double d = days + (t->hour - t->zone) / 24, r = PI / 180;
+	double d = days + (t->hour - t->utc_offset) / 24, r = PI / 180;
 	double g = (357.529 + 0.98560028 * d) * r, q = 280.459 + 0.98564736 * d;
 	double along = (q + 1.915 * sin(g) + 0.020 * sin(2 * g)) * r, tilt = (23.439 - 0.00000036 * d) * r;
 	double ascension = atan2(cos(tilt) * sin(along), cos(along)), declination = asin(sin(tilt) * sin(along));
@@ -87,7 +87,8 @@ static void test_the_almanac(void **state)
 		{{0, -78.5, -5, 17, 2004, 2, 29}, 1520},	 {{-54.8, -68.3, -3, 12.25, 2049, 3, 1}, 17957},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		vec3 here = daylight_position(&cases[i].t), there = by_the_almanac(&cases[i].t, cases[i].days - 0.5);
+		vec3 here = daylight_sun_direction(&cases[i].t),
+		     there = by_the_almanac(&cases[i].t, cases[i].days - 0.5);
 		double off = vec3_length(vec3_sub(here, there)) * 180 / PI;
 		print_message("row %zu: %.4f degrees apart, %.1f above the horizon\n", i, off, asin(here.y) * 180 / PI);
 		assert_true(off < 0.02);
@@ -99,30 +100,30 @@ static void test_how_bright_it_is(void **state)
 {
 	(void)state;
 	double rgb[3], sun = 30 * PI / 180;
-	daylight_sun(3, sun, rgb);
+	daylight_sun_radiance(3, sun, rgb);
 	double solid = PI * DAYLIGHT_SUN_RADIUS * DAYLIGHT_SUN_RADIUS, lux = 683 * CIE_Y_SUM;
 	double direct = luminance(rgb) * lux * solid;
 	/* At noon on a clear day, the sun gives 70 to 110 klx, and the sky 10 to 25, more in the model. */
 	assert_true(direct > 7e4 && direct < 1.1e5);
-	struct daylight d = daylight_of(3, (const double[3]){0.2, 0.2, 0.2}, sun);
+	struct daylight d = daylight_make(3, (const double[3]){0.2, 0.2, 0.2}, sun);
 	double sky = 0;
 	enum { N = 200 };
 	for (int i = 0; i < N; i++)
 		for (int k = 0; k < N; k++) {
 			double theta = 0.5 * PI * (i + 0.5) / N, phi = 2 * PI * (k + 0.5) / N;
 			double gamma = acos(cos(theta) * cos(sun) + sin(theta) * sin(sun) * cos(phi));
-			daylight_sky(&d, theta, gamma, rgb);
+			daylight_sky_radiance(&d, theta, gamma, rgb);
 			sky += luminance(rgb) * lux * cos(theta) * sin(theta) * (0.5 * PI / N) * (2 * PI / N);
 		}
 	print_message("sun %.0f lx, sky %.0f lx\n", direct, sky);
 	assert_true(sky > 8e3 && sky < 4e4);
 	/* Far from the sun the sky is blue; below the horizon it is black. */
-	daylight_sky(&d, 60 * PI / 180, 90 * PI / 180, rgb);
+	daylight_sky_radiance(&d, 60 * PI / 180, 90 * PI / 180, rgb);
 	assert_true(rgb[2] > 1.3 * rgb[0]);
-	daylight_sky(&d, 1.6, 1, rgb);
+	daylight_sky_radiance(&d, 1.6, 1, rgb);
 	assert_true(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
 	/* A low sun in haze is red. */
-	daylight_sun(8, 85 * PI / 180, rgb);
+	daylight_sun_radiance(8, 85 * PI / 180, rgb);
 	assert_true(rgb[0] > 3 * rgb[2]);
 }
 
@@ -159,9 +160,9 @@ static void test_the_model(void **state)
 					    {0.0193339, 0.1191920, 0.9503041}};
 	for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
 		double ground = known[i].albedo, rgb[3];
-		struct daylight d = daylight_of(known[i].turbidity, (const double[3]){ground, ground, ground},
-						known[i].sun * PI / 180);
-		daylight_sky(&d, known[i].angle * PI / 180, known[i].gamma * PI / 180, rgb);
+		struct daylight d = daylight_make(known[i].turbidity, (const double[3]){ground, ground, ground},
+						  known[i].sun * PI / 180);
+		daylight_sky_radiance(&d, known[i].angle * PI / 180, known[i].gamma * PI / 180, rgb);
 		for (int k = 0; k < 3; k++) {
 			double x = 0;
 			for (int c = 0; c < 3; c++)
@@ -175,7 +176,7 @@ static void test_the_model(void **state)
 static int make_emitter(struct arena *a, const char *text, bool dialect_3, struct emitter *em, struct error *e)
 {
 	struct scene_node *n = node_make(a, PLUGIN_EMITTER, text);
-	const struct emitter_build build = {.arena = a, .dialect_3 = dialect_3, .scale = 1};
+	const struct emitter_build build = {.arena = a, .dialect_3 = dialect_3, .world_scale = 1};
 	return emitter_create(em, n, &build, e);
 }
 
@@ -185,11 +186,11 @@ static void test_picture(void **state)
 	(void)state;
 	static const char *const texts[] = {"sun", "sun sun_radius_scale=4", "sun sun_radius_scale=0",
 					    "sunsky sun_scale=1 sky_scale=0 scale=7"};
-	const struct wavelengths grey = {.grey = true};
+	const struct wavelengths grey = {.is_grey = true};
 	double expected[3];
 	struct daylight_time t = {35.6894, 139.6917, 9, 15, 2010, 7, 10};
-	vec3 at = daylight_position(&t);
-	daylight_sun(3, acos(at.y), expected);
+	vec3 at = daylight_sun_direction(&t);
+	daylight_sun_radiance(3, acos(at.y), expected);
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		struct arena a = {0};
 		struct emitter em;
@@ -220,13 +221,13 @@ static void test_picture(void **state)
 static double seen_at(const struct emitter *em, double angle, double azimuth, const struct wavelengths *w)
 {
 	vec3 d = {sin(angle) * sin(azimuth), cos(angle), sin(angle) * cos(azimuth)};
-	const struct emitter_point x = {.p = d, .infinite = true};
+	const struct emitter_point x = {.p = d, .is_infinite = true};
 	return em->ops->radiance(em, &x, vec3_neg(d), w).v[0];
 }
 
 static double radiance_seen(const struct emitter *em, double angle, double azimuth)
 {
-	return seen_at(em, angle, azimuth, &(struct wavelengths){.grey = true});
+	return seen_at(em, angle, azimuth, &(struct wavelengths){.is_grey = true});
 }
 
 /* A brighter ground makes the sky brighter, and a green one its green; the defaults of the dialects differ. */
@@ -285,8 +286,8 @@ static void test_below_the_horizon(void **state)
 	arena_fini(&a);
 }
 
-/* The parameters that scale sky and sun: in 0.6, `scale` is a default, and the only scale of `sky` and `sun`; in 3.x,
- * it is a further factor. */
+/* The parameters that scale sky and sun: in 0.6, `world_scale` is a default, and the only scale of `sky` and `sun`;
+ * in 3.x, it is a further factor. */
 static void test_scales(void **state)
 {
 	(void)state;
@@ -310,8 +311,8 @@ static void test_scales(void **state)
 		assert_int_equal(make_emitter(&a, "sky", skies[i].dialect_3, &one, &e), 0);
 		assert_int_equal(make_emitter(&a, skies[i].text, skies[i].dialect_3, &em, &e), 0);
 		vec3 at = skies[i].dialect_3 ? (vec3){0.3, -0.5, 0.8} : (vec3){0.3, 0.8, 0.5};
-		const struct emitter_point x = {.p = vec3_normalize(at), .infinite = true};
-		const struct wavelengths grey = {.grey = true};
+		const struct emitter_point x = {.p = vec3_normalize(at), .is_infinite = true};
+		const struct wavelengths grey = {.is_grey = true};
 		double l = one.ops->radiance(&one, &x, vec3_neg(x.p), &grey).v[0];
 		double due = skies[i].factor * l, is = em.ops->radiance(&em, &x, vec3_neg(x.p), &grey).v[0];
 		if (!(l > 0 && fabs(is - due) <= 0.03 * due)) /* the maps have different resolutions */
@@ -324,7 +325,7 @@ static void test_scales(void **state)
 static vec3 middle_of(const struct emitter *em)
 {
 	enum { N = 200 };
-	const struct wavelengths grey = {.grey = true};
+	const struct wavelengths grey = {.is_grey = true};
 	vec3 mean = {0, 0, 0};
 	for (int k = 0; k < N * N; k++) {
 		double u[2] = {(k % N + 0.5) / N, (k / N + 0.5) / N}, pdf;
@@ -344,7 +345,7 @@ static void test_which_way_is_north(void **state)
 	struct emitter old, recent, low;
 	struct error e = {""};
 	struct daylight_time t = {35.6894, 139.6917, 9, 15, 2010, 7, 10};
-	vec3 d = daylight_position(&t);
+	vec3 d = daylight_sun_direction(&t);
 	assert_true(d.x < -0.6 && d.z > 0.02); /* in the west, a little to the south */
 	assert_int_equal(make_emitter(&a, "sun", false, &old, &e), 0);
 	assert_int_equal(make_emitter(&a, "sun", true, &recent, &e), 0);
@@ -364,7 +365,7 @@ static int make_under(struct arena *a, const char *type, vec3 sun, struct emitte
 	struct property direction = {.name = "sun_direction", .value = {.type = VALUE_POINT, .as.point = sun}};
 	n->properties = &direction;
 	n->property_count = 1;
-	return emitter_create(em, n, &(struct emitter_build){.arena = a, .scale = 1}, e);
+	return emitter_create(em, n, &(struct emitter_build){.arena = a, .world_scale = 1}, e);
 }
 
 /* As in Mitsuba, the sun may be on the horizon: the sky is bright, and the upper half of the sun is visible. */
@@ -411,7 +412,7 @@ static void test_refused(void **state)
 	struct error e = {""};
 	struct scene_node *n = node_make(&a, PLUGIN_EMITTER, "sky");
 	node_add_ref(&a, n, "albedo", node_make(&a, PLUGIN_TEXTURE, "checkerboard"));
-	const struct emitter_build build = {.arena = &a, .scale = 1};
+	const struct emitter_build build = {.arena = &a, .world_scale = 1};
 	assert_true(emitter_create(&em, n, &build, &e) < 0 && strstr(e.text, "textured albedo"));
 	arena_fini(&a);
 }

@@ -19,9 +19,9 @@
 
 #define LEVEL 1e-6
 
-static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths grey = {.is_grey = true};
 /* The spectrum of intensity 1. */
-static const struct color white = {.shape = COLOR_SHAPE_D65, .scale = 1, .d65 = true};
+static const struct color white = {.kind = COLOR_KIND_D65, .scale = 1, .times_d65 = true};
 
 /* A sphere at (10, 0, 0) of radius 4, so that the world is translated and scaled by a power of two. */
 static struct world *world_of(const char *version, const char *emitters)
@@ -33,20 +33,20 @@ static struct world *world_of(const char *version, const char *emitters)
 					   "<float name='radius' value='4'/></shape></scene>",
 		 version, emitters);
 	const struct memory_file files[] = {{"s.xml", text, strlen(text)}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 static struct emitter_point only_point(const struct emitter *em)
 {
 	struct emitter_point x, y;
 	double pdf, toward;
-	assert_true(em->delta && !em->ops->point_inverse);
+	assert_true(em->is_delta && !em->ops->point_inverse);
 	assert_true(em->ops->sample_point(em, (double[]){0.3, 0.9}, &x, &pdf));
 	assert_true(emitter_sample_toward(em, (vec3){1, 2, 3}, (double[]){0.8, 0.1}, &y, &toward));
 	assert_true(pdf == 1 && toward == 1 && em->ops->pdf_point(em, &x) == 1 &&
 		    emitter_pdf_toward(em, (vec3){1, 2, 3}, &x) == 1);
-	assert_true(x.p.x == y.p.x && x.p.y == y.p.y && x.p.z == y.p.z && x.infinite == y.infinite);
-	assert_true(x.infinite == em->infinite);
+	assert_true(x.p.x == y.p.x && x.p.y == y.p.y && x.p.z == y.p.z && x.is_infinite == y.is_infinite);
+	assert_true(x.is_infinite == em->is_infinite);
 	return x;
 }
 
@@ -86,10 +86,11 @@ static void test_places(void **state)
 		const struct emitter *em = &w->emitters[0];
 		struct emitter_point x = only_point(em);
 		assert_true(near(x.p, vec3_scale(w->scale, vec3_sub((vec3){3, 4, -5}, w->center))));
-		assert_true(vec3_length(x.n) == 0 && !x.infinite && w->environment == -1);
+		assert_true(vec3_length(x.n) == 0 && !x.is_infinite && w->environment == -1);
 		vec3 axis = vec3_normalize((vec3){7, -4, 5});
 		assert_true(fabs(em->ops->radiance(em, &x, axis, &grey).v[0] / (w->scale * w->scale) - 6) < 1e-12);
-		assert_true(em->power > 0 && em->brightest > 6 * w->scale * w->scale && isfinite(em->brightest));
+		assert_true(em->power > 0 && em->brightness_bound > 6 * w->scale * w->scale &&
+			    isfinite(em->brightness_bound));
 		world_free(w);
 	}
 	for (size_t i = 0; i < sizeof parallel / sizeof *parallel; i++) {
@@ -97,7 +98,7 @@ static void test_places(void **state)
 		const struct emitter *em = &w->emitters[0];
 		struct emitter_point x = only_point(em);
 		/* Towards the light. */
-		assert_true(x.infinite && near(x.p, (vec3){0, 0.6, -0.8}) && w->environment == -1);
+		assert_true(x.is_infinite && near(x.p, (vec3){0, 0.6, -0.8}) && w->environment == -1);
 		assert_true(em->ops->radiance(em, &x, vec3_neg(x.p), &grey).v[0] == 6);
 		assert_true(fabs(em->power / (M_PI * w->radius * w->radius) - 6 * color_mean(&white)) < 1e-9);
 		world_free(w);
@@ -112,10 +113,10 @@ static void check_directions(const char *name, const struct emitter *em, vec3 ax
 	double expected[CELLS * CELLS], sum = 0, total = 0;
 	struct emitter_point x = only_point(em);
 	struct frame f = frame_around(axis);
-	struct dice d = dice_of(name);
-	size_t n = dice_count(100000);
+	struct dice d = dice_for_test(name);
+	size_t n = dice_scaled_count(100000);
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		vec3 w;
 		assert_true(em->ops->sample_direction(em, &x, u, &w, &pdf));
 		assert_true(fabs(vec3_length(w) - 1) < 1e-14);
@@ -208,7 +209,7 @@ static bool has_effect(const struct world *w, const char *effect)
 {
 	struct render_summary s;
 	world_summary(w, &s);
-	return render_effect_on(&s, effect);
+	return render_effect_is_on(&s, effect);
 }
 
 static void test_world(void **state)
@@ -231,24 +232,24 @@ static void test_refusals(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	world_refused(
+	world_check_refused(
 		"<emitter type='point'>"
 			"<point name='position' x='1' y='0' z='0'/>"
 			"<transform name='to_world'><translate x='1'/></transform>"
 		"</emitter>",
 		"position and to_world are both given");
 	/* clang-format on */
-	world_refused(
+	world_check_refused(
 		"<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
 		"direction and to_world are both given");
-	world_refused("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
-		      "a direction of length 0");
-	world_refused("<emitter type='spot'><float name='beam_width' value='30'/></emitter>",
-		      "exceeds cutoff_angle=20");
-	world_refused("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
-		      "may have one environment only");
-	world_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot be inside a shape");
-	world_refused("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
+	world_check_refused("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
+			    "a direction of length 0");
+	world_check_refused("<emitter type='spot'><float name='beam_width' value='30'/></emitter>",
+			    "exceeds cutoff_angle=20");
+	world_check_refused("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
+			    "may have one environment only");
+	world_check_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot be inside a shape");
+	world_check_refused("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
 }
 
 int main(void)

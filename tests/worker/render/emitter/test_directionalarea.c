@@ -9,7 +9,7 @@
  * 1e-4.
  */
 #include "tests/support/bodies.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -24,12 +24,12 @@
 static const double power = 2.5, half_angle = 1e-3;
 #define BEAM "<emitter type='directionalarea'><float name='radiance' value='2.5'/></emitter>"
 #define EYE SENSOR("0,0,9", "0,0,0")
-static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths grey = {.is_grey = true};
 
 /* A world with one emitting shape, with the given contents. */
 static struct world *beam(const char *shape, const char *more)
 {
-	return world_of_text(8, 8, EYE "<shape type='%s'>%s" BEAM "</shape>", shape, more);
+	return world_from_text(8, 8, EYE "<shape type='%s'>%s" BEAM "</shape>", shape, more);
 }
 
 /* A plane that is tilted and far from the origin, so that its corners are rounded. */
@@ -49,9 +49,9 @@ static double emitted(const struct emitter *em, const struct emitter_point *x, v
 static void check_directions(const struct emitter *em, const char *name)
 {
 	enum { RINGS = 2000 };
-	struct dice d = dice_of(name);
-	for (size_t i = 0, n = dice_count(20000); i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, v[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+	struct dice d = dice_for_test(name);
+	for (size_t i = 0, n = dice_scaled_count(20000); i < n; i++) {
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, v[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		struct emitter_point x;
 		vec3 w;
 		assert_true(em->ops->sample_point(em, u, &x, &pdf));
@@ -73,7 +73,7 @@ static void check_directions(const struct emitter *em, const char *name)
 		sum += em->ops->pdf_direction(em, &x, w) * ring;
 		flux += emitted(em, &x, w) * cos(angle) * ring;
 		assert_true(angle < 1.001 * half_angle || emitted(em, &x, w) == 0);
-		assert_true(emitted(em, &x, w) <= em->brightest);
+		assert_true(emitted(em, &x, w) <= em->brightness_bound);
 	}
 	print_message("%s: density %.6f, power per area %.6f\n", name, sum, flux);
 	assert_true(fabs(sum - 1) < 1e-4 && fabs(flux / power - 1) < 1e-4);
@@ -96,10 +96,10 @@ static struct stats_mean irradiance(const struct emitter *em, vec3 ref, vec3 n, 
 {
 	enum { GROUPS = 16 };
 	double means[GROUPS] = {0};
-	struct dice d = dice_of(name);
-	size_t each = dice_count(2500);
+	struct dice d = dice_for_test(name);
+	size_t each = dice_scaled_count(2500);
 	for (size_t i = 0; i < each * GROUPS; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, pdf;
 		struct emitter_point x;
 		if (!emitter_sample_toward(em, ref, u, &x, &pdf))
 			continue;
@@ -119,7 +119,7 @@ static void expect_irradiance(const struct emitter *em, vec3 ref, vec3 n, double
 	print_message("%s: %.5f +- %.5f, expected %.5f\n", name, m.mean, m.error, expected);
 	if (fabs(m.mean - expected) > 8 * m.error + 1e-4 * expected)
 		fail_msg("%s: %g +- %g instead of %g", name, m.mean, m.error, expected);
-	assert_true(test_scaled() || m.error <= 0.002 * expected);
+	assert_true(test_is_scaled() || m.error <= 0.002 * expected);
 }
 
 /* Returns the normal of a plane, from points that are far apart. */
@@ -204,7 +204,7 @@ static void test_bent(void **state)
 	static const char bent[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 .01\nf 1 2 3\nf 2 4 3\n";
 	const struct memory_file files[] = {
 		{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent, sizeof bent - 1}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(8, 8, files);
+	struct world *w = world_from_files(8, 8, files);
 	const struct emitter *em = &w->emitters[0];
 	struct emitter_point x;
 	double pdf;

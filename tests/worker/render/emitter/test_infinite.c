@@ -32,7 +32,7 @@ static int rows(void)
 	return 2 * (dialect_3 ? HEIGHT - 1 : HEIGHT);
 }
 
-static const struct wavelengths colour = {.nm = {450, 550, 600, 700}}, grey = {.grey = true};
+static const struct wavelengths colour = {.nm = {450, 550, 600, 700}}, grey = {.is_grey = true};
 static const char *const cases[] = {
 	"constant",	      "constant radiance=rgb(0.3,0.5,2)",
 	"envmap filename=p0", "envmap filename=p1 scale=3",
@@ -105,13 +105,13 @@ static vec3 direction(double u, double v)
 
 static double pdf_at(const struct emitter *em, vec3 d)
 {
-	const struct emitter_point x = {.p = d, .infinite = true};
+	const struct emitter_point x = {.p = d, .is_infinite = true};
 	return em->ops->pdf_point(em, &x);
 }
 
 static spectrum radiance_at(const struct emitter *em, vec3 d, const struct wavelengths *w)
 {
-	const struct emitter_point x = {.p = d, .infinite = true};
+	const struct emitter_point x = {.p = d, .is_infinite = true};
 	return em->ops->radiance(em, &x, vec3_neg(d), w);
 }
 
@@ -135,7 +135,7 @@ static void check_sample(const struct emitter *em, const double u[2], const stru
 	const vec3 ref = {1, 2, 3};
 	struct emitter_point y;
 	double pdf_toward;
-	assert_true(x->infinite && fabs(vec3_length(x->p) - 1) < 1e-14 && pdf > 0 && isfinite(pdf));
+	assert_true(x->is_infinite && fabs(vec3_length(x->p) - 1) < 1e-14 && pdf > 0 && isfinite(pdf));
 	assert_true(em->ops->pdf_point(em, x) == pdf && emitter_pdf_toward(em, ref, x) == pdf);
 	assert_true(emitter_sample_toward(em, ref, u, &y, &pdf_toward));
 	assert_true(y.p.x == x->p.x && y.p.y == x->p.y && y.p.z == x->p.z && pdf_toward == pdf);
@@ -165,7 +165,7 @@ static void test_samples_follow_the_density(void **state)
 {
 	for (int k = 0; k < CASES; k++) {
 		struct emitter em = make_emitter(*state, cases[k], NULL);
-		assert_true(em.infinite && em.power > 0 && isfinite(em.power));
+		assert_true(em.is_infinite && em.power > 0 && isfinite(em.power));
 		double p = chi_square(&em, 0, stats_seed(cases[k]));
 		print_message("%s: p = %.2e\n", cases[k], p);
 		assert_true(p > LEVEL);
@@ -210,7 +210,7 @@ static void test_orientation(void **state)
 	assert_true(fabs(radiance_at(&em, d, &grey).v[0] - 6) < 1e-9);
 	assert_true(fabs(radiance_at(&em, d, &colour).v[1] - 6 * color_d65(550)) < 1e-9);
 	assert_true(radiance_at(&em, vec3_neg(d), &grey).v[0] == 0);
-	assert_int_equal(em.shape, COLOR_SHAPE_D65);
+	assert_int_equal(em.color_kind, COLOR_KIND_D65);
 
 	/* A rotation by 90 degrees about y moves +z to +x; a scale has no effect; the density rotates with the map. */
 	const mat4 turn = {{{0, 0, 2, 0}, {0, 2, 0, 0}, {-2, 0, 0, 0}, {0, 0, 0, 1}}};
@@ -228,7 +228,7 @@ static void test_orientation(void **state)
 static void test_pixel_centres(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p0", NULL);
-	const struct wavelengths red = {.rgb = true};
+	const struct wavelengths red = {.is_rgb = true};
 	for (int i = 0; i < WIDTH * HEIGHT; i++) {
 		double row = i / WIDTH, v = dialect_3 ? row / (HEIGHT - 1) : (row + 0.5) / HEIGHT;
 		vec3 d = direction((i % WIDTH + 0.5) / WIDTH, fmin(fmax(v, 1e-9), 1 - 1e-9));
@@ -272,7 +272,7 @@ static void check_places(struct fixture *f, const char *text, const mat4 *m, con
 	for (int i = 0; i < 2000; i++) {
 		vec3 l = direction((i % 50 + 0.37) / 50, (i / 50 + 0.41) / 40), d = vec3_normalize(mat4_vector(m, l));
 		double is = radiance_at(em, d, &colour).v[1], want = radiance_at(&plain, l, &colour).v[1];
-		if (fabs(is - want) > 1e-9 * (want + 1e-3 * plain.brightest))
+		if (fabs(is - want) > 1e-9 * (want + 1e-3 * plain.brightness_bound))
 			fail_msg("%s: %.9g at %d, not %.9g", text, is, i, want);
 	}
 }

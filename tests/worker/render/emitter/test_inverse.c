@@ -29,7 +29,8 @@ static double slope(const struct emitter *em, const double u[2], double pdf, dou
 				     draw(em, u[0], u[1] + h)};
 	/* Differences must not cross the borders of triangles or cells. */
 	for (int i = 0; i < 4; i++)
-		if (a[i].where.prim != a[0].where.prim || fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
+		if (a[i].texture_point.prim != a[0].texture_point.prim ||
+		    fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
 			return NAN;
 	vec3 d0 = vec3_sub(a[1].p, a[0].p), d1 = vec3_sub(a[3].p, a[2].p);
 	return vec3_length(vec3_cross(d0, d1)) / (4 * h * h);
@@ -37,18 +38,19 @@ static double slope(const struct emitter *em, const double u[2], double pdf, dou
 
 static void check(const char *name, const struct emitter *em, double share)
 {
-	struct dice d = dice_of(name);
-	size_t n = dice_count(40000), slopes = 0;
+	struct dice d = dice_for_test(name);
+	size_t n = dice_scaled_count(40000), slopes = 0;
 	double worst = 0, worst_slope = 0;
-	assert_false(em->delta);
+	assert_false(em->is_delta);
 	for (size_t i = 0; i < n; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, back[2], pdf;
+		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, back[2], pdf;
 		struct emitter_point x, y;
 		assert_true(em->ops->sample_point(em, u, &x, &pdf));
 		em->ops->point_inverse(em, &x, back);
 		assert_true(back[0] >= 0 && back[0] < 1 && back[1] >= 0 && back[1] < 1);
 		y = draw(em, back[0], back[1]);
-		assert_true(y.infinite == x.infinite && (x.infinite || y.where.prim == x.where.prim));
+		assert_true(y.is_infinite == x.is_infinite &&
+			    (x.is_infinite || y.texture_point.prim == x.texture_point.prim));
 		worst = fmax(worst, vec3_length(vec3_sub(x.p, y.p)));
 		if (fabs(u[0] - 0.5) > 0.499 || fabs(u[1] - 0.5) > 0.499)
 			continue;
@@ -81,7 +83,7 @@ static void check(const char *name, const struct emitter *em, double share)
 static void test_area(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		8, 8,
 		SENSOR("0,0,9",
 		       "0,0,0") "<shape type='rectangle'><transform name='to_world'><scale x='3' y='.2'/>"
@@ -100,7 +102,7 @@ static void test_area(void **state)
 		"v 0 2 0\nv 3 2 0\nv 1 2.0002 0\nf 1 2 3\nf 4 5 6\nf 7 8 9\nf 10 11 12\n";
 	const struct memory_file files[] = {
 		{"few.xml", scene, sizeof scene - 1}, {"few.obj", few, sizeof few - 1}, {NULL, NULL, 0}};
-	w = world_of_files(8, 8, files);
+	w = world_from_files(8, 8, files);
 	check("mesh", &w->emitters[0], 0.99);
 	world_free(w);
 }
@@ -124,7 +126,8 @@ static void test_infinite(void **state)
 	const mat4 turn = mat4_rotate((vec3){1, 2, 3}, 40);
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		struct scene_node *n = node_make(&arena, PLUGIN_EMITTER, texts[i]);
-		const struct emitter_build build = {.assets = &source, .arena = &arena, .dialect_3 = true, .scale = 1};
+		const struct emitter_build build = {
+			.assets = &source, .arena = &arena, .dialect_3 = true, .world_scale = 1};
 		if (i)
 			node_add_transform(&arena, n, "to_world", turn);
 		struct emitter em;

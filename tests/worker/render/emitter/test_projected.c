@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 enum { WIDTH = 4, HEIGHT = 2 };
-static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths grey = {.is_grey = true};
 static const double shades[WIDTH * HEIGHT] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1};
 
 /* clang-format off */
@@ -46,7 +46,7 @@ static struct world *world_of(const char *emitters)
 	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
 					    {"p.hdr", pictures.file[0].bytes, pictures.file[0].size},
 					    {NULL, NULL, 0}};
-	struct world *w = world_of_files(64, 32, files);
+	struct world *w = world_from_files(64, 32, files);
 	pictures_fini(&pictures);
 	return w;
 }
@@ -56,7 +56,7 @@ static double radiance(const struct world *w, int i, vec3 d)
 	const struct emitter *em = &w->emitters[i];
 	struct emitter_point x;
 	double pdf;
-	assert_true(em->delta && em->ops->sample_point(em, (double[]){0.5, 0.5}, &x, &pdf) && pdf == 1);
+	assert_true(em->is_delta && em->ops->sample_point(em, (double[]){0.5, 0.5}, &x, &pdf) && pdf == 1);
 	return em->ops->radiance(em, &x, d, &grey).v[0] / (w->scale * w->scale);
 }
 
@@ -67,7 +67,7 @@ static void test_camera(void **state)
 	struct world *w = world_of("<emitter type='projector'><float name='fov' value='40'/>" LOOK PICTURE(
 		"irradiance") "<float name='scale' value='3'/></emitter>");
 	const struct camera *c = &w->camera;
-	struct dice dice = dice_of("projected_camera");
+	struct dice dice = dice_for_test("projected_camera");
 	vec3 axis = c->axes.n;
 	int lit = 0;
 	for (int i = 0; i < 20000; i++) {
@@ -91,7 +91,7 @@ static void test_plane(void **state)
 	(void)state;
 	struct world *w = world_of("<emitter type='projector'><float name='fov' value='90'/>" LOOK
 				   "<float name='irradiance' value='0.7'/></emitter>");
-	struct dice dice = dice_of("projected_plane");
+	struct dice dice = dice_for_test("projected_plane");
 	const struct frame *f = &w->camera.axes;
 	for (int i = 0; i < 1000; i++) {
 		double z = dice_between(&dice, 0.1, 5);
@@ -110,7 +110,7 @@ static void test_directions(void **state)
 	(void)state;
 	struct world *w = world_of("<emitter type='projector'><float name='fov' value='70'/>" LOOK PICTURE(
 		"irradiance") "</emitter><emitter type='spot'>" LOOK PICTURE("texture") "</emitter>");
-	struct dice dice = dice_of("projected_directions");
+	struct dice dice = dice_for_test("projected_directions");
 	enum { N = 200000 };
 	for (int k = 0; k < 2; k++) {
 		const struct emitter *em = &w->emitters[k];
@@ -118,7 +118,7 @@ static void test_directions(void **state)
 		double pdf, sum = 0, all = 0, mass = 0;
 		assert_true(em->ops->sample_point(em, (double[]){0, 0}, &x, &pdf));
 		for (int i = 0; i < N; i++) {
-			double u[2] = {dice_throw(&dice), dice_throw(&dice)};
+			double u[2] = {dice_uniform(&dice), dice_uniform(&dice)};
 			vec3 d;
 			assert_true(em->ops->sample_direction(em, &x, u, &d, &pdf));
 			assert_true(fabs(vec3_length(d) - 1) < 1e-14);
@@ -135,8 +135,8 @@ static void test_directions(void **state)
 		assert_true(fabs(all / sum - 1) < 0.05 && fabs(mass - 1) < 0.05);
 		assert_true(em->power >=
 			    sum * w->scale * w->scale *
-				    color_mean(&(struct color){.shape = COLOR_SHAPE_D65, .scale = 1, .d65 = true}));
-		assert_true(em->textured && em->brightest > 0);
+				    color_mean(&(struct color){.kind = COLOR_KIND_D65, .scale = 1, .times_d65 = true}));
+		assert_true(em->is_textured && em->brightness_bound > 0);
 	}
 	world_free(w);
 }
@@ -150,7 +150,7 @@ static void test_spot(void **state)
 			   "<emitter type='spot'>" LOOK "<float name='cutoff_angle' value='35'/></emitter>"
 			   "<emitter type='spot'>" LOOK
 			   "<rgb name='texture' value='0.5'/><float name='cutoff_angle' value='35'/></emitter>");
-	struct dice dice = dice_of("projected_spot");
+	struct dice dice = dice_for_test("projected_spot");
 	/* The camera's x and y point against those of to_world. */
 	const struct frame *f = &w->camera.axes;
 	double reach = tan(35 * M_PI / 180);
@@ -168,16 +168,16 @@ static void test_spot(void **state)
 static void test_refusals(void **state)
 {
 	(void)state;
-	world_refused(
+	world_check_refused(
 		"<emitter type='spot'><texture type='checkerboard' name='texture'/><float name='cutoff_angle' value='90'/></emitter>",
 		"at most 89 degrees");
-	world_refused(
+	world_check_refused(
 		"<emitter type='projector'><float name='fov' value='30'/><string name='focal_length' value='30mm'/></emitter>",
 		"are both given");
-	world_refused(
+	world_check_refused(
 		"<emitter type='projector'><transform name='to_world'><scale x='1' y='1' z='0'/></transform></emitter>",
 		"singular");
-	world_refused("<emitter type='projector'><float name='fov' value='180'/></emitter>", "fov");
+	world_check_refused("<emitter type='projector'><float name='fov' value='180'/></emitter>", "fov");
 }
 
 int main(void)

@@ -20,13 +20,13 @@
 #define PLACE " latitude=47.5 longitude=8.5 timezone=1"
 enum { DIRECTIONS = 60, SLOPES = 4 };
 
-static const struct wavelengths rgb = {.rgb = true};
+static const struct wavelengths rgb = {.is_rgb = true};
 
 static int try_emitter(struct arena *a, const char *text, double open, double close, struct emitter *em,
 		       struct error *e)
 {
 	const struct emitter_build build = {
-		.arena = a, .dialect_3 = true, .scale = 1, .shutter_open = open, .shutter_close = close};
+		.arena = a, .dialect_3 = true, .world_scale = 1, .shutter_open = open, .shutter_close = close};
 	return emitter_create(em, node_make(a, PLUGIN_EMITTER, text), &build, e);
 }
 
@@ -47,7 +47,7 @@ static void add_light(struct light *l, const struct emitter *em, double share)
 	enum { N = 128 };
 	static const vec3 normal[SLOPES] = {{0, 0, 1}, {0.8, 0, 0.6}, {-0.6, 0.8, 0}, {0, -1, 0}};
 	for (int i = 0; i < DIRECTIONS; i++) {
-		struct emitter_point x = {.p = direction(i), .infinite = true};
+		struct emitter_point x = {.p = direction(i), .is_infinite = true};
 		spectrum s = em->ops->radiance(em, &x, vec3_neg(x.p), &rgb);
 		for (int c = 0; c < 3; c++)
 			l->radiance[i][c] += share * s.v[c];
@@ -181,11 +181,11 @@ static void test_in_scene(void **state)
 	(void)state;
 	double power[2];
 	for (int i = 0; i < 2; i++) {
-		struct world *w = world_of_text(8, 8,
-						"<sensor type='perspective'><float name='shutter_close' value='%d'/>"
-						"</sensor><shape type='sphere'/><emitter type='timed_sunsky'>"
-						"<float name='window_start_time' value='8'/></emitter>",
-						i);
+		struct world *w = world_from_text(8, 8,
+						  "<sensor type='perspective'><float name='shutter_close' value='%d'/>"
+						  "</sensor><shape type='sphere'/><emitter type='timed_sunsky'>"
+						  "<float name='window_start_time' value='8'/></emitter>",
+						  i);
 		power[i] = w->emitters[0].power;
 		world_free(w);
 	}

@@ -37,9 +37,9 @@ static void kernels_have_integral_1(void **state)
 		enum { N = 200000 };
 		double sum = 0, r = cases[k].filter_radius;
 		for (int i = 0; i < N; i++)
-			sum += film_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
+			sum += film_sums_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
 		assert_true(fabs(sum - 1) < 1e-4);
-		assert_true(film_kernel(&f, 1.001 * r) == 0 && film_kernel(&f, -1.001 * r) == 0);
+		assert_true(film_sums_kernel(&f, 1.001 * r) == 0 && film_sums_kernel(&f, -1.001 * r) == 0);
 		/* Averaged over all positions within a pixel, splats keep their energy. */
 		double energy = 0, value[3] = {1, 2, 3};
 		enum { PLACES = 40 };
@@ -79,8 +79,8 @@ static void kernels_have_their_shapes(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
 		struct film_sums f;
 		assert_int_equal(film_sums_init(&f, &p, &cases[i].s, NULL), 0);
-		double middle = cases[i].s.filter == FILTER_CUBIC ? 1 : film_kernel(&f, 0),
-		       value = film_kernel(&f, cases[i].distance) / middle;
+		double middle = cases[i].s.filter == FILTER_CUBIC ? 1 : film_sums_kernel(&f, 0),
+		       value = film_sums_kernel(&f, cases[i].distance) / middle;
 		if (!(fabs(value - cases[i].value) <= cases[i].slack))
 			fail_msg("kernel %zu is %g at %g, not %g", i, value, cases[i].distance, cases[i].value);
 		film_sums_fini(&f);

@@ -46,15 +46,15 @@ static vec3 grazing(struct dice *d, vec3 n, double slope)
 static void test_outside_of_mesh(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("outside of mesh");
+	struct dice d = dice_for_test("outside of mesh");
 	struct geom_shape s;
-	body_ball(&s, 24, 0.7, 0.15);
-	struct accel *a = body_accel(&s, 1);
-	size_t n = dice_count(100000), false_hits = 0, compared = 0, wrong = 0, hits = 0;
+	body_make_ball(&s, 24, 0.7, 0.15);
+	struct accel *a = body_build_accel(&s, 1);
+	size_t n = dice_scaled_count(100000), false_hits = 0, compared = 0, wrong = 0, hits = 0;
 	for (size_t i = 0; i < n; i++) {
-		struct surface_point x = body_point(&s, 0, &d);
+		struct surface_point x = body_sample_point(&s, 0, &d);
 		vec3 w = i % 4 ? direction_beyond(&d, x.ng) : grazing(&d, x.ng, exp(dice_between(&d, log(1e-6), 0)));
-		struct ray_end from = body_end(&x);
+		struct ray_end from = body_ray_end(&x);
 		struct ray_hit hit;
 		bool met = accel_closest(a, &from, w, 0, INFINITY, &hit);
 		hits += met;
@@ -69,7 +69,7 @@ static void test_outside_of_mesh(void **state)
 		if (i % 50)
 			continue;
 		uint32_t prim = 0;
-		double nearest = body_nearest(&s, x.p, w, 1e-9, &prim);
+		double nearest = body_hit_distance(&s, x.p, w, 1e-9, &prim);
 		compared++;
 		bool same = met ? hit.prim.prim == prim || fabs(nearest - hit.t) < 1e-5 : isinf(nearest);
 		wrong += !same;
@@ -80,19 +80,19 @@ static void test_outside_of_mesh(void **state)
 	assert_int_equal(false_hits, 0);
 	assert_int_equal(wrong, 0);
 	accel_free(a);
-	body_free(&s);
+	body_fini(&s);
 }
 
 static void check_closed(const char *name, const struct geom_shape *s, double within)
 {
-	struct dice d = dice_of(name);
-	struct accel *a = body_accel(s, 1);
-	size_t n = dice_count(100000), leaks = 0;
+	struct dice d = dice_for_test(name);
+	struct accel *a = body_build_accel(s, 1);
+	size_t n = dice_scaled_count(100000), leaks = 0;
 	for (size_t i = 0; i < n; i++) {
-		struct surface_point x = body_point(s, 0, &d);
+		struct surface_point x = body_sample_point(s, 0, &d);
 		vec3 inwards = vec3_scale(-s->normal_sign, x.ng);
 		struct ray_end from =
-			i % 2 ? body_end(&x) : free_end(vec3_scale(within * dice_throw(&d), dice_direction(&d)));
+			i % 2 ? body_ray_end(&x) : free_end(vec3_scale(within * dice_uniform(&d), dice_direction(&d)));
 		vec3 w = i % 2 ? direction_beyond(&d, inwards) : dice_direction(&d);
 		if (i % 8 == 7)
 			w = grazing(&d, inwards, exp(dice_between(&d, log(1e-6), 0)));
@@ -109,19 +109,19 @@ static void test_closed(void **state)
 {
 	(void)state;
 	struct geom_shape s;
-	body_ball(&s, 24, 0.7, 0.15);
+	body_make_ball(&s, 24, 0.7, 0.15);
 	check_closed("inside of mesh", &s, 0.55);
-	body_free(&s);
+	body_fini(&s);
 	struct geom_shape ball = {.is_sphere = true, .center = {0.3, -0.2, 0.1}, .radius = 0.6, .normal_sign = 1};
 	check_closed("inside of sphere", &ball, 0.2);
 	ball.normal_sign = -1;
 	check_closed("inside of sphere turned inside out", &ball, 0.2);
 	struct geom_shape tiny = {.is_sphere = true, .center = {0.7, 0.6, 0.5}, .radius = 1e-6, .normal_sign = 1};
-	struct dice d = dice_of("tiny sphere");
-	struct accel *a = body_accel(&tiny, 1);
-	for (size_t i = 0; i < dice_count(20000); i++) {
-		struct surface_point x = body_point(&tiny, 0, &d);
-		struct ray_end from = body_end(&x);
+	struct dice d = dice_for_test("tiny sphere");
+	struct accel *a = body_build_accel(&tiny, 1);
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
+		struct surface_point x = body_sample_point(&tiny, 0, &d);
+		struct ray_end from = body_ray_end(&x);
 		struct ray_hit hit;
 		assert_false(accel_closest(a, &from, direction_beyond(&d, x.ng), 0, INFINITY, &hit));
 		assert_true(accel_closest(a, &from, direction_beyond(&d, vec3_neg(x.ng)), 0, INFINITY, &hit));
@@ -138,50 +138,50 @@ static void test_plane(void **state)
 	(void)state;
 	const double tilt[][3] = {{0, 0, 0}, {0.5, -0.25, 0}, {0.375, 0.625, 0}, {0, 0, 0.75}};
 	for (size_t k = 0; k < sizeof tilt / sizeof tilt[0]; k++) {
-		struct dice d = dice_of("plane");
+		struct dice d = dice_for_test("plane");
 		struct geom_shape s;
-		body_plane(&s, 64, tilt[k][0], tilt[k][1]);
+		body_make_plane(&s, 64, tilt[k][0], tilt[k][1]);
 		for (uint32_t i = 0; i < s.vertex_count; i++)
 			s.position[i][2] += (float)tilt[k][2];
-		struct accel *a = body_accel(&s, 1);
-		size_t n = dice_count(25000), met = 0;
+		struct accel *a = body_build_accel(&s, 1);
+		size_t n = dice_scaled_count(25000), met = 0;
 		for (size_t i = 0; i < n; i++) {
-			struct surface_point x = body_point(&s, 0, &d);
+			struct surface_point x = body_sample_point(&s, 0, &d);
 			vec3 up = i % 2 ? x.ng : vec3_neg(x.ng);
 			vec3 w = i % 3 ? grazing(&d, up, i % 3 == 1 ? 1e-6 : 1e-4) : direction_beyond(&d, up);
-			struct ray_end from = body_end(&x);
+			struct ray_end from = body_ray_end(&x);
 			struct ray_hit hit;
 			met += accel_closest(a, &from, w, 0, INFINITY, &hit);
 			met += accel_occluded_to_infinity(a, &from, w);
-			struct ray_end to = free_end(vec3_madd(x.p, dice_throw(&d), w));
+			struct ray_end to = free_end(vec3_madd(x.p, dice_uniform(&d), w));
 			met += accel_occluded(a, &from, &to);
 			met += accel_occluded(a, &to, &from);
 		}
 		print_message("plane %zu: %zu of %zu met their own plane\n", k, met, 4 * n);
 		assert_int_equal(met, 0);
 		accel_free(a);
-		body_free(&s);
+		body_fini(&s);
 	}
 }
 
 static bool hidden_by_mesh(const struct geom_shape *s, vec3 a, vec3 b)
 {
 	uint32_t prim;
-	return !s->is_sphere && body_nearest(s, a, vec3_sub(b, a), 1e-9, &prim) < 1 - 1e-9;
+	return !s->is_sphere && body_hit_distance(s, a, vec3_sub(b, a), 1e-9, &prim) < 1 - 1e-9;
 }
 
 /* Two points on the surface of a convex body see each other; with a ball in the middle, the two points do not see
  * each other if their line passes through the ball. */
 static void check_segments(const char *name, const struct geom_shape *body)
 {
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	struct geom_shape both[2] = {
 		*body, {.is_sphere = true, .center = {0.05, 0.02, -0.03}, .radius = 0.2, .normal_sign = 1}};
-	struct accel *open = body_accel(both, 1), *blocked = body_accel(both, 2);
-	size_t n = dice_count(50000), unseen = 0, seen = 0, tried = 0;
+	struct accel *open = body_build_accel(both, 1), *blocked = body_build_accel(both, 2);
+	size_t n = dice_scaled_count(50000), unseen = 0, seen = 0, tried = 0;
 	for (size_t i = 0; i < n; i++) {
-		struct surface_point x = body_point(body, 0, &d), y = body_point(body, 0, &d);
-		struct ray_end from = body_end(&x), to = body_end(&y);
+		struct surface_point x = body_sample_point(body, 0, &d), y = body_sample_point(body, 0, &d);
+		struct ray_end from = body_ray_end(&x), to = body_ray_end(&y);
 		if (!body->is_sphere && x.prim.prim == y.prim.prim)
 			continue;
 		if (accel_occluded(open, &from, &to)) /* the mesh has valleys: does the search in double agree? */
@@ -195,8 +195,8 @@ static void check_segments(const char *name, const struct geom_shape *body)
 		tried++;
 		seen += !accel_occluded(blocked, &from, &to);
 		/* Segments to and from the ball: points on its far side are hidden, points on its near side are not. */
-		struct surface_point z = body_point(&both[1], 1, &d);
-		struct ray_end ball = body_end(&z);
+		struct surface_point z = body_sample_point(&both[1], 1, &d);
+		struct ray_end ball = body_ray_end(&z);
 		bool hidden = vec3_dot(vec3_sub(x.p, z.p), z.ng) < 0;
 		unseen += accel_occluded(blocked, &from, &ball) != hidden;
 		unseen += accel_occluded(blocked, &ball, &from) != hidden;
@@ -214,9 +214,9 @@ static void test_segments(void **state)
 {
 	(void)state;
 	struct geom_shape s;
-	body_ball(&s, 12, 0.7, 0);
+	body_make_ball(&s, 12, 0.7, 0);
 	check_segments("segments in a mesh", &s);
-	body_free(&s);
+	body_fini(&s);
 	struct geom_shape ball = {.is_sphere = true, .radius = 0.7, .normal_sign = -1};
 	check_segments("segments in a sphere", &ball);
 }
@@ -225,20 +225,20 @@ static void test_segments(void **state)
 static void test_far_away(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("far away");
+	struct dice d = dice_for_test("far away");
 	struct geom_shape s[2] = {{0}, {.is_sphere = true, .center = {0.1, 0.1, 0.1}, .radius = 0.3, .normal_sign = 1}};
-	body_ball(&s[0], 10, 0.7, 0.15);
-	struct accel *mesh = body_accel(s, 1), *sphere = body_accel(s + 1, 1);
-	size_t n = dice_count(4000), wrong = 0, met_mesh = 0, met_sphere = 0;
+	body_make_ball(&s[0], 10, 0.7, 0.15);
+	struct accel *mesh = body_build_accel(s, 1), *sphere = body_build_accel(s + 1, 1);
+	size_t n = dice_scaled_count(4000), wrong = 0, met_mesh = 0, met_sphere = 0;
 	for (size_t i = 0; i < n; i++) {
 		double distance = i % 2 ? 1e6 : 1e3;
-		vec3 axis = dice_direction(&d), aim = vec3_scale(0.9 * cbrt(dice_throw(&d)), dice_direction(&d));
+		vec3 axis = dice_direction(&d), aim = vec3_scale(0.9 * cbrt(dice_uniform(&d)), dice_direction(&d));
 		struct ray_end from = free_end(vec3_scale(distance, axis)), to = free_end(vec3_scale(-distance, axis));
 		vec3 w = vec3_normalize(vec3_sub(aim, from.p));
 		to.p = vec3_madd(from.p, 2 * distance, w);
 		struct ray_hit hit;
 		uint32_t prim = 0;
-		double t = body_nearest(s, from.p, w, 0, &prim);
+		double t = body_hit_distance(s, from.p, w, 0, &prim);
 		bool met = accel_closest(mesh, &from, w, 0, INFINITY, &hit);
 		met_mesh += met;
 		wrong += met != (bool)isfinite(t) || (met && !(fabs(hit.t - t) < 1e-5 + 1e-15 * distance));
@@ -258,7 +258,7 @@ static void test_far_away(void **state)
 	assert_true(met_mesh > n / 4 && met_sphere > n / 20);
 	accel_free(mesh);
 	accel_free(sphere);
-	body_free(&s[0]);
+	body_fini(&s[0]);
 }
 
 /* Rays that just touch a sphere and rays that just miss it, including positions at which the sphere touches its
@@ -266,7 +266,7 @@ static void test_far_away(void **state)
 static void test_silhouettes(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("silhouettes");
+	struct dice d = dice_for_test("silhouettes");
 	for (double radius = 1; radius > 1e-7; radius /= 30) {
 		/* Other spheres are added because Embree ignores the bounding box of a single primitive. */
 		struct geom_shape all[12],
@@ -275,11 +275,11 @@ static void test_silhouettes(void **state)
 			all[i] = (struct geom_shape){
 				.is_sphere = true, .center = {40, 40, 40 + i}, .radius = 1e-3, .normal_sign = 1};
 		all[5] = s;
-		struct accel *a = body_accel(all, 12);
+		struct accel *a = body_build_accel(all, 12);
 		const vec3 poles[6] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
-		for (size_t i = 0; i < dice_count(5000); i++) {
+		for (size_t i = 0; i < dice_scaled_count(5000); i++) {
 			vec3 side = vec3_normalize(
-				vec3_madd(poles[i % 6], dice_throw(&d) < 0.5 ? 0 : 0.01, dice_direction(&d)));
+				vec3_madd(poles[i % 6], dice_uniform(&d) < 0.5 ? 0 : 0.01, dice_direction(&d)));
 			vec3 w = vec3_normalize(vec3_cross(side, dice_direction(&d)));
 			for (int in = 0; in < 2; in++) {
 				vec3 touch = vec3_madd(s.center, radius * (in ? 1 - 1e-7 : 1 + 1e-7), side);
@@ -301,9 +301,9 @@ static void test_slivers(void **state)
 {
 	(void)state;
 	enum { STRIPS = 64 };
-	struct dice d = dice_of("slivers");
+	struct dice d = dice_for_test("slivers");
 	struct geom_shape s;
-	body_plane(&s, STRIPS, 0, 0);
+	body_make_plane(&s, STRIPS, 0, 0);
 	/* Strips of width 2^-19 and length 2 in the middle; two wide strips cover the rest. */
 	s.vertex_count = s.triangle_count = 0;
 	for (uint32_t i = 0; i <= STRIPS; i++) {
@@ -317,8 +317,8 @@ static void test_slivers(void **state)
 		memcpy(s.index[s.triangle_count++], (uint32_t[3]){2 * i, 2 * i, 2 * i + 1}, sizeof s.index[0]);
 		memcpy(s.index[s.triangle_count++], (uint32_t[3]){2 * i, 2 * i + 1, 2 * i}, sizeof s.index[0]);
 	}
-	struct accel *a = body_accel(&s, 1);
-	size_t n = dice_count(100000), leaks = 0, off = 0;
+	struct accel *a = body_build_accel(&s, 1);
+	size_t n = dice_scaled_count(100000), leaks = 0, off = 0;
 	for (size_t i = 0; i < n; i++) {
 		double reach = i % 2 ? 0x1p-14 : 0.999;
 		vec3 aim = {dice_between(&d, -reach, reach), dice_between(&d, -0.999, 0.999), 0};
@@ -339,7 +339,7 @@ static void test_slivers(void **state)
 	assert_int_equal(leaks, 0);
 	assert_int_equal(off, 0);
 	accel_free(a);
-	body_free(&s);
+	body_fini(&s);
 }
 
 /* A long build reports progress to its liveness counter. */
@@ -348,14 +348,14 @@ static void test_building_ticks(void **state)
 	(void)state;
 	atomic_ullong ticks = 0;
 	struct geom_shape s;
-	body_ball(&s, 200, 0.7, 0.15);
+	body_make_ball(&s, 200, 0.7, 0.15);
 	liveness_counter = &ticks;
-	struct accel *a = body_accel(&s, 1);
+	struct accel *a = body_build_accel(&s, 1);
 	liveness_counter = NULL;
 	print_message("%llu ticks for %u triangles\n", atomic_load(&ticks), s.triangle_count);
 	assert_true(atomic_load(&ticks) >= s.triangle_count / 4096);
 	accel_free(a);
-	body_free(&s);
+	body_fini(&s);
 }
 
 /* Two sheets closer together than float precision in their scene, so that a ray in float begins beyond the second
@@ -364,7 +364,7 @@ static void test_building_ticks(void **state)
 static void test_sheets(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("sheets");
+	struct dice d = dice_for_test("sheets");
 	static const double gaps[] = {0x1p-23, 0x1p-22, 0x1p-21, 0x1p-20, 0x1p-16};
 	for (size_t k = 0; k < sizeof gaps / sizeof *gaps; k++) {
 		float position[2][5][3] = {{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}};
@@ -376,9 +376,9 @@ static void test_sheets(void **state)
 			position[1][i][2] = (float)gaps[k];
 		s[1] = s[0];
 		s[1].position = position[1];
-		struct accel *a = body_accel(s, 2);
+		struct accel *a = body_build_accel(s, 2);
 		const vec3 up = {0, 0, 1};
-		for (size_t i = 0; i < dice_count(20000); i++) {
+		for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 			struct ray_end from = {
 				{dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5), 0}, up, {0, 0, 0}};
 			from.prim.prim = from.p.y > from.p.x;

@@ -24,7 +24,7 @@ static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
 			position[m][i] = (float)dice_between(d, -1, 1);
 			normal[m][i] = (float)(dice_between(d, -0.5, 0.5));
 			if (i < 2)
-				uv[m][i] = (float)dice_throw(d);
+				uv[m][i] = (float)dice_uniform(d);
 		}
 	vec3 v[3];
 	for (int m = 0; m < 3; m++)
@@ -63,13 +63,13 @@ static struct geom_shape random_placement(struct geom_shape s, struct dice *d)
 	static struct placement place;
 	static uint32_t turned[1][3] = {{0, 2, 1}};
 	mat4 m = mat4_mul(mat4_rotate(dice_direction(d), dice_between(d, 0, 360)),
-			  mat4_scale((vec3){dice_between(d, 0.5, 2) * (dice_throw(d) < 0.5 ? -1 : 1),
+			  mat4_scale((vec3){dice_between(d, 0.5, 2) * (dice_uniform(d) < 0.5 ? -1 : 1),
 					    dice_between(d, 0.5, 2), dice_between(d, 0.5, 2)}));
 	for (int i = 0; i < 3; i++)
 		m.m[i][3] = dice_between(d, -1, 1);
 	assert_true(placement_make(&place, &m, (vec3){-1, -1, -1}, (vec3){1, 1, 1}));
-	s.place = &place;
-	if (place.mirrored)
+	s.placement = &place;
+	if (place.is_mirrored)
 		s.index = turned;
 	return s;
 }
@@ -115,7 +115,7 @@ static struct geom_shape sphere(struct dice *d)
 	struct geom_shape s = {.is_sphere = true,
 			       .center = dice_direction(d),
 			       .radius = dice_between(d, 0.1, 2),
-			       .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
+			       .normal_sign = dice_uniform(d) < 0.5 ? -1 : 1};
 	s.sphere_axes = frame_around(dice_direction(d));
 	return s;
 }
@@ -124,11 +124,11 @@ static struct geom_shape sphere(struct dice *d)
 static struct geom_shape curve(struct dice *d, bool smooth)
 {
 	static struct strand strand;
-	strand_random(&strand, 2, 0, (const double[]){0.5, 1}, (const double[]){0.1, 0.6}, d);
+	strand_make_random(&strand, 2, 0, (const double[]){0.5, 1}, (const double[]){0.1, 0.6}, d);
 	strand.v[1] = (float)dice_between(d, 0.1, 1);
 	if (smooth)
-		strand_smooth(&strand, 0.5, d);
-	return (struct geom_shape){.curves = &strand.c, .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
+		strand_set_tangents(&strand, 0.5, d);
+	return (struct geom_shape){.curves = &strand.curves, .normal_sign = dice_uniform(d) < 0.5 ? -1 : 1};
 }
 
 /* Finds a random point of the curve, but not so near the poles that the meridians turn within the steps of the
@@ -154,7 +154,7 @@ static struct surface_point moved_by(const struct geom_shape *s, const struct su
 	if (s->curves) {
 		enum cone_part part = x->b1 < 0 ? CONE_START : x->b1 > 1 ? CONE_END : CONE_SIDE;
 		struct cone c = curves_cone(s->curves, 0);
-		struct curve_site at = curves_site(&c, part, p);
+		struct curve_coordinates at = curves_coordinates(&c, part, p);
 		assert_true(surface_on_curve(s, x->prim, at.along, at.around, &y));
 		return y;
 	}
@@ -171,8 +171,8 @@ static double distance_relative(vec3 a, vec3 b, double scale)
 
 static double compare(const struct geom_shape *s, const struct surface_point *x)
 {
-	struct surface_change c;
-	surface_change_of(s, x, &c);
+	struct surface_derivatives c;
+	surface_compute_derivatives(s, x, &c);
 	assert_true(fabs(vec3_length(c.du) - 1) < 4 * DBL_EPSILON && fabs(vec3_length(c.dv) - 1) < 4 * DBL_EPSILON);
 	assert_true(fabs(vec3_dot(c.du, c.dv)) < 16 * DBL_EPSILON && fabs(vec3_dot(c.du, x->ng)) < 16 * DBL_EPSILON);
 	vec3 level = vec3_madd(x->axis, -vec3_dot(x->axis, x->ng), x->ng);
@@ -201,13 +201,13 @@ static double compare(const struct geom_shape *s, const struct surface_point *x)
 static void test_differences(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("changes of surface points");
+	struct dice d = dice_for_test("changes of surface points");
 	/* The first kinds are triangles: flat, without and with uv; smooth, without and with uv, and with tangents.
 	 * Then a sphere, and curves with the normals of their cones and with smooth ones. */
 	enum { TANGENTS = 4, SPHERE, CURVE, SMOOTH_CURVE, KINDS };
 	double worst[1 + RELIEFS][KINDS] = {{0}};
 	uint32_t counts[KINDS] = {0};
-	for (size_t i = 0; i < dice_count(32000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(32000); i++) {
 		int kind = (int)(i % KINDS), relief = (int)(i / KINDS % (1 + RELIEFS));
 		bool curved = kind >= CURVE;
 		struct geom_shape s = kind == SPHERE ? sphere(&d)
@@ -250,7 +250,8 @@ static void test_differences(void **state)
 		for (int kind = 0; kind < KINDS; kind++)
 			assert_true(at[kind] < 1e-7);
 	}
-	assert_true(counts[CURVE] > dice_count(32000) / 40 && counts[SMOOTH_CURVE] > dice_count(32000) / 40);
+	assert_true(counts[CURVE] > dice_scaled_count(32000) / 40 &&
+		    counts[SMOOTH_CURVE] > dice_scaled_count(32000) / 40);
 }
 
 /* The bent normal is that of the displaced surface p + h n, computed by differences of its points: to first order in
@@ -258,9 +259,9 @@ static void test_differences(void **state)
 static void test_bent_normal_is_that_of_the_surface(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("normals of bumps");
+	struct dice d = dice_for_test("normals of bumps");
 	double worst[2] = {0};
-	for (size_t i = 0; i < dice_count(2000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(2000); i++) {
 		bool round = i & 1;
 		struct geom_shape s = bent_shape(round ? sphere(&d) : triangle(&d, false, true), &d, 0);
 		struct surface_point x;
@@ -338,9 +339,9 @@ static void test_mirrored_pictures(void **state)
 
 static void assert_finite(const struct geom_shape *s, const struct surface_point *x)
 {
-	struct surface_change c;
+	struct surface_derivatives c;
 	feclearexcept(FE_INVALID);
-	surface_change_of(s, x, &c);
+	surface_compute_derivatives(s, x, &c);
 	assert_false(fetestexcept(FE_INVALID));
 	for (int i = 0; i < 2; i++)
 		assert_true(vec3_is_finite(c.dn[i]) && vec3_is_finite(c.daxis[i]));
@@ -350,9 +351,9 @@ static void assert_finite(const struct geom_shape *s, const struct surface_point
 static void test_degenerate(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("changes of degenerate surfaces");
+	struct dice d = dice_for_test("changes of degenerate surfaces");
 	struct surface_point x;
-	struct surface_change c;
+	struct surface_derivatives c;
 	/* At the poles, and as near to them as double can represent. */
 	for (int i = 0; i < 400; i++) {
 		struct geom_shape s = sphere(&d);
@@ -388,7 +389,7 @@ static void test_degenerate(void **state)
 		for (int i = 0; i < 3; i++)
 			normal[m][i] = -normal[m][i];
 	surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &x);
-	surface_change_of(&s, &x, &c);
+	surface_compute_derivatives(&s, &x, &c);
 	assert_true(vec3_length(c.dn[0]) == 0 && vec3_length(c.dn[1]) == 0);
 }
 

@@ -108,12 +108,12 @@ static void test_two(void **state)
 {
 	(void)state;
 	static struct soup s;
-	struct dice d = dice_of("two triangles");
+	struct dice d = dice_for_test("two triangles");
 	size_t seen[2] = {0, 0};
-	for (size_t n = dice_count(100000); n > 0; n--) {
+	for (size_t n = dice_scaled_count(100000); n > 0; n--) {
 		double a[3][2], b[3][2], size = exp2(dice_between(&d, -12, -1));
 		struct frame f = frame_around(dice_direction(&d));
-		vec3 at = vec3_scale(dice_throw(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
+		vec3 at = vec3_scale(dice_uniform(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
 		throw_corners(&d, a);
 		throw_corners(&d, b);
 		double g = widest_gap(a, b);
@@ -123,7 +123,7 @@ static void test_two(void **state)
 		put(&s, &f, at, size, a);
 		put(&s, &f, at, size, b);
 		/* Farther apart than the rounding of the vertices (coordinates are below 2); and a tilted copy. */
-		vec3 off = vec3_madd(at, dice_throw(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
+		vec3 off = vec3_madd(at, dice_uniform(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
 		put(&s, &f, off, size, b);
 		struct frame tilted = frame_around(vec3_normalize(vec3_madd(f.n, 0.02, f.s)));
 		put(&s, &tilted, at, fmax(size, 0x1p-10), b);
@@ -146,8 +146,8 @@ static void test_neighbours(void **state)
 {
 	(void)state;
 	struct geom_shape g[2];
-	body_plane(&g[0], 8, 0.3, 0.7);
-	body_ball(&g[1], 8, 0.7, 0.1);
+	body_make_plane(&g[0], 8, 0.3, 0.7);
+	body_make_ball(&g[1], 8, 0.7, 0.1);
 	for (int k = 0; k < 2; k++) {
 		for (uint32_t i = 0; i < g[k].triangle_count; i++)
 			for (uint32_t j = 0; j < i; j++) {
@@ -157,7 +157,7 @@ static void test_neighbours(void **state)
 					triangle_from((const float(*)[3])g[k].position, g[k].index[j]);
 				assert_false(do_coincide(&a, &b));
 			}
-		body_free(&g[k]);
+		body_fini(&g[k]);
 	}
 }
 
@@ -171,14 +171,14 @@ static struct prim_ref first_by_rule(const struct accel_shape *s, uint32_t count
 	for (unsigned rank = 0; rank <= s[at.shape].rank; rank++)
 		for (uint32_t i = 0; i < count; i++)
 			for (uint32_t k = 0; s[i].rank == rank && k < s[i].triangle_count; k++) {
-				if (i == at.shape && (k >= at.prim || rank != SURFACE_SHINES))
+				if (i == at.shape && (k >= at.prim || rank != SURFACE_EMITS))
 					return at;
 				if (rank == s[at.shape].rank && i > at.shape)
 					return at;
 				const struct triangle u = triangle_from(s[i].position, s[i].index[k]);
 				double unused;
 				bool wholly;
-				if (triangle_meets(&u, p, t.n, &unused) && coincide_triangles(&t, &u, 0, &wholly))
+				if (triangle_intersect(&u, p, t.n, &unused) && coincide_triangles(&t, &u, 0, &wholly))
 					return (struct prim_ref){i, k, 0};
 			}
 	return at;
@@ -187,7 +187,7 @@ static struct prim_ref first_by_rule(const struct accel_shape *s, uint32_t count
 static vec3 point_on(const struct accel_shape *s, uint32_t prim, struct dice *d)
 {
 	const struct triangle t = triangle_from(s->position, s->index[prim]);
-	double root = sqrt(dice_throw(d)), u = 1 - root, v = root * dice_throw(d);
+	double root = sqrt(dice_uniform(d)), u = 1 - root, v = root * dice_uniform(d);
 	return vec3_madd(vec3_madd(t.v[0], u, vec3_sub(t.v[1], t.v[0])), v, vec3_sub(t.v[2], t.v[0]));
 }
 
@@ -213,9 +213,9 @@ static void test_search(void **state)
 {
 	(void)state;
 	static struct soup soup[5];
-	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_SHINES, SURFACE_OPAQUE,
-						  SURFACE_PASSES};
-	struct dice d = dice_of("search");
+	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_EMITS, SURFACE_OPAQUE,
+						  SURFACE_SEE_THROUGH};
+	struct dice d = dice_for_test("search");
 	struct accel_shape shape[5];
 	struct coincidence *c;
 	struct error e;
@@ -226,19 +226,19 @@ static void test_search(void **state)
 	}
 	assert_int_equal(coincide_find(&c, shape, 5, &e), 0);
 	assert_non_null(c);
-	assert_false(c->incomplete);
-	for (size_t n = dice_count(20000); n > 0; n--) {
+	assert_false(c->is_incomplete);
+	for (size_t n = dice_scaled_count(20000); n > 0; n--) {
 		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150), 0};
 		vec3 p = point_on(&shape[at.shape], at.prim, &d);
-		struct prim_ref there = coincide_there(c, shape, at, p), right = first_by_rule(shape, 5, at, p);
+		struct prim_ref there = coincide_present_prim(c, shape, at, p), right = first_by_rule(shape, 5, at, p);
 		if (there.shape != right.shape || there.prim != right.prim)
 			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape,
 				 right.prim, there.shape, there.prim);
 		hidden += there.shape != at.shape;
 	}
 	print_message("%zu pairs of primitives, %zu of shapes; %zu of the points hidden\n", c->pair_count,
-		      c->shapes_count, hidden);
-	assert_true(hidden > 0 && c->shapes_count > 4);
+		      c->shape_pair_count, hidden);
+	assert_true(hidden > 0 && c->shape_pair_count > 4);
 	coincide_free(c);
 }
 
@@ -250,7 +250,7 @@ static void test_crossing_leaves(void **state)
 	enum { LEAVES = 36, FAN = 256 };
 	static struct soup soup[LEAVES];
 	struct accel_shape shape[LEAVES];
-	struct dice d = dice_of("leaves");
+	struct dice d = dice_for_test("leaves");
 	struct coincidence *c;
 	struct error e;
 	for (int i = 0; i < LEAVES; i++) {
@@ -267,7 +267,7 @@ static void test_crossing_leaves(void **state)
 			}
 			add(&soup[i], center, rim[0], rim[1]);
 		}
-		shape[i] = shape_of(&soup[i], SURFACE_PASSES);
+		shape[i] = shape_of(&soup[i], SURFACE_SEE_THROUGH);
 	}
 	assert_int_equal(coincide_find(&c, shape, LEAVES, &e), 0);
 	assert_null(c);
@@ -308,7 +308,7 @@ static void test_tubes(void **state)
 	(void)state;
 	struct tube *tube = mem_alloc(TUBES + TWINS, sizeof *tube);
 	static struct accel_shape shape[TUBES + TWINS];
-	struct dice d = dice_of("tubes");
+	struct dice d = dice_for_test("tubes");
 	struct coincidence *c;
 	struct error e;
 	assert_non_null(tube);
@@ -326,12 +326,12 @@ static void test_tubes(void **state)
 	}
 	assert_int_equal(coincide_find(&c, shape, TUBES + TWINS, &e), 0);
 	assert_non_null(c);
-	assert_false(c->incomplete);
+	assert_false(c->is_incomplete);
 	for (uint32_t i = 0; i < TWINS; i++) {
 		bool seen[2 * AROUND] = {false};
 		size_t hidden = 0;
-		for (size_t k = c->first[TUBES + i]; k < c->first[TUBES + i + 1]; k++)
-			if (c->pairs[k].by.shape == i && !seen[c->pairs[k].hidden.prim]) {
+		for (size_t k = c->first_pair[TUBES + i]; k < c->first_pair[TUBES + i + 1]; k++)
+			if (c->pairs[k].covering.shape == i && !seen[c->pairs[k].hidden.prim]) {
 				seen[c->pairs[k].hidden.prim] = true;
 				hidden++;
 			}
@@ -339,7 +339,7 @@ static void test_tubes(void **state)
 			fail_msg("of a part of tube %u %zu triangles of %d are seen to be one with it", i, hidden,
 				 2 * AROUND);
 	}
-	print_message("%zu pairs of primitives, %zu of shapes\n", c->pair_count, c->shapes_count);
+	print_message("%zu pairs of primitives, %zu of shapes\n", c->pair_count, c->shape_pair_count);
 	coincide_free(c);
 	mem_free(tube);
 }
@@ -351,16 +351,16 @@ static void test_bounds(void **state)
 {
 	(void)state;
 	static struct soup s, other;
-	struct dice d = dice_of("bounds");
+	struct dice d = dice_for_test("bounds");
 	struct coincidence *c;
 	struct error e;
 	s.count = 0;
 	for (int i = 0; i < MOST; i++)
 		add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
-	struct accel_shape shape[2] = {shape_of(&s, SURFACE_SHINES)};
+	struct accel_shape shape[2] = {shape_of(&s, SURFACE_EMITS)};
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
 	assert_int_equal(c->pair_count, MOST - 1);
-	assert_false(c->incomplete);
+	assert_false(c->is_incomplete);
 	coincide_free(c);
 	for (s.count = 0; s.count < MOST;) {
 		double turn = dice_between(&d, 0, 6);
@@ -368,7 +368,7 @@ static void test_bounds(void **state)
 		    (vec3){cos(turn + 4), sin(turn + 4), 0});
 	}
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
-	assert_true(c->incomplete && c->pair_count > MOST && c->pair_count < 64 * MOST);
+	assert_true(c->is_incomplete && c->pair_count > MOST && c->pair_count < 64 * MOST);
 	coincide_free(c);
 	shape[0] = shape_of(&s, SURFACE_OPAQUE);
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
@@ -380,14 +380,14 @@ static void test_bounds(void **state)
 	ball[2].radius *= 1 + 1e-5;
 	assert_int_equal(coincide_find(&c, ball, 3, &e), 0);
 	assert_int_equal(c->pair_count, 1);
-	assert_int_equal(coincide_there(c, ball, (struct prim_ref){1, 0, 0}, ball[1].center).shape, 0);
-	assert_int_equal(coincide_there(c, ball, (struct prim_ref){2, 0, 0}, ball[2].center).shape, 2);
+	assert_int_equal(coincide_present_prim(c, ball, (struct prim_ref){1, 0, 0}, ball[1].center).shape, 0);
+	assert_int_equal(coincide_present_prim(c, ball, (struct prim_ref){2, 0, 0}, ball[2].center).shape, 2);
 	coincide_free(c);
 	s.count = other.count = 0;
 	add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
 	add(&other, (vec3){0, 0, 0}, (vec3){1, 1, 0}, (vec3){0, 1, 0});
 	shape[0] = shape_of(&s, SURFACE_OPAQUE);
-	shape[1] = shape_of(&other, SURFACE_SHINES);
+	shape[1] = shape_of(&other, SURFACE_EMITS);
 	int rc = -ENOMEM;
 	for (long n = 0; n < 20 && rc; n++) {
 		mem_fail_after(n);
@@ -407,9 +407,9 @@ static void test_rays(void **state)
 {
 	(void)state;
 	static struct soup s[2];
-	struct dice d = dice_of("rays");
+	struct dice d = dice_for_test("rays");
 	size_t lamp = 0, pane = 0, on_hidden = 0;
-	for (size_t n = dice_count(2000); n > 0; n--) {
+	for (size_t n = dice_scaled_count(2000); n > 0; n--) {
 		struct frame f = frame_around(dice_direction(&d));
 		vec3 at = vec3_scale(0.4, dice_direction(&d));
 		struct coincidence *c;
@@ -426,7 +426,7 @@ static void test_rays(void **state)
 				put(&s[k], &f, at, 1, corner[i]);
 		}
 		const struct accel_shape shape[2] = {shape_of(&s[0], SURFACE_TRANSMITS),
-						     shape_of(&s[1], SURFACE_SHINES)};
+						     shape_of(&s[1], SURFACE_EMITS)};
 		assert_int_equal(coincide_find(&c, shape, 2, &e), 0);
 		assert_non_null(c);
 		assert_int_equal(accel_new(&a, shape, 2, c, &e), 0);
@@ -452,7 +452,7 @@ static void test_rays(void **state)
 						     .index = s[right].index};
 			struct surface_point q;
 			surface_from_hit(&g, eye.p, w, &hit, &q);
-			struct ray_end from = body_end(&q);
+			struct ray_end from = body_ray_end(&q);
 			if (accel_closest(a, &from, w, 0, INFINITY, &hit) || accel_occluded(a, &from, &far) ||
 			    accel_occluded(a, &eye, &from) || accel_occluded_to_infinity(a, &from, w))
 				fail_msg("what leaves shape %u meets the one that it coincides with", right);
@@ -463,7 +463,7 @@ static void test_rays(void **state)
 			/* The point of the pane at the same position. */
 			struct triangle t = triangle_from(shape[0].position, shape[0].index[0]);
 			double unused;
-			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1, 0};
+			struct prim_ref prim = {0, triangle_intersect(&t, p, f.n, &unused) ? 0 : 1, 0};
 			struct ray_end hidden = {p, f.n, prim};
 			assert_false(accel_closest(a, &hidden, w, 0, INFINITY, &hit));
 			assert_true(accel_occluded(a, &hidden, &far) && accel_occluded(a, &eye, &hidden) &&
@@ -483,8 +483,8 @@ static void test_fan(void **state)
 	(void)state;
 	enum { PARTS = 256 };
 	static struct soup s;
-	struct dice d = dice_of("fan");
-	for (size_t n = dice_count(200); n > 0; n--) {
+	struct dice d = dice_for_test("fan");
+	for (size_t n = dice_scaled_count(200); n > 0; n--) {
 		struct frame f = frame_around(dice_direction(&d));
 		vec3 rim[PARTS + 1];
 		double size = exp2(dice_between(&d, -12, 0)), wide = size * dice_between(&d, 0.01, 1);

@@ -57,8 +57,8 @@ static double distance_by_search(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
 static void test_distance(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("distances from cones");
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	struct dice d = dice_for_test("distances from cones");
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &d);
@@ -76,7 +76,7 @@ static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t
 	for (enum cone_part part = 0; part < CONE_PARTS; part++) {
 		double root[2];
 		for (int k = 0; cone_roots(c, part, o, d, root) && k < 2; k++)
-			if (isfinite(root[k]) && cone_has(c, part, vec3_madd(o, root[k], d), slack))
+			if (isfinite(root[k]) && cone_part_contains(c, part, vec3_madd(o, root[k], d), slack))
 				t[n++] = root[k];
 	}
 	for (int i = 0; i < n; i++)
@@ -95,9 +95,9 @@ static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t
 static void test_rays(void **state)
 {
 	(void)state;
-	struct dice dice = dice_of("rays at cones");
+	struct dice dice = dice_for_test("rays at cones");
 	uint32_t hits[KINDS] = {0};
-	for (size_t i = 0; i < dice_count(60000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(60000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &dice);
@@ -131,15 +131,15 @@ static void test_rays(void **state)
 		hits[i % KINDS] += n > 0;
 	}
 	for (size_t i = 0; i < KINDS; i++)
-		assert_true(hits[i] > 100 * dice_count(60000) / 60000);
+		assert_true(hits[i] > 100 * dice_scaled_count(60000) / 60000);
 }
 
 /* The other root of a line that starts on the surface, against all roots. Outwards, no root lies ahead. */
 static void test_other_root(void **state)
 {
 	(void)state;
-	struct dice dice = dice_of("rays from cones");
-	for (size_t i = 0; i < dice_count(30000); i++) {
+	struct dice dice = dice_for_test("rays from cones");
+	for (size_t i = 0; i < dice_scaled_count(30000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &dice);
@@ -153,7 +153,7 @@ static void test_other_root(void **state)
 			double scale = fmax(k->r0, k->r1) / fmax(want, 1e-300);
 			if (!(fabs(other - want) <= 1e-9 * want * fmax(scale, 1)))
 				fail_msg("%s, part %d: %.17g, not %.17g", k->name, part, other, want);
-			if (cone_has(&c, part, p, 0))
+			if (cone_part_contains(&c, part, p, 0))
 				assert_true(other > 0 && fabs(cone_height(&c, part, p)) < 1e-13);
 		}
 	}
@@ -169,7 +169,7 @@ static void test_areas(void **state)
 					     {"cone", 1, 0.5, 0.2},
 					     {"tip", 1, 0.4, 0},
 					     {"sphere", 0.2, 0.5, 0.1}};
-	struct dice dice = dice_of("areas of cones");
+	struct dice dice = dice_for_test("areas of cones");
 	for (size_t b = 0; b < sizeof bodies / sizeof *bodies; b++) {
 		const struct kind *k = &bodies[b];
 		vec3 p0 = {-0.5 * k->length, 0, 0}, p1 = {0.5 * k->length, 0, 0};
@@ -183,7 +183,7 @@ static void test_areas(void **state)
 		for (size_t i = 0; i < n; i++) {
 			vec3 w = dice_direction(&dice), a = dice_direction(&dice), across;
 			across = vec3_normalize(vec3_madd(a, -vec3_dot(a, w), w));
-			vec3 o = vec3_madd(vec3_scale(-3, w), r * sqrt(dice_throw(&dice)), across);
+			vec3 o = vec3_madd(vec3_scale(-3, w), r * sqrt(dice_uniform(&dice)), across);
 			double t[6];
 			met += roots_of(&c, o, w, 1e-14, t) > 0;
 		}

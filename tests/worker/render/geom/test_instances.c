@@ -108,8 +108,8 @@ static struct scene *scene_of(int first)
 	struct scene *s = mem_alloc(1, sizeof *s);
 	struct accel_shape a[SHAPES] = {{.is_sphere = false}};
 	assert_non_null(s);
-	body_ball(&s->ball, 6, 0.8, 0.1);
-	body_plane(&s->shape[INSTANCES], 2, 0.25, -0.125);
+	body_make_ball(&s->ball, 6, 0.8, 0.1);
+	body_make_plane(&s->shape[INSTANCES], 2, 0.25, -0.125);
 	turn_scene(s);
 	for (int k = 0; k < SHAPES; k++) {
 		mat4 m = k < INSTANCES ? transform((k + first) % INSTANCES) : mat4_identity();
@@ -117,8 +117,8 @@ static struct scene *scene_of(int first)
 		if (k < INSTANCES) {
 			*g = s->ball;
 			assert_true(placement_make(&s->place[k], &m, (vec3){-0.9, -0.9, -0.9}, (vec3){0.9, 0.9, 0.9}));
-			g->place = &s->place[k];
-			if (s->place[k].mirrored)
+			g->placement = &s->place[k];
+			if (s->place[k].is_mirrored)
 				g->index = s->turned;
 			s->size[k] = triangle_norm_max(s->place[k].half);
 		} else {
@@ -129,7 +129,7 @@ static struct scene *scene_of(int first)
 					    .position = (const float(*)[3])g->position,
 					    .index = (const uint32_t(*)[3])g->index,
 					    .rank = SURFACE_OPAQUE,
-					    .place = g->place};
+					    .placement = g->placement};
 		for (uint32_t i = 0; i < g->triangle_count; i++)
 			for (int c = 0; c < 3; c++)
 				s->corner[k][i][c] = move(&m, g->position[g->index[i][c]]);
@@ -144,8 +144,8 @@ static void scene_free(struct scene *s)
 {
 	accel_free(s->accel);
 	mem_free(s->turned);
-	body_free(&s->ball);
-	body_free(&s->shape[INSTANCES]);
+	body_fini(&s->ball);
+	body_fini(&s->shape[INSTANCES]);
 	mem_free(s);
 }
 
@@ -178,20 +178,20 @@ static struct met search(const struct scene *s, wide o, wide d, const struct pri
 static struct surface_point point_of(const struct scene *s, struct dice *d)
 {
 	uint32_t k = dice_below(d, SHAPES);
-	return body_point(&s->shape[k], k, d);
+	return body_sample_point(&s->shape[k], k, d);
 }
 
 /* Returns a direction, nearly half of the time one along the surface. */
 static vec3 direction_leaving(const struct surface_point *x, struct dice *d)
 {
 	vec3 w = dice_direction(d);
-	double low = dice_throw(d) < 0.3 ? exp(dice_between(d, -20, 0)) : 1;
+	double low = dice_uniform(d) < 0.3 ? exp(dice_between(d, -20, 0)) : 1;
 	return vec3_normalize(vec3_madd(w, (low - 1) * vec3_dot(w, x->ng), x->ng));
 }
 
 static struct ray_end start_of(const struct scene *s, struct dice *d, vec3 *w)
 {
-	if (dice_throw(d) < 0.3) {
+	if (dice_uniform(d) < 0.3) {
 		const struct ray_end from = {.p = vec3_scale(dice_between(d, 0.1, 30), dice_direction(d)),
 					     .prim = PRIM_NONE};
 		const struct surface_point aim = point_of(s, d);
@@ -200,7 +200,7 @@ static struct ray_end start_of(const struct scene *s, struct dice *d, vec3 *w)
 	}
 	const struct surface_point x = point_of(s, d);
 	*w = direction_leaving(&x, d);
-	return body_end(&x);
+	return body_ray_end(&x);
 }
 
 static void check_closest(struct scene *s, struct dice *d, size_t n, size_t met[SHAPES], size_t *wrong)
@@ -241,7 +241,7 @@ static void check_segments(struct scene *s, struct dice *d, size_t n, size_t *bl
 {
 	for (size_t i = 0; i < n; i++) {
 		const struct surface_point a = point_of(s, d), b = point_of(s, d);
-		const struct ray_end from = body_end(&a), to = body_end(&b);
+		const struct ray_end from = body_ray_end(&a), to = body_ray_end(&b);
 		const struct prim_ref out[2] = {a.prim, b.prim};
 		bool plane = a.prim.shape == INSTANCES && b.prim.shape == INSTANCES; /* the segment lies in the plane */
 		bool want = search(s, widen(a.p), wide_sub(widen(b.p), widen(a.p)), out, 1).prim.shape != UINT32_MAX;
@@ -259,9 +259,9 @@ static void test_rays(void **state)
 {
 	(void)state;
 	for (int first = 0; first < 4; first += 2) {
-		struct dice d = dice_of("rays among instances");
+		struct dice d = dice_for_test("rays among instances");
 		struct scene *s = scene_of(first);
-		size_t n = dice_count(4000), met[SHAPES] = {0}, wrong = 0, crossed = 0, blocked = 0;
+		size_t n = dice_scaled_count(4000), met[SHAPES] = {0}, wrong = 0, crossed = 0, blocked = 0;
 		check_closest(s, &d, n, met, &wrong);
 		check_segments(s, &d, n / 2, &blocked, &crossed);
 		print_message("%zu rays: %zu differ; met", n, wrong);
@@ -280,12 +280,12 @@ static void test_rays(void **state)
 static void test_closed(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("rays within instances");
+	struct dice d = dice_for_test("rays within instances");
 	struct scene *s = scene_of(0);
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		uint32_t k = dice_below(&d, INSTANCES);
-		const struct surface_point x = body_point(&s->shape[k], k, &d);
-		const struct ray_end from = body_end(&x);
+		const struct surface_point x = body_sample_point(&s->shape[k], k, &d);
+		const struct ray_end from = body_ray_end(&x);
 		vec3 w = direction_leaving(&x, &d);
 		struct ray_hit hit;
 		if (vec3_dot(w, x.ng) > 0)
@@ -318,8 +318,8 @@ static void test_coincident(void **state)
 	struct geom_shape floor, top;
 	struct placement place[4];
 	struct accel_shape a[5] = {{.is_sphere = false}};
-	body_plane(&floor, 2, 0, 0);
-	body_plane(&top, 4, 0, 0);
+	body_make_plane(&floor, 2, 0, 0);
+	body_make_plane(&top, 4, 0, 0);
 	for (uint32_t i = 0; i < top.vertex_count; i++)
 		top.position[i][2] = -0.3f;
 	const mat4 m[4] = {mat4_translate((vec3){0, 0, 0.3}),
@@ -333,7 +333,7 @@ static void test_coincident(void **state)
 					    .position = (const float(*)[3])g->position,
 					    .index = (const uint32_t(*)[3])g->index,
 					    .rank = k < 4 ? SURFACE_TRANSMITS : SURFACE_OPAQUE,
-					    .place = k < 4 ? &place[k] : NULL};
+					    .placement = k < 4 ? &place[k] : NULL};
 		assert_true(k == 4 || placement_make(&place[k], &m[k], (vec3){-1, -1, -0.3f}, (vec3){1, 1, -0.3f}));
 	}
 	struct coincidence *c;
@@ -345,11 +345,11 @@ static void test_coincident(void **state)
 			const struct prim_ref prim = {k, i, 0};
 			const struct triangle t = accel_triangle(&a[k], i, 0);
 			vec3 p = vec3_scale(1.0 / 3, vec3_add(t.v[0], vec3_add(t.v[1], t.v[2])));
-			assert_int_equal(coincide_there(c, a, prim, p).shape, k < 2 ? 4 : k);
+			assert_int_equal(coincide_present_prim(c, a, prim, p).shape, k < 2 ? 4 : k);
 		}
 	coincide_free(c);
-	body_free(&floor);
-	body_free(&top);
+	body_fini(&floor);
+	body_fini(&top);
 }
 
 /* Returns a direction along the surface that rises by `slope`. */
@@ -372,11 +372,11 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	assert_true(placement_make(&place[1], &above, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
 	struct geom_shape s[2] = {{.vertex_count = 4, .triangle_count = 2, .position = position, .index = index}};
 	s[1] = s[0];
-	s[0].place = &place[0];
-	s[1].place = &place[1];
-	struct accel *a = body_accel(s, 2);
+	s[0].placement = &place[0];
+	s[1].placement = &place[1];
+	struct accel *a = body_build_accel(s, 2);
 	const vec3 up = placement_normal(&place[0], (vec3){0, 0, 1});
-	for (size_t i = 0; i < dice_count(2000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(2000); i++) {
 		const vec3 p = {dice_between(d, -0.5, 0.5), dice_between(d, -0.5, 0.5), 0};
 		const struct ray_end from = {placement_point(&place[0], p), up, {0, p.y > p.x, 0}};
 		vec3 w = grazing(d, up, exp(dice_between(d, log(1.0 / 32), log(8))));
@@ -392,7 +392,7 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 static void test_sheets(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("instances of a sheet");
+	struct dice d = dice_for_test("instances of a sheet");
 	const mat4 turned = product(mat4_translate((vec3){0.2, -0.1, 0.3}), mat4_rotate((vec3){1, 2, -1}, 50));
 	const vec3 sizes[] = {{1, 1, 1}, {0.5, 0.25, 0.4}, {0.3, 0.3, -0.6}, {0.25, 0.25, 0.03}};
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)

@@ -24,21 +24,21 @@ struct scene {
 static struct scene scene_of(double small)
 {
 	struct scene s = {.small = small};
-	body_plane(&s.shape[0], 1, 0.5, 0.25);
-	body_ball(&s.shape[1], 6, small, 0.15);
+	body_make_plane(&s.shape[0], 1, 0.5, 0.25);
+	body_make_ball(&s.shape[1], 6, small, 0.15);
 	s.shape[2] = (struct geom_shape){.is_sphere = true,
 					 .center = {2 * small, 0.6 * small, 2 * small},
 					 .radius = 0.7 * small,
 					 .normal_sign = 1};
-	s.accel = body_accel(s.shape, SHAPES);
+	s.accel = body_build_accel(s.shape, SHAPES);
 	return s;
 }
 
 static void scene_free(struct scene *s)
 {
 	accel_free(s->accel);
-	body_free(&s->shape[0]);
-	body_free(&s->shape[1]);
+	body_fini(&s->shape[0]);
+	body_fini(&s->shape[1]);
 }
 
 /* Returns the nearest hit of a sphere from outside; d is a unit vector. */
@@ -57,7 +57,7 @@ static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 	for (uint32_t i = 0; i < SHAPES; i++) {
 		uint32_t prim;
 		double t = s->shape[i].is_sphere ? sphere_nearest(&s->shape[i], o, d)
-						 : body_nearest(&s->shape[i], o, d, 0, &prim);
+						 : body_hit_distance(&s->shape[i], o, d, 0, &prim);
 		if (t < best) {
 			best = t;
 			*shape = i;
@@ -142,14 +142,14 @@ static size_t check_from_the_floor(const struct scene *s, struct dice *d, size_t
 		if (!accel_closest(s->accel, &from, down, 0, INFINITY, &hit) || hit.prim.shape != 0)
 			continue;
 		surface_from_hit(&s->shape[0], over, down, &hit, &x);
-		from = body_end(&x);
+		from = body_ray_end(&x);
 		vec3 w = dice_direction(d);
 		uint32_t shape = 0;
 		double t = INFINITY;
 		for (uint32_t k = 1; k < SHAPES; k++) {
 			uint32_t prim;
 			double at = k == 2 ? sphere_nearest(&s->shape[k], x.p, w)
-					   : body_nearest(&s->shape[k], x.p, w, 0, &prim);
+					   : body_hit_distance(&s->shape[k], x.p, w, 0, &prim);
 			if (at < t) {
 				t = at;
 				shape = k;
@@ -169,9 +169,9 @@ static void test_mixed(void **state)
 		double size;
 		size_t wrong; /* allowed per million rays */
 	} sizes[] = {{0x1p-12, 1000}, {0x1p-20, 1000}, {0x1p-30, 1000}, {0x1p-36, 30000}};
-	size_t n = dice_count(20000);
+	size_t n = dice_scaled_count(20000);
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-		struct dice d = dice_of("mixed scales");
+		struct dice d = dice_for_test("mixed scales");
 		struct scene s = scene_of(sizes[i].size);
 		size_t met[SHAPES] = {0}, blocked = 0, close = check_closest(&s, &d, false, n, met),
 		       far = check_closest(&s, &d, true, n, met);

@@ -23,11 +23,11 @@ static double distance_of(const struct surface_point *a, const struct surface_po
 static void test_triangles(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("points put back on triangles");
+	struct dice d = dice_for_test("points put back on triangles");
 	struct geom_shape s;
-	body_ball(&s, 6, 0.7, 0.3);
-	for (size_t i = 0; i < dice_count(50000); i++) {
-		struct surface_point x = body_point(&s, 0, &d), y;
+	body_make_ball(&s, 6, 0.7, 0.3);
+	for (size_t i = 0; i < dice_scaled_count(50000); i++) {
+		struct surface_point x = body_sample_point(&s, 0, &d), y;
 		vec3 o = vec3_madd(x.p, dice_between(&d, 0.01, 2), dice_direction(&d)), w = vec3_sub(x.p, o);
 		double t = vec3_length(w), cosine = fabs(vec3_dot(w, x.ng)) / t;
 		if (cosine < 1e-6 || fmin(fmin(x.b1, x.b2), 1 - x.b1 - x.b2) < 1e-6)
@@ -45,20 +45,20 @@ static void test_triangles(void **state)
 		vec3 past = vec3_sub(beside.p, o);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, o, vec3_normalize(past), t, &y));
 	}
-	body_free(&s);
+	body_fini(&s);
 }
 
 static void test_spheres(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("points put back on spheres");
+	struct dice d = dice_for_test("points put back on spheres");
 	struct geom_shape s = {.is_sphere = true,
 			       .center = {0.2, -0.1, 0.3},
 			       .radius = 0.4,
 			       .normal_sign = 1,
 			       .sphere_axes = frame_around((vec3){0, 0, 1})};
-	for (size_t i = 0; i < dice_count(50000); i++) {
-		struct surface_point x = body_point(&s, 0, &d), y, z;
+	for (size_t i = 0; i < dice_scaled_count(50000); i++) {
+		struct surface_point x = body_sample_point(&s, 0, &d), y, z;
 		vec3 o = vec3_madd(x.p, dice_between(&d, 0.01, 2), dice_direction(&d)), w = vec3_sub(x.p, o);
 		double t = vec3_length(w), cosine = fabs(vec3_dot(w, x.ng)) / t;
 		if (cosine < 1e-4)

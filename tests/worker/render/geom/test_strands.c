@@ -25,7 +25,7 @@ enum { KINDS = sizeof kinds / sizeof *kinds };
 
 static void make_strand(struct strand *s, const struct kind *k, struct dice *d)
 {
-	strand_random(s, k->count, k->turn, k->length, k->radius, d);
+	strand_make_random(s, k->count, k->turn, k->length, k->radius, d);
 }
 
 /* Finds the nearest primitive that the ray meets; returns false if there is none. */
@@ -33,8 +33,8 @@ static bool nearest(const struct strand *s, struct curve_ray *r, uint32_t *prim,
 {
 	bool any = false;
 	double t_max = r->t_max;
-	for (uint32_t i = 0; i < s->c.count; i++)
-		if (curves_meet(&s->c, i, r, x)) {
+	for (uint32_t i = 0; i < s->curves.count; i++)
+		if (curves_intersect(&s->curves, i, r, x)) {
 			*prim = i;
 			r->t_max = x->t;
 			any = true;
@@ -45,7 +45,7 @@ static bool nearest(const struct strand *s, struct curve_ray *r, uint32_t *prim,
 
 static vec3 aimed_at(const struct strand *s, struct dice *d)
 {
-	const float *p = s->point[dice_below(d, s->c.point_count)];
+	const float *p = s->point[dice_below(d, s->curves.point_count)];
 	double off = dice_below(d, 2) ? 1 : dice_between(d, 0, 1.2);
 	return vec3_madd((vec3){(double)p[0], (double)p[1], (double)p[2]}, off * (double)p[3], dice_direction(d));
 }
@@ -55,8 +55,8 @@ static vec3 aimed_at(const struct strand *s, struct dice *d)
 static void test_crossings(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("crossings of strands");
-	for (size_t i = 0; i < dice_count(28000); i++) {
+	struct dice d = dice_for_test("crossings of strands");
+	for (size_t i = 0; i < dice_scaled_count(28000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		struct strand s;
 		make_strand(&s, k, &d);
@@ -66,18 +66,19 @@ static void test_crossings(void **state)
 		uint32_t prim;
 		struct curve_crossing x;
 		while (nearest(&s, &r, &prim, &x)) {
-			struct cone c = curves_cone(&s.c, prim);
-			struct curve_site at = curves_site(&c, x.part, vec3_madd(r.o, x.t, w));
-			struct curve_place p;
-			assert_true(curves_have(&s.c, prim, at));
-			curves_place(&s.c, prim, at, &p);
+			struct cone c = curves_cone(&s.curves, prim);
+			struct curve_coordinates at = curves_coordinates(&c, x.part, vec3_madd(r.o, x.t, w));
+			struct curve_point p;
+			assert_true(curves_have_point(&s.curves, prim, at));
+			curves_compute_point(&s.curves, prim, at, &p);
 			double off = strand_distance(&s, p.p), beside = vec3_length(vec3_cross(vec3_sub(p.p, o), w));
 			if (!(fabs(off) < 1e-9 && beside < 2e-7))
 				fail_msg("%s, ray %zu: distance %g, %g beside the ray", k->name, i, off, beside);
 			depth += vec3_dot(p.n, w) < 0 ? 1 : -1;
 			if (depth < 0 || depth > 1)
 				fail_msg("%s, ray %zu: crossing %d makes it %d deep", k->name, i, met, depth);
-			r = (struct curve_ray){.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = prim};
+			r = (struct curve_ray){
+				.o = p.p, .d = w, .t_max = INFINITY, .starts_on_curve = true, .start_prim = prim};
 			assert_true(++met < 100);
 		}
 		if (depth != 0)
@@ -96,21 +97,22 @@ static void test_crossings(void **state)
 static void test_culled(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("culled strands");
+	struct dice d = dice_for_test("culled strands");
 	size_t entered = 0;
-	for (size_t i = 0; i < dice_count(14000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(14000); i++) {
 		const struct kind *k = &kinds[i % KINDS];
 		struct strand s;
 		make_strand(&s, k, &d);
 		vec3 w = dice_direction(&d);
 		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY}, culled = r;
-		culled.culled = true;
+		culled.culls_backfaces = true;
 		uint32_t prim, culled_prim;
 		struct curve_crossing x, y;
 		while (nearest(&s, &r, &prim, &x)) {
-			struct cone c = curves_cone(&s.c, prim);
-			struct curve_place p;
-			curves_place(&s.c, prim, curves_site(&c, x.part, vec3_madd(r.o, x.t, w)), &p);
+			struct cone c = curves_cone(&s.curves, prim);
+			struct curve_point p;
+			curves_compute_point(&s.curves, prim, curves_coordinates(&c, x.part, vec3_madd(r.o, x.t, w)),
+					     &p);
 			if (vec3_dot(p.n, w) < 0) {
 				if (!(nearest(&s, &culled, &culled_prim, &y) && culled_prim == prim &&
 				      y.part == x.part))
@@ -118,64 +120,66 @@ static void test_culled(void **state)
 				culled = (struct curve_ray){.o = p.p,
 							    .d = w,
 							    .t_max = INFINITY,
-							    .starts = true,
-							    .from = prim,
-							    .culled = true};
+							    .starts_on_curve = true,
+							    .start_prim = prim,
+							    .culls_backfaces = true};
 				entered++;
 			}
-			r = (struct curve_ray){.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = prim};
+			r = (struct curve_ray){
+				.o = p.p, .d = w, .t_max = INFINITY, .starts_on_curve = true, .start_prim = prim};
 		}
 		if (nearest(&s, &culled, &culled_prim, &y))
 			fail_msg("%s, ray %zu: it is met from inside", k->name, i);
 	}
-	assert_true(entered > dice_count(7000));
+	assert_true(entered > dice_scaled_count(7000));
 }
 
 /* A segment between two points of the surface meets nothing at its ends. */
 static void test_segments(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("segments of strands");
+	struct dice d = dice_for_test("segments of strands");
 	size_t inner = 0;
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		struct strand s;
 		make_strand(&s, &kinds[i % 2], &d); /* straight and bent in turn */
 		vec3 w = dice_direction(&d);
 		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY};
 		uint32_t first, second, between;
 		struct curve_crossing x, y;
-		struct curve_place a, b;
+		struct curve_point a, b;
 		if (!nearest(&s, &r, &first, &x))
 			continue;
-		struct cone c = curves_cone(&s.c, first);
-		curves_place(&s.c, first, curves_site(&c, x.part, vec3_madd(r.o, x.t, w)), &a);
-		r = (struct curve_ray){.o = a.p, .d = w, .t_max = INFINITY, .starts = true, .from = first};
+		struct cone c = curves_cone(&s.curves, first);
+		curves_compute_point(&s.curves, first, curves_coordinates(&c, x.part, vec3_madd(r.o, x.t, w)), &a);
+		r = (struct curve_ray){
+			.o = a.p, .d = w, .t_max = INFINITY, .starts_on_curve = true, .start_prim = first};
 		assert_true(nearest(&s, &r, &second, &y));
-		c = curves_cone(&s.c, second);
-		curves_place(&s.c, second, curves_site(&c, y.part, vec3_madd(r.o, y.t, w)), &b);
+		c = curves_cone(&s.curves, second);
+		curves_compute_point(&s.curves, second, curves_coordinates(&c, y.part, vec3_madd(r.o, y.t, w)), &b);
 		r = (struct curve_ray){.o = a.p,
 				       .d = vec3_sub(b.p, a.p),
 				       .end = b.p,
-				       .starts = true,
-				       .ends = true,
-				       .from = first,
-				       .to = second,
+				       .starts_on_curve = true,
+				       .ends_on_curve = true,
+				       .start_prim = first,
+				       .end_prim = second,
 				       .t_max = 1};
-		for (between = 0; between < s.c.count; between++)
-			assert_false(curves_meet(&s.c, between, &r, &x));
+		for (between = 0; between < s.curves.count; between++)
+			assert_false(curves_intersect(&s.curves, between, &r, &x));
 		r = (struct curve_ray){.o = b.p,
 				       .d = vec3_sub(a.p, b.p),
 				       .end = a.p,
-				       .starts = true,
-				       .ends = true,
-				       .from = second,
-				       .to = first,
+				       .starts_on_curve = true,
+				       .ends_on_curve = true,
+				       .start_prim = second,
+				       .end_prim = first,
 				       .t_max = 1};
-		for (between = 0; between < s.c.count; between++)
-			assert_false(curves_meet(&s.c, between, &r, &x));
+		for (between = 0; between < s.curves.count; between++)
+			assert_false(curves_intersect(&s.curves, between, &r, &x));
 		inner++;
 	}
-	assert_true(inner > dice_count(20000) / 4);
+	assert_true(inner > dice_scaled_count(20000) / 4);
 }
 
 /* From points so near a joint that in double they lie on two cones: outwards, a ray does not meet a straight chain
@@ -183,19 +187,21 @@ static void test_segments(void **state)
 static void test_joints(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("joints of strands");
-	for (size_t i = 0; i < dice_count(40000); i++) {
+	struct dice d = dice_for_test("joints of strands");
+	for (size_t i = 0; i < dice_scaled_count(40000); i++) {
 		struct strand s;
-		strand_begin(&s);
+		strand_init(&s);
 		for (int k = 0; k < 5; k++)
 			strand_add(&s, (vec3){0.5 * k - 1, 0.375, 0.125}, i % 2 ? 0.25 : 0.5 - 0.0625 * k);
-		strand_end(&s);
+		strand_end_chain(&s);
 		uint32_t from = 1 + dice_below(&d, 2), prim;
 		double near = exp(dice_between(&d, log(1e-17), log(1e-3)));
-		struct curve_place p;
-		curves_place(&s.c, from, (struct curve_site){i / 2 % 2 ? near : 1 - near, dice_between(&d, -3, 3)}, &p);
+		struct curve_point p;
+		curves_compute_point(&s.curves, from,
+				     (struct curve_coordinates){i / 2 % 2 ? near : 1 - near, dice_between(&d, -3, 3)},
+				     &p);
 		vec3 w = dice_direction(&d);
-		struct curve_ray r = {.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = from};
+		struct curve_ray r = {.o = p.p, .d = w, .t_max = INFINITY, .starts_on_curve = true, .start_prim = from};
 		struct curve_crossing x;
 		bool any = nearest(&s, &r, &prim, &x);
 		if (fabs(vec3_dot(w, p.n)) < 1e-6)
@@ -210,12 +216,12 @@ static void test_open(void **state)
 {
 	(void)state;
 	struct strand s;
-	strand_begin(&s);
+	strand_init(&s);
 	for (int i = 0; i < 4; i++)
 		strand_add(&s, (vec3){i, 0, 0}, 0.25);
-	strand_end(&s);
+	strand_end_chain(&s);
 	for (int open = 0; open < 2; open++) {
-		s.c.open = open;
+		s.curves.is_open = open;
 		struct curve_ray along = {.o = {-2, 0.1, 0}, .d = {1, 0, 0}, .t_max = INFINITY},
 				 across = {.o = {1, 0.1, -2}, .d = {0, 0, 1}, .t_max = INFINITY},
 				 cap = {.o = {-0.1, 0.1, -2}, .d = {0, 0, 1}, .t_max = INFINITY};
@@ -231,22 +237,23 @@ static void test_open(void **state)
 static void test_places(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("places on strands");
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	struct dice d = dice_for_test("places on strands");
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		struct strand s;
 		make_strand(&s, &kinds[1], &d);
-		uint32_t prim = dice_below(&d, s.c.count);
-		struct curve_site at = {dice_between(&d, 0, 1), dice_between(&d, -M_PI, M_PI)};
-		struct curve_place p, q;
-		curves_place(&s.c, prim, at, &p);
-		struct curve_site again = curves_nearest(&s.c, prim, vec3_madd(p.p, 0.01, p.n));
+		uint32_t prim = dice_below(&d, s.curves.count);
+		struct curve_coordinates at = {dice_between(&d, 0, 1), dice_between(&d, -M_PI, M_PI)};
+		struct curve_point p, q;
+		curves_compute_point(&s.curves, prim, at, &p);
+		struct curve_coordinates again = curves_nearest_coordinates(&s.curves, prim, vec3_madd(p.p, 0.01, p.n));
 		assert_true(fabs(again.along - at.along) < 1e-12 && fabs(again.around - at.around) < 1e-12);
 		double h = 1e-6;
-		curves_place(&s.c, prim, (struct curve_site){at.along + (at.along < 0.5 ? h : -h), at.around}, &q);
+		curves_compute_point(&s.curves, prim,
+				     (struct curve_coordinates){at.along + (at.along < 0.5 ? h : -h), at.around}, &q);
 		vec3 up = vec3_normalize(vec3_scale(at.along < 0.5 ? 1 : -1, vec3_sub(q.p, p.p)));
 		assert_true(vec3_length(vec3_sub(up, p.up)) < 1e-8 && fabs(vec3_dot(p.up, p.n)) < 1e-14);
-		curves_place(&s.c, prim, (struct curve_site){at.along, at.around + h}, &q);
-		vec3 side = vec3_scale(1 / (h * p.x), vec3_sub(q.p, p.p));
+		curves_compute_point(&s.curves, prim, (struct curve_coordinates){at.along, at.around + h}, &q);
+		vec3 side = vec3_scale(1 / (h * p.axis_distance), vec3_sub(q.p, p.p));
 		assert_true(vec3_length(vec3_sub(side, p.side)) < 1e-5);
 		double turn = q.u - p.u;
 		assert_true(fabs((turn < 0 ? turn + 1 : turn) - h / (2 * M_PI)) < 1e-12);

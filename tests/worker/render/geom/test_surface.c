@@ -27,13 +27,13 @@ static double off_line(vec3 p, vec3 o, vec3 d)
 static void test_triangles(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("surface of triangles");
+	struct dice d = dice_for_test("surface of triangles");
 	struct geom_shape s;
-	body_ball(&s, 12, 0.7, 0.15);
-	struct accel *a = body_accel(&s, 1);
+	body_make_ball(&s, 12, 0.7, 0.15);
+	struct accel *a = body_build_accel(&s, 1);
 	double worst_plane = 0, worst_line = 0;
 	size_t met = 0, beside = 0;
-	for (size_t i = 0; i < dice_count(100000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(100000); i++) {
 		vec3 o = vec3_scale(i % 2 ? 0.3 : 3, dice_direction(&d));
 		vec3 w = vec3_normalize(vec3_sub(vec3_scale(0.5, dice_direction(&d)), o));
 		struct ray_end from = {.p = o, .prim = PRIM_NONE};
@@ -59,12 +59,12 @@ static void test_triangles(void **state)
 	}
 	print_message("%zu hits: off the plane %.1e, off the ray %.1e x cos; %zu beside an edge\n", met, worst_plane,
 		      worst_line, beside);
-	assert_true(met > dice_count(100000) / 2);
+	assert_true(met > dice_scaled_count(100000) / 2);
 	assert_true(worst_plane < 1e-15);
 	assert_true(worst_line < 2e-15);
 	assert_true(beside <= met / 10000 + 1);
 	accel_free(a);
-	body_free(&s);
+	body_fini(&s);
 }
 
 /* Points are center + radius x unit vector, so they lie on the sphere to rounding. They lie on the ray to 1e-15 over
@@ -72,7 +72,7 @@ static void test_triangles(void **state)
 static void test_spheres(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("surface of spheres");
+	struct dice d = dice_for_test("surface of spheres");
 	for (double distance = 0.5; distance < 2e6; distance *= 10) {
 		for (double radius = 1e-6; radius < 1; radius *= 20) {
 			struct geom_shape s = {.is_sphere = true,
@@ -80,8 +80,8 @@ static void test_spheres(void **state)
 					       .radius = radius,
 					       .normal_sign = 1,
 					       .sphere_axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-			struct accel *a = body_accel(&s, 1);
-			for (size_t i = 0; i < dice_count(500); i++) {
+			struct accel *a = body_build_accel(&s, 1);
+			for (size_t i = 0; i < dice_scaled_count(500); i++) {
 				vec3 o = vec3_madd(s.center, distance, dice_direction(&d));
 				vec3 aim = vec3_madd(s.center, 0.9 * radius, dice_direction(&d));
 				struct ray_end from = {.p = o, .prim = PRIM_NONE};
@@ -110,20 +110,20 @@ static void test_spheres(void **state)
 static void test_sphere_from_itself(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("sphere from itself");
+	struct dice d = dice_for_test("sphere from itself");
 	struct geom_shape s = {.is_sphere = true,
 			       .center = {0.3, -0.2, 0.1},
 			       .radius = 0.6,
 			       .normal_sign = 1,
 			       .sphere_axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-	struct accel *a = body_accel(&s, 1);
-	for (size_t i = 0; i < dice_count(50000); i++) {
-		struct surface_point x = body_point(&s, 0, &d), y;
+	struct accel *a = body_build_accel(&s, 1);
+	for (size_t i = 0; i < dice_scaled_count(50000); i++) {
+		struct surface_point x = body_sample_point(&s, 0, &d), y;
 		vec3 w = dice_direction(&d);
-		double cosine = i % 2 ? dice_throw(&d) : exp(dice_between(&d, log(1e-7), 0));
+		double cosine = i % 2 ? dice_uniform(&d) : exp(dice_between(&d, log(1e-7), 0));
 		w = vec3_normalize(vec3_madd(w, -vec3_dot(w, x.ng), x.ng));
 		w = vec3_normalize(vec3_madd(vec3_scale(sqrt(1 - cosine * cosine), w), -cosine, x.ng));
-		struct ray_end from = body_end(&x);
+		struct ray_end from = body_ray_end(&x);
 		struct ray_hit hit;
 		assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit));
 		surface_from_hit(&s, x.p, w, &hit, &y);
@@ -144,7 +144,7 @@ static void test_beside_a_sliver(void **state)
 	float position[4][3] = {{0, -1, 0}, {0x1p-20f, -1, 0}, {0x1p-20f, 1, 0}, {0, 0, 0}};
 	uint32_t index[1][3] = {{0, 1, 2}};
 	struct geom_shape s = {.vertex_count = 3, .triangle_count = 1, .position = position, .index = index};
-	struct dice d = dice_of("beside a sliver");
+	struct dice d = dice_for_test("beside a sliver");
 	for (int i = 0; i < 1000; i++) {
 		vec3 aim = {dice_between(&d, -0x1p-20, 0x1p-19), dice_between(&d, -1, 1), 0};
 		vec3 o = {aim.x + dice_between(&d, -1, 1), aim.y + dice_between(&d, -1, 1), 1};
@@ -160,14 +160,14 @@ static void test_beside_a_sliver(void **state)
 static void test_parameters(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("surface parameters");
+	struct dice d = dice_for_test("surface parameters");
 	struct geom_shape s = {.is_sphere = true,
 			       .center = {0.3, -0.2, 0.1},
 			       .radius = 0.6,
 			       .normal_sign = 1,
 			       .sphere_axes = {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}};
 	for (int i = 0; i < 1000; i++) {
-		double u = dice_throw(&d), v = dice_between(&d, 0.05, 0.95), h = 1e-5;
+		double u = dice_uniform(&d), v = dice_between(&d, 0.05, 0.95), h = 1e-5;
 		struct surface_point x[3];
 		for (int k = 0; k < 3; k++) {
 			double phi = 2 * M_PI * (u + (k - 1) * h), theta = M_PI * v;

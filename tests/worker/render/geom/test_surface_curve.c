@@ -21,10 +21,11 @@ enum { STRANDS = 3 };
 static void make_strand(struct strand *s, struct geom_shape *g, double radius, struct dice *d)
 {
 	for (int i = 0; i < STRANDS; i++) {
-		strand_random(&s[i], 12, 0.8, (const double[]){0.05, 0.1}, (const double[]){radius, 1.5 * radius}, d);
+		strand_make_random(&s[i], 12, 0.8, (const double[]){0.05, 0.1}, (const double[]){radius, 1.5 * radius},
+				   d);
 		if (i == 1)
-			strand_smooth(&s[i], 0.1, d);
-		g[i] = (struct geom_shape){.curves = &s[i].c, .normal_sign = i == 2 ? -1 : 1};
+			strand_set_tangents(&s[i], 0.1, d);
+		g[i] = (struct geom_shape){.curves = &s[i].curves, .normal_sign = i == 2 ? -1 : 1};
 	}
 }
 
@@ -33,13 +34,13 @@ static bool search(const struct strand *s, const struct ray_end *from, vec3 w, d
 {
 	bool any = false;
 	for (uint32_t k = 0; k < STRANDS; k++)
-		for (uint32_t i = 0; i < s[k].c.count; i++) {
+		for (uint32_t i = 0; i < s[k].curves.count; i++) {
 			struct curve_ray r = {.o = from->p,
 					      .d = w,
-					      .starts = from->prim.shape == k,
-					      .from = from->prim.prim,
+					      .starts_on_curve = from->prim.shape == k,
+					      .start_prim = from->prim.prim,
 					      .t_max = any ? at->t : t_max};
-			if (!curves_meet(&s[k].c, i, &r, at))
+			if (!curves_intersect(&s[k].curves, i, &r, at))
 				continue;
 			any = true;
 			*prim = (struct prim_ref){k, i, 0};
@@ -50,10 +51,11 @@ static bool search(const struct strand *s, const struct ray_end *from, vec3 w, d
 static vec3 direction_to_strand(const struct strand *s, struct dice *d)
 {
 	const struct strand *k = &s[dice_below(d, STRANDS)];
-	const float *p = k->point[dice_below(d, k->c.point_count)], *q = p == k->point[0] ? p : p - 4;
-	double x = dice_throw(d);
+	const float *p = k->point[dice_below(d, k->curves.point_count)], *q = p == k->point[0] ? p : p - 4;
+	double x = dice_uniform(d);
 	vec3 a = {(double)p[0], (double)p[1], (double)p[2]}, b = {(double)q[0], (double)q[1], (double)q[2]};
-	return vec3_madd(vec3_madd(vec3_scale(x, a), 1 - x, b), 1.1 * dice_throw(d) * (double)p[3], dice_direction(d));
+	return vec3_madd(vec3_madd(vec3_scale(x, a), 1 - x, b), 1.1 * dice_uniform(d) * (double)p[3],
+			 dice_direction(d));
 }
 
 /* Follows a ray and starts another at each hit. */
@@ -77,7 +79,7 @@ static void follow_ray(const struct strand *s, const struct geom_shape *g, const
 		if (vec3_length(vec3_cross(vec3_sub(x.p, from.p), w)) > 4e-8)
 			return; /* the roots of a tangent ray are off by the square root of the rounding */
 		/* Nothing lies in front of the hit, and the curve lies behind it. */
-		struct ray_end to = body_end(&x), beyond = {vec3_madd(x.p, 1e-4, w), {0, 0, 0}, PRIM_NONE};
+		struct ray_end to = body_ray_end(&x), beyond = {vec3_madd(x.p, 1e-4, w), {0, 0, 0}, PRIM_NONE};
 		assert_false(accel_occluded(a, &from, &to));
 		assert_false(accel_occluded(a, &to, &from));
 		assert_true(accel_occluded(a, &from, &beyond));
@@ -94,13 +96,13 @@ static void follow_ray(const struct strand *s, const struct geom_shape *g, const
 static void test_rays(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("rays at strands");
+	struct dice d = dice_for_test("rays at strands");
 	static const double radii[] = {0.02, 1e-3, 2e-5};
-	for (size_t i = 0; i < dice_count(300); i++) {
+	for (size_t i = 0; i < dice_scaled_count(300); i++) {
 		struct strand s[STRANDS];
 		struct geom_shape g[STRANDS];
 		make_strand(s, g, radii[i % 3], &d);
-		struct accel *a = body_accel(g, STRANDS);
+		struct accel *a = body_build_accel(g, STRANDS);
 		size_t met = 0;
 		for (int k = 0; k < 100; k++)
 			follow_ray(s, g, a, &d, k % 3 == 0 ? 0 : k % 3 == 1 ? 2 : 1000, &met);
@@ -114,37 +116,37 @@ static void test_rays(void **state)
 static void test_lifted(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("hairs over a plane");
+	struct dice d = dice_for_test("hairs over a plane");
 	struct strand s;
 	struct geom_shape g[2];
-	body_plane(&g[0], 2, 0, 0);
-	strand_begin(&s);
+	body_make_plane(&g[0], 2, 0, 0);
+	strand_init(&s);
 	for (int i = 0; i < 5; i++)
 		strand_add(&s, (vec3){0.25 * i - 0.5, 0, 0.03125}, 1e-5);
-	strand_end(&s);
-	g[1] = (struct geom_shape){.curves = &s.c, .normal_sign = 1};
-	struct accel *a = body_accel(g, 2);
+	strand_end_chain(&s);
+	g[1] = (struct geom_shape){.curves = &s.curves, .normal_sign = 1};
+	struct accel *a = body_build_accel(g, 2);
 	size_t met = 0;
-	for (size_t i = 0; i < dice_count(20000); i++) {
-		struct surface_point x = body_point(&g[0], 0, &d);
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
+		struct surface_point x = body_sample_point(&g[0], 0, &d);
 		if (x.p.y > -0.5)
 			continue;
 		vec3 to = {dice_between(&d, -0.4, 0.4), 0, 0.03125 + dice_between(&d, -1.2e-5, 1.2e-5)},
 		     w = vec3_normalize(vec3_sub(to, x.p));
-		struct ray_end from = body_end(&x);
+		struct ray_end from = body_ray_end(&x);
 		struct curve_ray r = {.o = x.p, .d = w, .t_max = INFINITY};
 		struct curve_crossing at;
 		struct ray_hit hit;
 		bool any = false;
-		for (uint32_t k = 0; k < s.c.count; k++)
-			any |= curves_meet(&s.c, k, &r, &at);
+		for (uint32_t k = 0; k < s.curves.count; k++)
+			any |= curves_intersect(&s.curves, k, &r, &at);
 		assert_true(any == accel_closest(a, &from, w, 0, INFINITY, &hit));
 		assert_true(any == accel_occluded_to_infinity(a, &from, w));
 		met += any;
 	}
-	assert_true(met > dice_count(20000) / 10);
+	assert_true(met > dice_scaled_count(20000) / 10);
 	accel_free(a);
-	body_free(&g[0]);
+	body_fini(&g[0]);
 }
 
 /* The frame: dp/du runs around the strand, so that t runs along it; smooth normals are perpendicular to the tangents
@@ -152,18 +154,18 @@ static void test_lifted(void **state)
 static void test_frames(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("frames of strands");
-	for (size_t i = 0; i < dice_count(2000); i++) {
+	struct dice d = dice_for_test("frames of strands");
+	for (size_t i = 0; i < dice_scaled_count(2000); i++) {
 		struct strand s;
-		strand_random(&s, 4, 0.3, (const double[]){0.3, 0.4}, (const double[]){0.1, 0.1}, &d);
-		struct geom_shape g = {.curves = &s.c, .normal_sign = 1};
+		strand_make_random(&s, 4, 0.3, (const double[]){0.3, 0.4}, (const double[]){0.1, 0.1}, &d);
+		struct geom_shape g = {.curves = &s.curves, .normal_sign = 1};
 		uint32_t prim = 1 + dice_below(&d, 2);
 		double around = dice_between(&d, -M_PI, M_PI);
 		struct surface_point x;
 		assert_true(surface_on_curve(&g, (struct prim_ref){0, prim, 0}, 0.5, around, &x));
-		struct cone c = curves_cone(&s.c, prim);
+		struct cone c = curves_cone(&s.curves, prim);
 		assert_true(vec3_dot(x.sh.t, c.axis) > 1 - 1e-6 && fabs(vec3_dot(x.sh.s, c.axis)) < 1e-7);
-		strand_smooth(&s, 0.1, &d);
+		strand_set_tangents(&s, 0.1, &d);
 		for (int end = 0; end < 2; end++) {
 			assert_true(surface_on_curve(&g, (struct prim_ref){0, prim, 0}, end, around, &x));
 			const float *t = s.tangent[prim + (uint32_t)end];
@@ -184,7 +186,8 @@ struct hairs {
 
 static void make_hairs(struct hairs *h, struct dice *d)
 {
-	h->c = (struct curves){.point = h->point, .cone = h->cone, .start = h->start, .v = h->v, .thickest = 1e-4f};
+	h->c = (struct curves){
+		.points = h->point, .cone = h->cone, .u_start = h->start, .v = h->v, .max_radius = 1e-4f};
 	for (uint32_t i = 0; i < HAIRS; i++) {
 		vec3 p = vec3_scale(0.5, dice_direction(d)), w = vec3_normalize(p);
 		for (uint32_t k = 0; k <= PIECES; k++) {
@@ -204,18 +207,18 @@ static void make_hairs(struct hairs *h, struct dice *d)
 static void test_memory_and_bits(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("many hairs");
+	struct dice d = dice_for_test("many hairs");
 	struct hairs *h = mem_alloc(1, sizeof *h);
 	assert_non_null(h);
 	make_hairs(h, &d);
 	struct geom_shape g = {.curves = &h->c, .normal_sign = 1};
-	struct accel *a = body_accel(&g, 1), *b = body_accel(&g, 1);
+	struct accel *a = body_build_accel(&g, 1), *b = body_build_accel(&g, 1);
 	double arrays = (double)(sizeof *h - sizeof h->c) / (double)h->c.count,
 	       tree = (double)accel_bytes(a) / (double)h->c.count;
 	print_message("%u segments: %.1f bytes each, and %.1f in Embree (at most %.1f)\n", h->c.count, arrays, tree,
 		      (double)accel_peak_bytes(a) / (double)h->c.count);
 	assert_true(arrays + tree <= 150);
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		vec3 w = dice_direction(&d);
 		struct ray_end from = {vec3_scale(-2, dice_direction(&d)), {0, 0, 0}, PRIM_NONE};
 		w = vec3_normalize(vec3_sub(vec3_scale(0.7, w), from.p));

@@ -26,7 +26,7 @@ enum { SIDE = 32 };
 static struct picture render(struct world *w)
 {
 	struct picture out;
-	const struct render_picture_how how = {"path", "gltf", 8, 6};
+	const struct render_picture_options how = {"path", "gltf", 8, 6};
 	render_picture_xyz(w, &how, &out);
 	world_free(w);
 	return out;
@@ -36,19 +36,19 @@ static void test_twin(void **state)
 {
 	(void)state;
 	static struct gltf_files f;
-	struct asset_source folder = asset_folder("tests/scenes/gltf");
+	struct asset_source folder = asset_source_for_folder("tests/scenes/gltf");
 	struct asset texture;
 	struct error e;
 	assert_int_equal(folder.open(folder.user, "rgb.hdr", &texture, &e), 0);
 	/* With the choice of emitters by position, the probabilities would depend on the last bits of the cameras,
 	 * which differ. */
 	worlds_accuracy = "emitter-choice=power";
-	struct picture want = render(world_of_own_scene("gltf", "twin.xml", SIDE, SIDE));
+	struct picture want = render(world_from_own_scene("gltf", "twin.xml", SIDE, SIDE));
 	gltf_files_make(&f);
 	for (int form = 0; form < GLTF_FORMS; form++) {
 		gltf_files_pack(&f, (enum gltf_form)form);
-		f.list[2] = (struct memory_file){"rgb.hdr", texture.bytes, texture.size};
-		struct picture got = render(world_of_files(SIDE, SIDE, f.list));
+		f.files[2] = (struct memory_file){"rgb.hdr", texture.bytes, texture.size};
+		struct picture got = render(world_from_files(SIDE, SIDE, f.files));
 		double bright = 0;
 		for (int k = 0; k < 3; k++)
 			for (size_t i = 0; i < SIDE * SIDE; i++) {
@@ -171,10 +171,10 @@ static void test_malformed(void **state)
 	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
 		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* a placeholder that packing fills in */
 		const struct memory_file *files =
-			gltf_files_change(&changed, buffer ? NULL : malformed[i].from, malformed[i].to);
+			gltf_files_make_changed(&changed, buffer ? NULL : malformed[i].from, malformed[i].to);
 		if (buffer) {
 			gltf_files_replace(&changed, "BUFFER", malformed[i].to);
-			changed.list[0].size = changed.file_size = strlen(changed.json);
+			changed.files[0].size = changed.file_size = strlen(changed.json);
 			memcpy(changed.file, changed.json, changed.file_size);
 		}
 		refuses(files, malformed[i].text);
@@ -200,12 +200,12 @@ static void test_malformed_containers(void **state)
 		gltf_files_make(&changed);
 		gltf_files_pack(&changed, GLTF_BINARY);
 		changed.file[damage[i].at] = damage[i].value;
-		refuses(changed.list, damage[i].text);
+		refuses(changed.files, damage[i].text);
 	}
 	gltf_files_make(&changed);
 	gltf_files_pack(&changed, GLTF_BINARY);
-	changed.list[0].size -= changed.buffer_size;
-	refuses(changed.list, "its header says");
+	changed.files[0].size -= changed.buffer_size;
+	refuses(changed.files, "its header says");
 }
 
 /* The limit on values applies before jansson allocates memory for them; brackets within text do not count. */
@@ -230,21 +230,21 @@ static void test_too_much(void **state)
 static void test_damaged(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("damaged glTF");
+	struct dice d = dice_for_test("damaged glTF");
 	for (int form = 0; form < GLTF_FORMS; form++)
 		for (int i = 0; i < 400; i++) {
 			gltf_files_make(&changed);
 			gltf_files_pack(&changed, (enum gltf_form)form);
 			size_t at = dice_below(&d, (uint32_t)changed.file_size);
 			if (i % 4 == 0)
-				changed.list[0].size = at;
+				changed.files[0].size = at;
 			else
 				changed.file[at] = (unsigned char)dice_below(&d, 256);
 			struct scene s;
 			struct error e = {""};
-			int rc = gltf_files_read(changed.list, i % 2, &s, &e);
+			int rc = gltf_files_read(changed.files, i % 2, &s, &e);
 			if (!rc) {
-				rc = build_shapes(&s, changed.list, &e);
+				rc = build_shapes(&s, changed.files, &e);
 				scene_fini(&s);
 			}
 			assert_true(rc == 0 || (rc < 0 && *e.text));
@@ -271,7 +271,7 @@ static void assert_near(double got, double want)
 static void test_lights_and_cameras(void **state)
 {
 	(void)state;
-	struct scene s = gltf_files_scene(
+	struct scene s = gltf_files_read_changed(
 		"\"type\": \"point\"",
 		"\"type\": \"spot\", \"spot\": {\"innerConeAngle\": 0.25, \"outerConeAngle\": 0.5}", false);
 	const struct scene_node *spot = find(&s, PLUGIN_EMITTER, "spot");
@@ -280,11 +280,12 @@ static void test_lights_and_cameras(void **state)
 	assert_near(node_float(spot, "beam_width", 0), 0.25 * 180 / M_PI);
 	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* the light emits along -z */
 	scene_fini(&s);
-	s = gltf_files_scene("\"type\": \"point\"", "\"type\": \"directional\"", false);
+	s = gltf_files_read_changed("\"type\": \"point\"", "\"type\": \"directional\"", false);
 	m = node_transform(find(&s, PLUGIN_EMITTER, "directional"), "to_world");
 	assert_true(m.m[2][2] == -1);
 	scene_fini(&s);
-	s = gltf_files_scene("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {", false);
+	s = gltf_files_read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {",
+				    false);
 	const struct scene_node *sensor = find(&s, PLUGIN_SENSOR, "orthographic");
 	m = node_transform(sensor, "to_world");
 	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
@@ -312,8 +313,8 @@ static void test_versions_of_blender(void **state)
 	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
 		char asset[128];
 		snprintf(asset, sizeof asset, "{\"generator\": %s, \"version\": \"2.0\"}", files[i].generator);
-		struct scene s = gltf_files_scene("{\"version\": \"2.0\"}", asset, false);
-		const double *rgb = node_find(find(&s, PLUGIN_EMITTER, "point"), "intensity")->value.as.rgb;
+		struct scene s = gltf_files_read_changed("{\"version\": \"2.0\"}", asset, false);
+		const double *rgb = node_find_property(find(&s, PLUGIN_EMITTER, "point"), "intensity")->value.as.rgb;
 		for (int k = 0; k < 3; k++)
 			assert_near(rgb[k], (4 >> k) * files[i].scale);
 		assert_true(scene_has_note(&s, "lamps are divided by 683") == (files[i].scale < 1));
@@ -331,7 +332,7 @@ static void test_no_camera_no_light(void **state)
 	gltf_files_replace(&changed, "\"camera\": 0,", "");
 	gltf_files_replace(&changed, "\"emissiveFactor\": [1, 0.5, 0.5],", "");
 	gltf_files_replace(&changed, "{\"translation\": [2, 2, 2], \"ext", "{\"translation\": [2, 2, 2], \"ext_");
-	struct scene s = gltf_files_packed(&changed, GLTF_EXTERNAL);
+	struct scene s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "it has no camera") && scene_has_note(&s, "it has no light") &&
 		    scene_has_note(&s, "points and lines"));
 	find(&s, PLUGIN_EMITTER, "constant");
@@ -356,13 +357,13 @@ static unsigned count_of(const struct scene *s, enum plugin_class cls)
 static void test_draco(void **state)
 {
 	(void)state;
-	struct scene s = gltf_files_scene(NULL, NULL, false);
+	struct scene s = gltf_files_read_changed(NULL, NULL, false);
 	unsigned shapes = count_of(&s, PLUGIN_SHAPE);
 	scene_fini(&s);
 	gltf_files_make(&changed);
 	gltf_files_replace(&changed, "\"mode\": 5,",
 			   "\"mode\": 5, \"extensions\": {\"KHR_draco_mesh_compression\": {\"bufferView\": 0}},");
-	s = gltf_files_packed(&changed, GLTF_EXTERNAL);
+	s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
 	assert_int_equal(count_of(&s, PLUGIN_SHAPE), shapes);
 	assert_false(scene_has_note(&s, "Draco") || scene_has_note(&s, "draco"));
 	scene_fini(&s);
@@ -370,8 +371,8 @@ static void test_draco(void **state)
 			   "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"extensionsUsed\"");
 	gltf_files_replace(&changed, "{\"bufferView\": 6, ", "{");
 	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	refuses(changed.list, "meshes[0]: compressed by Draco (KHR_draco_mesh_compression), which is not supported; "
-			      "export without compression");
+	refuses(changed.files, "meshes[0]: compressed by Draco (KHR_draco_mesh_compression), which is not supported; "
+			       "export without compression");
 }
 
 #define HIDDEN(value) "\"extensions\": {\"KHR_node_visibility\": {" value "}"
@@ -391,7 +392,7 @@ static void test_hidden(void **state)
 		 "{\"translation\": [2, 2, 2], " HIDDEN("\"visible\": false") ", ", 4, 0},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct scene s = gltf_files_scene(cases[i].from, cases[i].to, false);
+		struct scene s = gltf_files_read_changed(cases[i].from, cases[i].to, false);
 		unsigned points = 0;
 		for (uint32_t k = 0; k < s.object_count; k++)
 			points += strcmp(s.objects[k]->type, "point") == 0;
@@ -410,7 +411,7 @@ static void test_notes(void **state)
 	gltf_files_replace(&changed, "\"extensionsUsed\": [\"KHR_lights_punctual\"]",
 			   "\"extensionsUsed\": [\"KHR_lights_punctual\", \"ACME_fog\", \"ACME_wind\"]");
 	gltf_files_replace(&changed, "\"intensity\": ", "\"range\": 5, \"intensity\": ");
-	struct scene s = gltf_files_packed(&changed, GLTF_EXTERNAL);
+	struct scene s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);
@@ -421,11 +422,11 @@ static void test_loose_files(void **state)
 {
 	(void)state;
 	struct gltf_files f;
-	struct scene s, whole = gltf_files_scene(NULL, NULL, false);
+	struct scene s, whole = gltf_files_read_changed(NULL, NULL, false);
 	gltf_files_make(&f); /* with a byte order mark */
 	memmove(f.json + 3, f.json, strlen(f.json) + 1);
 	memcpy(f.json, "\xef\xbb\xbf", 3);
-	s = gltf_files_packed(&f, GLTF_BINARY);
+	s = gltf_files_read_packed(&f, GLTF_BINARY);
 	assert_int_equal(s.object_count, whole.object_count);
 	scene_fini(&s);
 	gltf_files_make(&f); /* JSON padded with zeros */
@@ -433,25 +434,25 @@ static void test_loose_files(void **state)
 	gltf_files_pack(&f, GLTF_BINARY);
 	for (size_t at = 19 + f.file[12] + 256u * f.file[13]; f.file[at] != '}'; at--)
 		f.file[at] = 0;
-	assert_int_equal(gltf_files_read(f.list, false, &s, &(struct error){""}), 0);
+	assert_int_equal(gltf_files_read(f.files, false, &s, &(struct error){""}), 0);
 	assert_int_equal(s.object_count, whole.object_count);
 	scene_fini(&s);
 	gltf_files_make(&f); /* without scenes: the same nodes are roots */
 	gltf_files_replace(&f, "\"scene\": 0", "\"extras\": 0");
 	gltf_files_replace(&f, "\"scenes\"", "\"other\"");
-	s = gltf_files_packed(&f, GLTF_BINARY);
+	s = gltf_files_read_packed(&f, GLTF_BINARY);
 	assert_int_equal(s.object_count, whole.object_count);
 	assert_true(scene_has_note(&s, "it has no scenes: all of its nodes are shown"));
 	scene_fini(&s);
 	scene_fini(&whole);
 	/* a picture with an absolute path, and one that the exporter lost */
 	struct error e;
-	const struct memory_file *files = gltf_files_change(&f, "\"rgb.hdr\"", "\"file:///x/rgb.hdr\"");
+	const struct memory_file *files = gltf_files_make_changed(&f, "\"rgb.hdr\"", "\"file:///x/rgb.hdr\"");
 	assert_int_equal(gltf_files_read(files, false, &s, &e), 0);
 	assert_string_equal(s.assets[s.asset_count - 1], "the mesh.bin");
 	assert_string_equal(s.assets[0], "%2f/x/rgb.hdr");
 	scene_fini(&s);
-	s = gltf_files_scene("{\"source\": 0, ", "{", true);
+	s = gltf_files_read_changed("{\"source\": 0, ", "{", true);
 	assert_true(scene_has_note(&s, "unknown_format"));
 	scene_fini(&s);
 }
@@ -461,19 +462,19 @@ static void test_no_area(void **state)
 {
 	(void)state;
 	static const char scale[] = "\"scale\": [4, 1, 4]";
-	struct scene whole = gltf_files_scene(NULL, NULL, false),
-		     s = gltf_files_scene(scale, "\"scale\": [0, 0, 0]", false);
+	struct scene whole = gltf_files_read_changed(NULL, NULL, false),
+		     s = gltf_files_read_changed(scale, "\"scale\": [0, 0, 0]", false);
 	assert_true(s.object_count < whole.object_count);
 	assert_true(scene_has_note(&s, "the mesh of 1 node, which a scale of 0 makes a line or a point, is left out "
 				       "(first: nodes["));
 	scene_fini(&s);
-	s = gltf_files_scene(scale, "\"scale\": [0, 1, 0]", false);
+	s = gltf_files_read_changed(scale, "\"scale\": [0, 1, 0]", false);
 	assert_true(s.object_count < whole.object_count);
 	scene_fini(&s);
 	scene_fini(&whole);
 	struct gltf_files f;
 	struct error e;
-	assert_true(gltf_files_read(gltf_files_change(&f, scale, "\"scale\": [4, 0, 4]"), false, &s, &e));
+	assert_true(gltf_files_read(gltf_files_make_changed(&f, scale, "\"scale\": [4, 0, 4]"), false, &s, &e));
 	assert_non_null(strstr(e.text, "flattens the shape"));
 }
 

@@ -129,15 +129,15 @@ static void test_twin(void **state)
 	pictures_add(&p, 2, 2, rgb);
 	make_gltf(&f, "BLEND");
 	size_t count = 0;
-	while (f.list[count].name)
+	while (f.files[count].name)
 		count++;
-	f.list[count] = (struct memory_file){"rgb.hdr", p.file[0].bytes, p.file[0].size};
+	f.files[count] = (struct memory_file){"rgb.hdr", p.file[0].bytes, p.file[0].size};
 	const struct memory_file files[] = {{"twin.xml", twin, sizeof twin - 1},
 					    {"strip.ply", strip_ply, sizeof strip_ply - 1},
 					    {"solid.ply", solid, write_solid(solid, sizeof solid)},
-					    f.list[count],
+					    f.files[count],
 					    {0}};
-	struct world *a = world_of_files(8, 8, f.list), *b = world_of_files(8, 8, files);
+	struct world *a = world_from_files(8, 8, f.files), *b = world_from_files(8, 8, files);
 	const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
 	const vec3 wo = vec3_normalize((vec3){0.25, 0.5, 1}), wi = vec3_normalize((vec3){-0.25, 0.25, 1});
 	double sum = 0;
@@ -150,7 +150,8 @@ static void test_twin(void **state)
 			double b1 = (k % 4) / 3.0, b2 = (k / 4 % 4) / 3.0 * (1 - b1);
 			surface_on_triangle(mesh, (struct prim_ref){s, k / 16, 0}, b1, b2, &x);
 			struct bsdf_point at = world_bsdf_point(&x, &colour, TRANSPORT_RADIANCE);
-			const struct bsdf *of_a = &a->bsdfs[a->parts[s].bsdf], *of_b = &b->bsdfs[b->parts[s].bsdf];
+			const struct bsdf *of_a = &a->bsdfs[a->shape_bindings[s].bsdf],
+					  *of_b = &b->bsdfs[b->shape_bindings[s].bsdf];
 			spectrum fa = of_a->ops->eval(of_a, &at, wo, wi), fb = of_b->ops->eval(of_b, &at, wo, wi);
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
 				if (!(fabs(fa.v[l] - fb.v[l]) <= 1e-12 * fb.v[l])) /* the index is computed */
@@ -177,10 +178,10 @@ static void test_modes(void **state)
 	} cases[] = {{"MASK", -1}, {"OPAQUE", 0}};
 	for (int i = 0; i < 2; i++) {
 		make_gltf(&f, cases[i].mode);
-		struct asset_source assets = memory_assets(f.list);
+		struct asset_source assets = memory_assets(f.files);
 		struct scene s;
 		struct error e = {""};
-		int rc = scene_read(&s, &assets, f.list[0].name, render_plugins(), NULL, 0, &e);
+		int rc = scene_read(&s, &assets, f.files[0].name, render_plugins(), NULL, 0, &e);
 		if ((rc < 0) != (cases[i].result < 0) ||
 		    (rc && !strstr(e.text, "`alpha_of_COLOR_0_with_MASK` is not supported; --lenient")))
 			fail_msg("%s: %d, %s", cases[i].mode, rc, e.text);

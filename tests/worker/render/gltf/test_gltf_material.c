@@ -31,28 +31,28 @@ static void test_layers(void **state)
 {
 	(void)state;
 	static const char third[] = "bsdf of materials[2]";
-	struct scene s = gltf_files_scene(
+	struct scene s = gltf_files_read_changed(
 		IOR,
 		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatTexture\": {\"index\": 0}, "
 		"\"clearcoatRoughnessFactor\": 0.5, \"clearcoatRoughnessTexture\": {\"index\": 0}, "
 		"\"clearcoatNormalTexture\": {\"index\": 0}}, \"KHR_materials_iridescence\": {\"iridescenceFactor\": 1}, "
 		"\"KHR_materials_sheen\": {\"sheenColorFactor\": [0.5, 0.25, 0.125]}, " IOR,
 		false);
-	const struct scene_node *coat = node_ref(scene_named(&s, third), "coat");
+	const struct scene_node *coat = node_ref(scene_find_object(&s, third), "coat");
 	assert_string_equal(coat->type, "scale");
 	assert_near(node_float(coat, "scale", 0), 0.5);
 	assert_string_equal(node_string(node_child(coat, PLUGIN_TEXTURE, 0), "channel", ""), "r");
-	const struct scene_node *rough = node_ref(scene_named(&s, third), "coat_roughness");
+	const struct scene_node *rough = node_ref(scene_find_object(&s, third), "coat_roughness");
 	assert_string_equal(node_string(node_child(rough, PLUGIN_TEXTURE, 0), "channel", ""), "g");
-	assert_near(node_float(scene_named(&s, third), "sheen", 0), 0.5);
-	assert_near(node_float(scene_named(&s, third), "sheen_tint", 0), 0.75);
+	assert_near(node_float(scene_find_object(&s, third), "sheen", 0), 0.5);
+	assert_near(node_float(scene_find_object(&s, third), "sheen_tint", 0), 0.75);
 	assert_true(scene_has_note(&s, "sheen is that of") && scene_has_note(&s, "thin films") &&
 		    scene_has_note(&s, "clear coats use the normals"));
 	scene_fini(&s);
 
-	s = gltf_files_scene("\"transmissionFactor\": 1",
-			     "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
-	assert_string_equal(node_string(node_ref(scene_named(&s, third), "spec_trans"), "channel", ""), "r");
+	s = gltf_files_read_changed("\"transmissionFactor\": 1",
+				    "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
+	assert_string_equal(node_string(node_ref(scene_find_object(&s, third), "spec_trans"), "channel", ""), "r");
 	scene_fini(&s);
 }
 
@@ -62,7 +62,7 @@ static void assert_absorbs_only(const struct scene_node *node)
 	struct arena arena = {0};
 	struct error e;
 	struct medium m;
-	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
+	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .world_scale = 1};
 	if (medium_create(&m, node, &build, &e))
 		fail_msg("%s", e.text);
 	assert_true(m.absorbs && !m.scatters);
@@ -79,9 +79,9 @@ static void test_volume(void **state)
 	char with[256], thin[256];
 	snprintf(with, sizeof with, "%s, \"thicknessFactor\": 0.1}, " IOR, volume);
 	snprintf(thin, sizeof thin, "%s}, " IOR, volume);
-	struct scene s = gltf_files_scene(IOR, with, false);
-	const struct scene_node *medium = scene_named(&s, third);
-	const double *sigma_a = node_find(medium, "sigma_t")->value.as.rgb;
+	struct scene s = gltf_files_read_changed(IOR, with, false);
+	const struct scene_node *medium = scene_find_object(&s, third);
+	const double *sigma_a = node_find_property(medium, "sigma_t")->value.as.rgb;
 	assert_near(exp(-2 * sigma_a[0]), 0.25);
 	assert_near(exp(-2 * sigma_a[1]), 0.5);
 	assert_true(exp(-2 * sigma_a[2]) < 2e-6);
@@ -92,7 +92,7 @@ static void test_volume(void **state)
 			inside++;
 	assert_true(inside > 0);
 	scene_fini(&s);
-	s = gltf_files_scene(IOR, thin, false);
+	s = gltf_files_read_changed(IOR, thin, false);
 	for (uint32_t i = 0; i < s.object_count; i++)
 		assert_true(s.objects[i]->cls != PLUGIN_MEDIUM);
 	scene_fini(&s);
@@ -108,29 +108,29 @@ static void test_diffuse_transmission(void **state)
 	"\"KHR_materials_diffuse_transmission\": {\"diffuseTransmissionFactor\": 0.5, " \
 	"\"diffuseTransmissionColorFactor\": [0.25, 0.5, 1]" more "}"
 	static const char first[] = "bsdf of materials[0]";
-	struct scene s = gltf_files_scene(FIRST, FIRST ", \"extensions\": {" THROUGH("") "}", false);
-	const struct scene_node *blend = scene_named(&s, first), *sheet = node_child(blend, PLUGIN_BSDF, 1);
+	struct scene s = gltf_files_read_changed(FIRST, FIRST ", \"extensions\": {" THROUGH("") "}", false);
+	const struct scene_node *blend = scene_find_object(&s, first), *sheet = node_child(blend, PLUGIN_BSDF, 1);
 	assert_string_equal(blend->type, "blendbsdf");
 	assert_near(node_float(blend, "weight", 0), 0.5);
 	assert_string_equal(node_child(blend, PLUGIN_BSDF, 0)->type, "principled");
 	assert_string_equal(sheet->type, "difftrans");
-	assert_near(node_find(sheet, "transmittance")->value.as.rgb[0], 0.25);
+	assert_near(node_find_property(sheet, "transmittance")->value.as.rgb[0], 0.25);
 	assert_false(scene_has_note(&s, "diffuse_transmission"));
 	scene_fini(&s);
-	s = gltf_files_scene(FIRST,
-			     "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0.75}, \"extensions\": {" THROUGH(
-				     ", \"diffuseTransmissionTexture\": {\"index\": 0}, "
-				     "\"diffuseTransmissionColorTexture\": {\"index\": 0}") "}",
-			     false);
-	blend = scene_named(&s, first);
+	s = gltf_files_read_changed(FIRST,
+				    "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0.75}, \"extensions\": {" THROUGH(
+					    ", \"diffuseTransmissionTexture\": {\"index\": 0}, "
+					    "\"diffuseTransmissionColorTexture\": {\"index\": 0}") "}",
+				    false);
+	blend = scene_find_object(&s, first);
 	const struct scene_node *weight = node_ref(blend, "weight"),
 				*colour = node_ref(node_child(blend, PLUGIN_BSDF, 1), "transmittance");
 	assert_near(node_float(weight, "scale", 0), 0.125);
 	assert_string_equal(node_string(node_child(weight, PLUGIN_TEXTURE, 0), "channel", ""), "a");
-	assert_near(node_find(colour, "scale")->value.as.rgb[1], 0.5);
+	assert_near(node_find_property(colour, "scale")->value.as.rgb[1], 0.5);
 	scene_fini(&s);
-	s = gltf_files_scene(IOR, THROUGH("") ", " IOR, false); /* the material transmits */
-	assert_string_equal(scene_named(&s, "bsdf of materials[2]")->type, "principled");
+	s = gltf_files_read_changed(IOR, THROUGH("") ", " IOR, false); /* the material transmits */
+	assert_string_equal(scene_find_object(&s, "bsdf of materials[2]")->type, "principled");
 	assert_true(scene_has_note(&s, "is left out if the material also transmits light otherwise"));
 	scene_fini(&s);
 #undef FIRST
@@ -142,9 +142,9 @@ static void test_anisotropy(void **state)
 {
 	(void)state;
 	static const char third[] = "bsdf of materials[2]";
-	struct scene s =
-		gltf_files_scene(IOR, "\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6}, " IOR, false);
-	const struct scene_node *bsdf = scene_named(&s, third);
+	struct scene s = gltf_files_read_changed(
+		IOR, "\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6}, " IOR, false);
+	const struct scene_node *bsdf = scene_find_object(&s, third);
 	double x = node_float(bsdf, "anisotropic", 0), r = node_float(bsdf, "roughness", 0), aspect = sqrt(1 - 0.9 * x);
 	assert_true(x > 0);
 	assert_near(r * r / aspect, 0.25 + 0.75 * 0.36);
@@ -154,8 +154,8 @@ static void test_anisotropy(void **state)
 		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyRotation\": 1}, " IOR,
 		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyTexture\": {}}, " IOR};
 	for (int i = 0; i < 2; i++) {
-		s = gltf_files_scene(IOR, left_out[i], false);
-		assert_null(node_find(scene_named(&s, third), "anisotropic"));
+		s = gltf_files_read_changed(IOR, left_out[i], false);
+		assert_null(node_find_property(scene_find_object(&s, third), "anisotropic"));
 		assert_true(scene_has_note(&s, "anisotropy is left out if it has a texture or a rotation"));
 		scene_fini(&s);
 	}
@@ -165,11 +165,12 @@ static void test_materials(void **state)
 {
 	(void)state;
 	static const char second[] = "bsdf of materials[1]", third[] = "bsdf of materials[2]";
-	struct scene s = gltf_files_scene("\"metallicFactor\": 0.5,",
-					  "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASK\", \"alphaCutoff\": 0.25, "
-					  "\"normalTexture\": {\"index\": 0, \"scale\": 2}, \"x\": {",
-					  false);
-	const struct scene_node *mask = scene_named(&s, second), *map = node_child(mask, PLUGIN_BSDF, 0),
+	struct scene s =
+		gltf_files_read_changed("\"metallicFactor\": 0.5,",
+					"\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASK\", \"alphaCutoff\": 0.25, "
+					"\"normalTexture\": {\"index\": 0, \"scale\": 2}, \"x\": {",
+					false);
+	const struct scene_node *mask = scene_find_object(&s, second), *map = node_child(mask, PLUGIN_BSDF, 0),
 				*opacity = node_ref(mask, "opacity");
 	assert_string_equal(mask->type, "mask");
 	assert_string_equal(node_string(opacity, "channel", ""), "a");
@@ -186,55 +187,57 @@ static void test_materials(void **state)
 	static const char unknown[] = "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASKED\", \"x\": {";
 	static struct gltf_files f;
 	struct error e;
-	assert_true(gltf_files_read(gltf_files_change(&f, "\"metallicFactor\": 0.5,", unknown), false, &s, &e) < 0);
+	assert_true(gltf_files_read(gltf_files_make_changed(&f, "\"metallicFactor\": 0.5,", unknown), false, &s, &e) <
+		    0);
 	assert_non_null(strstr(e.text, "`alphaMode \"MASKED\"` is not supported; --lenient leaves it out"));
-	s = gltf_files_scene("\"metallicFactor\": 0.5,", unknown, true);
-	assert_true(node_float(scene_named(&s, second), "opacity", 0) == 1);
+	s = gltf_files_read_changed("\"metallicFactor\": 0.5,", unknown, true);
+	assert_true(node_float(scene_find_object(&s, second), "opacity", 0) == 1);
 	assert_true(scene_has_note(&s, "the parameter `alphaMode \"MASKED\"` is not supported and left out (lenient)"));
 	scene_fini(&s);
 
 	/* Abbe's number is 20 / dispersion: (n(d) - 1) / (n(F) - n(C)). */
-	s = gltf_files_scene(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
-	const struct scene_node *glass = scene_named(&s, third);
+	s = gltf_files_read_changed(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
+	const struct scene_node *glass = scene_find_object(&s, third);
 	double b = node_float(glass, "int_cauchy_b", 0);
 	assert_string_equal(glass->type, "roughdielectric");
 	assert_near(0.75 / (b / (0.48613 * 0.48613) - b / (0.65627 * 0.65627)), 40);
 	assert_near(node_float(glass, "alpha", 0), 0.25);
-	assert_null(node_find(glass, "specular_transmittance"));
+	assert_null(node_find_property(glass, "specular_transmittance"));
 	scene_fini(&s);
 
 	/* A coloured specular reflection, like that of `principled`. */
-	s = gltf_files_scene(
+	s = gltf_files_read_changed(
 		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5},\n\"extensions\": {\"KHR_materials_transmission\": ",
 		"\"metallicFactor\": 0, \"roughnessFactor\": 0.5, \"baseColorFactor\": [0.25, 0.81, 0.04, 1]},\n"
 		"\"extensions\": {\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, \"KHR_materials_transmission\": ",
 		false);
-	glass = scene_named(&s, third);
+	glass = scene_find_object(&s, third);
 	assert_string_equal(glass->type, "roughdielectric");
-	const struct property *colour = node_find(glass, "specular_transmittance");
+	const struct property *colour = node_find_property(glass, "specular_transmittance");
 	assert_non_null(colour);
 	assert_near(colour->value.as.rgb[0], 0.5);
 	assert_near(colour->value.as.rgb[1], 0.9);
 	assert_near(colour->value.as.rgb[2], 0.2);
 	scene_fini(&s);
 
-	s = gltf_files_scene(
+	s = gltf_files_read_changed(
 		IOR,
 		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatRoughnessFactor\": 0.25}, " IOR,
 		false);
-	assert_near(node_float(scene_named(&s, third), "coat", 0), 0.5);
-	assert_near(node_float(scene_named(&s, third), "coat_roughness", 0), 0.25);
+	assert_near(node_float(scene_find_object(&s, third), "coat", 0), 0.5);
+	assert_near(node_float(scene_find_object(&s, third), "coat_roughness", 0), 0.25);
 	assert_false(scene_has_note(&s, "clear coats"));
 	scene_fini(&s);
 
 	/* Unknown extensions are ignored with a note, even if the file does not list them. */
-	s = gltf_files_scene(IOR, "\"ACME_materials_fur\": {}, " IOR, false);
+	s = gltf_files_read_changed(IOR, "\"ACME_materials_fur\": {}, " IOR, false);
 	assert_true(scene_has_note(&s, "ACME_materials_fur of a material is not supported and ignored"));
 	assert_false(scene_has_note(&s, "KHR_materials_ior"));
 	scene_fini(&s);
 
-	s = gltf_files_scene(", \"material\": 0}", "}", false);
-	scene_named(&s, "bsdf of materials[4]"); /* the format's default material, after the last one of the file */
+	s = gltf_files_read_changed(", \"material\": 0}", "}", false);
+	scene_find_object(&s,
+			  "bsdf of materials[4]"); /* the format's default material, after the last one of the file */
 	scene_fini(&s);
 }
 
@@ -272,10 +275,10 @@ static void test_reflection(void **state)
 				 glass ? "transmission" : "emissive_strength", glass ? "" : "\"emissiveStrength\": 8}");
 			snprintf(to, sizeof to, "\"KHR_materials_specular\": {%s}, %s%.2f}, %s", files[i].members,
 				 glass ? "\"x\": {\"ior\": " : IOR "\"ior\": ", files[i].ior, from);
-			struct scene s = gltf_files_scene(from, to, false);
+			struct scene s = gltf_files_read_changed(from, to, false);
 			const struct scene_node *bsdf =
-				scene_named(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
-			const struct property *colour = node_find(bsdf, "specular_color");
+				scene_find_object(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
+			const struct property *colour = node_find_property(bsdf, "specular_color");
 			const char *want = glass ? files[i].of_glass : files[i].colour;
 			double eta = node_float(bsdf, "eta", 0), root = (eta - 1) / (eta + 1);
 			assert_near(root * root, glass ? R2 : files[i].want);
@@ -304,8 +307,9 @@ static void test_both_sides_shine(void **state)
 	static const char *const files[] = {factor, "\"doubleSided\": false, \"emissiveFactor\": [1, 0.5, 0.5]",
 					    "\"doubleSided\": true, \"emissiveFactor\": [1, 0.5, 0.5]"};
 	for (int i = 0; i < 3; i++) {
-		struct scene s = gltf_files_scene(factor, files[i], false);
-		assert_true(node_bool(scene_named(&s, "emitter of materials[3]"), "two_sided", false) == (i == 2));
+		struct scene s = gltf_files_read_changed(factor, files[i], false);
+		assert_true(node_bool(scene_find_object(&s, "emitter of materials[3]"), "two_sided", false) ==
+			    (i == 2));
 		scene_fini(&s);
 	}
 }
@@ -322,8 +326,8 @@ static void test_webp(void **state)
 	gltf_files_replace(&f, "{\"uri\": \"rgb.hdr\"}", "{\"uri\": \"rgb.hdr\"}, {\"uri\": \"b.webp\"}");
 	gltf_files_replace(&f, "\"extensionsUsed\"",
 			   "\"extensionsRequired\": [\"EXT_texture_webp\"], \"extensionsUsed\"");
-	s = gltf_files_packed(&f, GLTF_EXTERNAL);
-	const struct scene_node *scale = node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color");
+	s = gltf_files_read_packed(&f, GLTF_EXTERNAL);
+	const struct scene_node *scale = node_ref(scene_find_object(&s, "bsdf of materials[1]"), "base_color");
 	assert_string_equal(node_string(node_child(scale, PLUGIN_TEXTURE, 0), "filename", ""), "b.webp");
 	scene_fini(&s);
 }
@@ -349,11 +353,11 @@ static void test_foreign_images(void **state)
 			snprintf(to, sizeof to, "\"extensionsRequired\": [\"%s\"], \"extensionsUsed\"", formats[i]);
 			gltf_files_replace(&f, "\"extensionsUsed\"", to);
 			gltf_files_pack(&f, GLTF_EXTERNAL);
-			int rc = gltf_files_read(f.list, false, &s, &e);
+			int rc = gltf_files_read(f.files, false, &s, &e);
 			if (both) {
 				assert_int_equal(rc, 0);
 				const struct scene_node *scale =
-					node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color");
+					node_ref(scene_find_object(&s, "bsdf of materials[1]"), "base_color");
 				assert_string_equal(node_string(node_child(scale, PLUGIN_TEXTURE, 0), "filename", ""),
 						    "rgb.hdr");
 				scene_fini(&s);
@@ -364,8 +368,8 @@ static void test_foreign_images(void **state)
 				"images of %s are not supported; export PNG, JPEG or WebP; --lenient leaves the texture out",
 				formats[i]);
 			assert_true(rc == -ENOTSUP && strstr(e.text, want));
-			assert_int_equal(gltf_files_read(f.list, true, &s, &e), 0);
-			assert_null(node_find(scene_named(&s, "bsdf of materials[1]"), "base_color"));
+			assert_int_equal(gltf_files_read(f.files, true, &s, &e), 0);
+			assert_null(node_find_property(scene_find_object(&s, "bsdf of materials[1]"), "base_color"));
 			assert_true(scene_has_note(&s, formats[i]));
 			scene_fini(&s);
 		}
@@ -385,8 +389,8 @@ static void test_no_material(void **state)
 			gltf_files_replace(
 				&f, version,
 				"{\"generator\": \"Khronos glTF Blender I/O v3.3.27\", \"version\": \"2.0\"}");
-		s = gltf_files_packed(&f, GLTF_EXTERNAL);
-		const struct scene_node *bsdf = scene_named(&s, "bsdf of materials[4]");
+		s = gltf_files_read_packed(&f, GLTF_EXTERNAL);
+		const struct scene_node *bsdf = scene_find_object(&s, "bsdf of materials[4]");
 		assert_true(node_float(bsdf, "metallic", -1) == (blender ? 0 : 1));
 		assert_near(node_float(bsdf, "eta", 0), 1.5);
 		assert_true(node_float(bsdf, "specular_strength", 1) == (blender ? 0 : 1));
@@ -409,7 +413,7 @@ static void test_images_in_buffers(void **state)
 			struct scene s;
 			struct error e;
 			struct raster r = {0};
-			const struct raster_range range = {0, 1, false, IMAGE_ALL};
+			const struct raster_options range = {0, 1, false, IMAGE_ALL};
 			struct arena arena = {.limit = 1 << 20};
 			gltf_files_make(&f);
 			size_t at = f.buffer_size + offset, size = p.file[0].size;
@@ -434,14 +438,15 @@ static void test_images_in_buffers(void **state)
 			char longer[64];
 			snprintf(longer, sizeof longer, "\"byteLength\": %zu}]", f.buffer_size);
 			gltf_files_replace(&f, length, longer);
-			s = gltf_files_packed(&f, (enum gltf_form)form);
-			const struct scene_node *bitmap = node_child(
-				node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color"), PLUGIN_TEXTURE, 0);
-			struct asset_source assets = memory_assets(f.list);
+			s = gltf_files_read_packed(&f, (enum gltf_form)form);
+			const struct scene_node *bitmap =
+				node_child(node_ref(scene_find_object(&s, "bsdf of materials[1]"), "base_color"),
+					   PLUGIN_TEXTURE, 0);
+			struct asset_source assets = memory_assets(f.files);
 			if (raster_read(&r, bitmap, &assets, &range, &arena, &e))
 				fail_msg("form %d, offset %zu: %s", form, offset, e.text);
 			for (int i = 0; i < 12; i++)
-				assert_near((double)indexed_image_at(&r.image, (size_t)i), rgb[i]);
+				assert_near((double)indexed_image_value(&r.image, (size_t)i), rgb[i]);
 			arena_fini(&arena);
 			scene_fini(&s);
 		}

@@ -77,7 +77,7 @@ static void test_all_kinds(void **state)
 		random = random * 1664525 + 1013904223;
 		want[i][11] = random >> 16 & 1;
 	}
-	assert_true(gltf_meshopt_v1(all_kinds, sizeof all_kinds, COUNT, STRIDE, got[0]));
+	assert_true(gltf_meshopt_v1_decode(all_kinds, sizeof all_kinds, COUNT, STRIDE, got[0]));
 	assert_memory_equal(got, want, sizeof want);
 }
 
@@ -92,7 +92,7 @@ static void test_blocks(void **state)
 		want[i][6] = (unsigned char)(i >> 3);
 		want[i][7] = i % 50 == 0 ? 200 : 1;
 	}
-	assert_true(gltf_meshopt_v1(two_blocks, sizeof two_blocks, COUNT_2, STRIDE_2, got[0]));
+	assert_true(gltf_meshopt_v1_decode(two_blocks, sizeof two_blocks, COUNT_2, STRIDE_2, got[0]));
 	assert_memory_equal(got, want, sizeof want);
 }
 
@@ -104,33 +104,33 @@ static void test_malformed(void **state)
 	for (size_t some = 0; some < size; some++) {
 		unsigned char part[sizeof all_kinds]; /* ends with the array, so that sanitizers see reads beyond */
 		memcpy(part + size - some, all_kinds, some);
-		assert_false(gltf_meshopt_v1(part + size - some, some, COUNT, STRIDE, out));
+		assert_false(gltf_meshopt_v1_decode(part + size - some, some, COUNT, STRIDE, out));
 	}
 	memcpy(bytes + 1, all_kinds, size);
 	bytes[0] = all_kinds[0];
-	assert_false(gltf_meshopt_v1(bytes, size + 1, COUNT, STRIDE, out));
-	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT + 1, STRIDE, out));
-	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT - 1, STRIDE, out));
-	assert_false(gltf_meshopt_v1(all_kinds, size, COUNT, STRIDE - 4, out));
+	assert_false(gltf_meshopt_v1_decode(bytes, size + 1, COUNT, STRIDE, out));
+	assert_false(gltf_meshopt_v1_decode(all_kinds, size, COUNT + 1, STRIDE, out));
+	assert_false(gltf_meshopt_v1_decode(all_kinds, size, COUNT - 1, STRIDE, out));
+	assert_false(gltf_meshopt_v1_decode(all_kinds, size, COUNT, STRIDE - 4, out));
 	for (int kind = 0; kind < 256; kind++) { /* the last channel's deltas are bytes */
 		memcpy(bytes, all_kinds, size);
 		bytes[size - 1] = (unsigned char)kind;
 		bool known = kind < 2 || (kind & 15) == 2;
-		assert_true(gltf_meshopt_v1(bytes, size, COUNT, STRIDE, out) == known);
+		assert_true(gltf_meshopt_v1_decode(bytes, size, COUNT, STRIDE, out) == known);
 	}
 }
 
 static void test_damaged(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("damaged version 1");
+	struct dice d = dice_for_test("damaged version 1");
 	unsigned sound = 0;
 	for (int i = 0; i < 20000; i++) {
 		unsigned char bytes[sizeof two_blocks], out[COUNT_2 * STRIDE_2];
 		memcpy(bytes, two_blocks, sizeof bytes);
 		for (int k = 0; k < 2; k++)
 			bytes[dice_below(&d, sizeof bytes)] = (unsigned char)dice_below(&d, 256);
-		sound += gltf_meshopt_v1(bytes, sizeof bytes, COUNT_2, STRIDE_2, out);
+		sound += gltf_meshopt_v1_decode(bytes, sizeof bytes, COUNT_2, STRIDE_2, out);
 	}
 	assert_true(sound > 1000 && sound < 19000);
 }

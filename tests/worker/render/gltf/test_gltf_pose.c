@@ -55,7 +55,7 @@ static void finish_json(const char *json)
 		}
 		int k = *++p - '0';
 		n += (size_t)sprintf(file.json + n, "{\"byteLength\": %zu, \"uri\": \"data:;base64,", file.size[k]);
-		asset_range_encode(file.bytes[k], file.size[k], file.json + n);
+		asset_range_encode_base64(file.bytes[k], file.size[k], file.json + n);
 		n += strlen(file.json + n);
 		n += (size_t)sprintf(file.json + n, "\"}");
 	}
@@ -131,7 +131,7 @@ static void of_each_type(void **state)
 			 "%zu, 'byteStride': %d}], " ONE_BUFFER "}",
 			 cases[i].type, cases[i].normalized, cases[i].size, cases[i].stride);
 		finish_json(json);
-		struct world *w = world_of_files(4, 4, file.list);
+		struct world *w = world_from_files(4, 4, file.list);
 		vec3 far = corner(w, 0, 0, 1);
 		if (!(fabs(far.x - cases[i].side) <= 1e-6 * cases[i].side))
 			fail_msg("case %zu: %g, not %g", i, far.x, cases[i].side);
@@ -157,7 +157,7 @@ static void sparse_accessors(void **state)
 	add_bytes(0, values, sizeof values);
 	add_bytes(1, indices, sizeof indices);
 	finish_json(json);
-	struct world *w = world_of_files(4, 4, file.list);
+	struct world *w = world_from_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
 	char *type = strstr(file.json, "5123"); /* with a signed type, -1 would be an index */
@@ -180,7 +180,7 @@ static void in_several_buffers(void **state)
 		"'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, {'bufferView': 1, "
 		"'componentType': 5126, 'count': 3, 'type': 'VEC3'}], 'bufferViews': [{'buffer': 0, 'byteLength': 36}, "
 		"{'buffer': 1, 'byteLength': 36}], 'buffers': [$0, $1]}");
-	struct world *w = world_of_files(4, 4, file.list);
+	struct world *w = world_from_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
 }
@@ -212,7 +212,7 @@ static void morph_targets(void **state)
 	add_bytes(0, larger, sizeof larger);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		finish_json(cases[i].json);
-		struct world *w = world_of_files(4, 4, file.list);
+		struct world *w = world_from_files(4, 4, file.list);
 		assert_triangle(w, 0, (vec3){0, 0, cases[i].z}, cases[i].side);
 		world_free(w);
 	}
@@ -247,7 +247,7 @@ static void skins_move_vertices(void **state)
 	add_bytes(0, weights, sizeof weights);
 	add_bytes(0, inverse, sizeof inverse);
 	finish_json(SKIN("[1, 3]"));
-	struct world *w = world_of_files(4, 4, file.list);
+	struct world *w = world_from_files(4, 4, file.list);
 	assert_at(w, 0, 0, (vec3){0, 0, 0});
 	assert_at(w, 0, 1, (vec3){3, 0, 4});
 	assert_at(w, 0, 2, (vec3){0.75, 1.75, 3});
@@ -282,7 +282,7 @@ static void of_a_list(void **state)
 	add_bytes(0, places, sizeof places);
 	add_bytes(0, scales, sizeof scales);
 	finish_json(INSTANCES("2"));
-	struct world *w = world_of_files(4, 4, file.list);
+	struct world *w = world_from_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){11, 2, 3}, 1);
 	assert_triangle(w, 1, (vec3){9, 0, 0}, 2);
 	world_free(w);
@@ -332,8 +332,8 @@ static void of_several_nodes(void **state)
 			{"s.gltf", json[i], strlen(json[i])},
 			{"grid.bin", i ? (const void *)whole : grid, i ? sizeof whole : sizeof grid},
 			{0}};
-		struct world *w = world_of_files(4, 4, list);
-		assert_int_equal(w->sharing_count, 3);
+		struct world *w = world_from_files(4, 4, list);
+		assert_int_equal(w->sharing_shape_count, 3);
 		eye[i] = vec3_add(vec3_scale(1 / w->scale, w->camera.position), w->center);
 		world_free(w);
 	}
@@ -382,7 +382,7 @@ static void animations_are_interpolated(void **state)
 	add_bytes(1, sizes, sizeof sizes);
 	add_bytes(1, weights, sizeof weights);
 	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	struct world *w = world_of_files(4, 4, file.list);
+	struct world *w = world_from_files(4, 4, file.list);
 	assert_at(w, 0, 0, (vec3){1, 2, 3});
 	assert_at(w, 0, 1, (vec3){1, 5, 3});
 	assert_at(w, 0, 2, (vec3){-2, 2, 3});
@@ -390,14 +390,14 @@ static void animations_are_interpolated(void **state)
 	finish_json(ANIMATED(
 		CHANNEL("0", "translation") ", {'sampler': 0, 'target': {'path': 'pointer'}}, " CHANNEL("3", "blur"),
 		PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	w = world_of_files(4, 4, file.list); /* properties that are not animated are those of the node */
+	w = world_from_files(4, 4, file.list); /* properties that are not animated are those of the node */
 	assert_triangle(w, 0, (vec3){1, 2, 4}, 2);
 	world_free(w);
 	finish_json(ANIMATED(
 		CHANNEL("1", "rotation"),
 		PLACE TURN_OF(", 'sparse': {'count': 1, 'indices': {'bufferView': 0, 'componentType': 5121}, 'values': "
 			      "{'bufferView': 2}}") SIZE WEIGHTS_OF("4")));
-	w = world_of_files(4, 4, file.list);
+	w = world_from_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){7, 7, 8}, 2);
 	world_free(w);
 	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));

@@ -101,7 +101,7 @@ static const struct scene_node *material_of(const struct scene *s)
 /* Returns the coordinates by which the image of a property is looked up. */
 static const char *coordinates_of(const struct scene_node *bsdf, const char *name)
 {
-	const struct property *p = node_find(bsdf, name);
+	const struct property *p = node_find_property(bsdf, name);
 	assert_non_null(p);
 	return node_string(p->value.as.node, "coordinates", "");
 }
@@ -218,7 +218,7 @@ static void test_specular_glossiness(void **state)
 			if (s.objects[k]->cls == PLUGIN_BSDF)
 				bsdf = s.objects[k];
 		assert_non_null(bsdf);
-		const struct property *base = node_find(bsdf, "base_color");
+		const struct property *base = node_find_property(bsdf, "base_color");
 		for (int c = 0; c < 3; c++)
 			assert_true(fabs(base->value.as.rgb[c] - cases[i].base[c]) < 1e-6);
 		assert_true(fabs(node_float(bsdf, "metallic", -1) - cases[i].metallic) < 1e-6);

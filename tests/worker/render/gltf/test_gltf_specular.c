@@ -68,7 +68,7 @@ static void make(struct material *m, const char *base, const char *more, const c
 	if (m->scene.problem_count)
 		fail_msg("%s", m->scene.problems[0]);
 	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &assets};
-	if (bsdf_create(&m->bsdf, scene_named(&m->scene, "bsdf of materials[0]"), &build, &e))
+	if (bsdf_create(&m->bsdf, scene_find_object(&m->scene, "bsdf of materials[0]"), &build, &e))
 		fail_msg("%s", e.text);
 }
 
@@ -87,7 +87,8 @@ static vec3 direction(double z, double phi)
 static spectrum value(const struct material *m, double u, vec3 wo, vec3 wi)
 {
 	static const struct wavelengths w = {.nm = {430, 500, 570, 640}};
-	const struct bsdf_point at = {.where = {.u = u, .v = 0.5}, .w = &w, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point at = {
+		.texture_point = {.u = u, .v = 0.5}, .wavelengths = &w, .transport = TRANSPORT_RADIANCE};
 	return m->bsdf.ops->eval(&m->bsdf, &at, wo, wi);
 }
 

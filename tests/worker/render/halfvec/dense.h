@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { DENSE_MOST = 2 * FULL_PATH_MAX_VERTICES };
+enum { DENSE_MOST = 2 * FULL_PATH_VERTICES_MAX };
 
 struct dense {
 	unsigned n;

@@ -18,11 +18,11 @@ enum hand_uv { HAND_UV_NONE, HAND_UV, HAND_UV_DEGENERATE, HAND_TANGENTS };
 struct hand {
 	struct world w;
 	struct full_path x;
-	struct geom_shape shape[FULL_PATH_MAX_VERTICES];
-	struct bsdf bsdf[FULL_PATH_MAX_VERTICES];
-	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3],
-		uv[FULL_PATH_MAX_VERTICES][3][2], tangent[FULL_PATH_MAX_VERTICES][1][3][3];
-	uint32_t index[FULL_PATH_MAX_VERTICES][1][3];
+	struct geom_shape shape[FULL_PATH_VERTICES_MAX];
+	struct bsdf bsdf[FULL_PATH_VERTICES_MAX];
+	float position[FULL_PATH_VERTICES_MAX][3][3], normal[FULL_PATH_VERTICES_MAX][3][3],
+		uv[FULL_PATH_VERTICES_MAX][3][2], tangent[FULL_PATH_VERTICES_MAX][1][3][3];
+	uint32_t index[FULL_PATH_VERTICES_MAX][1][3];
 };
 
 static inline void hand_begin(struct hand *h, unsigned edges)
@@ -31,14 +31,14 @@ static inline void hand_begin(struct hand *h, unsigned edges)
 	h->x.edges = edges;
 	h->w.accuracy = accuracy_settings_default;
 	h->w.shapes = h->shape;
-	h->w.shape_count = FULL_PATH_MAX_VERTICES;
+	h->w.shape_count = FULL_PATH_VERTICES_MAX;
 	h->w.camera = (struct camera){.axes = {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}},
 				      .width = 640,
 				      .height = 480,
-				      .scale = 700,
+				      .pixels_per_slope = 700,
 				      .far_clip = INFINITY};
-	for (unsigned j = 0; j < FULL_PATH_MAX_VERTICES; j++) {
-		h->bsdf[j] = (struct bsdf){.eta = 1, .alpha = 0.1, .alpha_mean = 0.1, .has_smooth = true};
+	for (unsigned j = 0; j < FULL_PATH_VERTICES_MAX; j++) {
+		h->bsdf[j] = (struct bsdf){.eta = 1, .min_alpha = 0.1, .mean_alpha = 0.1, .has_smooth = true};
 		h->x.v[j].bsdf = &h->bsdf[j];
 		h->x.v[j].emitter = -1;
 		h->x.v[j].mode = BSDF_REFLECT;
@@ -83,8 +83,8 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 		memcpy(h->position[j][m], (float[3]){(float)q.x, (float)q.y, (float)q.z}, sizeof(float[3]));
 		memcpy(h->normal[j][m], (float[3]){(float)k.x, (float)k.y, (float)k.z}, sizeof(float[3]));
 		bool varied = t->uv == HAND_UV || t->uv == HAND_TANGENTS;
-		h->uv[j][m][0] = varied ? (float)dice_throw(d) : 0.5f;
-		h->uv[j][m][1] = varied ? (float)dice_throw(d) : 0.5f;
+		h->uv[j][m][0] = varied ? (float)dice_uniform(d) : 0.5f;
+		h->uv[j][m][1] = varied ? (float)dice_uniform(d) : 0.5f;
 		h->index[j][0][m] = (uint32_t)m;
 	}
 	*s = (struct geom_shape){
@@ -140,7 +140,7 @@ static inline void hand_emitter(struct hand *h, vec3 p, vec3 ng)
 static inline void hand_join(struct hand *h)
 {
 	for (unsigned e = 0; e < h->x.edges; e++) {
-		bool apart = full_path_join(&h->x, e);
+		bool apart = full_path_compute_edge(&h->x, e);
 		assert(apart);
 		(void)apart;
 	}
@@ -159,20 +159,21 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
 {
 	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};
-	vec3 p[FULL_PATH_MAX_VERTICES];
-	double eta[FULL_PATH_MAX_VERTICES] = {0};
+	vec3 p[FULL_PATH_VERTICES_MAX];
+	double eta[FULL_PATH_VERTICES_MAX] = {0};
 	hand_begin(h, edges);
 	for (unsigned j = 0; j <= edges; j++)
 		p[j] = (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)};
 	for (unsigned j = 0; j <= edges; j++) {
 		vec3 ng = dice_direction(d), n = ng;
 		if (j > 0 && j < edges) {
-			eta[j] = dice_throw(d) < 0.5 ? 0 : etas[dice_below(d, 4)];
+			eta[j] = dice_uniform(d) < 0.5 ? 0 : etas[dice_below(d, 4)];
 			vec3 i = vec3_normalize(vec3_sub(p[j - 1], p[j])), o = vec3_normalize(vec3_sub(p[j + 1], p[j]));
 			vec3 sum = vec3_madd(i, eta[j] == 0 ? 1 : eta[j], o);
 			if (vec3_length(sum) < 0.2)
 				return false;
-			n = ng = vec3_normalize(vec3_madd(vec3_normalize(sum), 0.3 * dice_throw(d), dice_direction(d)));
+			n = ng = vec3_normalize(
+				vec3_madd(vec3_normalize(sum), 0.3 * dice_uniform(d), dice_direction(d)));
 			ng = vec3_normalize(vec3_madd(n, bent, dice_direction(d)));
 			if (fmin(fabs(vec3_dot(ng, i)), fabs(vec3_dot(ng, o))) < 0.05)
 				return false;
@@ -181,7 +182,7 @@ static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struc
 		if (bent > 0)
 			hand_triangle(h, j, p[j], ng, n, &t, d);
 		else
-			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_throw(d) < 0.3 ? -1 : 1,
+			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_uniform(d) < 0.3 ? -1 : 1,
 				    dice_between(d, 0.3, 2.8), d);
 	}
 	hand_join(h);

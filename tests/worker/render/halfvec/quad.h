@@ -275,7 +275,7 @@ static inline struct quad_problem quad_problem_of(const struct hand *h, unsigned
 /* Returns the number shaken by one rounding of double, up or down. */
 static inline quad quad_shaken(quad a, struct dice *d)
 {
-	return a * (1 + (dice_throw(d) < 0.5 ? -1 : 1) * (quad)0x1p-53);
+	return a * (1 + (dice_uniform(d) < 0.5 ? -1 : 1) * (quad)0x1p-53);
 }
 
 static inline qvec q_shaken(qvec a, struct dice *d)

@@ -195,7 +195,7 @@ static bool make_chain(const struct corner *c, struct hand *h, struct dice *d)
 		struct hand_triangle t = {edge, c->inner == SLIVER ? 1e-4 : 1, c->inner == FLAT, c->bend / edge, c->uv};
 		if (c->inner == SMOOTH || c->inner == SLIVER)
 			t.bend = c->bend;
-		vec3 ng = vec3_normalize(vec3_madd(n, c->bent * dice_throw(d), dice_direction(d)));
+		vec3 ng = vec3_normalize(vec3_madd(n, c->bent * dice_uniform(d), dice_direction(d)));
 		hand_triangle(h, 1, p, c->inner == FLAT ? n : ng, n, &t, d);
 	}
 	p = h->x.v[1].x.p;
@@ -235,11 +235,11 @@ struct worst {
  * double. */
 static double step_of(const struct hand *h)
 {
-	struct surface_change c;
+	struct surface_derivatives c;
 	double l = 1;
 	for (unsigned j = 0; j < 3; j++) {
 		if (h->x.v[j].kind == VERTEX_SURFACE) {
-			surface_change_of(&h->shape[j], &h->x.v[j].x, &c);
+			surface_compute_derivatives(&h->shape[j], &h->x.v[j].x, &c);
 			double bend = fmax(fmax(vec3_length(c.dn[0]), vec3_length(c.dn[1])), vec3_length(c.daxis[0]));
 			l = fmin(l, 1 / fmax(bend, 1));
 		}
@@ -256,7 +256,7 @@ static void compare(const struct hand *h, struct dice *d, struct worst *w)
 	struct quad_problem q = quad_problem_of(h, 1);
 	quad hv[2], m[3][4];
 	double step = step_of(h);
-	constraints_of(&h->w, &h->x, 2, 0, k);
+	constraints_compute(&h->w, &h->x, 2, 0, k);
 	quad_derivatives(&q, step, hv, m);
 	double condition[4] = {0};
 	for (int i = 0; i < 4; i++) {
@@ -287,10 +287,10 @@ static void test_corners(void **state)
 	bool rows = getenv("HSLT_TEST_ROWS") != NULL, good = true;
 	double worst_ratio = 0;
 	for (size_t i = 0; i < sizeof corners / sizeof *corners; i++) {
-		struct dice d = dice_of(corners[i].name);
+		struct dice d = dice_for_test(corners[i].name);
 		struct worst w = {0};
 		static struct hand h;
-		for (size_t made = 0; made < dice_count(60);) {
+		for (size_t made = 0; made < dice_scaled_count(60);) {
 			if (!make_chain(&corners[i], &h, &d))
 				continue;
 			made++;
@@ -330,18 +330,18 @@ static double geometry(const struct hand *h, unsigned e)
 static void test_identity(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("the chain identity");
+	struct dice d = dice_for_test("the chain identity");
 	double worst[2] = {0, 0};
 	static struct hand h;
-	static struct constraint k[FULL_PATH_MAX_VERTICES];
+	static struct constraint k[FULL_PATH_VERTICES_MAX];
 	static struct constraint_system m;
 	for (unsigned bent = 0; bent < 2; bent++) {
-		for (size_t made = 0; made < dice_count(600);) {
+		for (size_t made = 0; made < dice_scaled_count(600);) {
 			unsigned edges = 2 + dice_below(&d, 6);
 			if (!hand_chain(&h, edges, bent ? 0.2 : 0, &d))
 				continue;
 			made++;
-			constraints_of(&h.w, &h.x, edges, 0, k);
+			constraints_compute(&h.w, &h.x, edges, 0, k);
 			if (constraint_double.factor(k, edges, 0, &m) != CONSTRAINT_OK)
 				continue;
 			double left = -m.log_det, right = log(geometry(&h, edges - 1)) + m.log_transfer;
@@ -363,7 +363,7 @@ static void test_identity(void **state)
 static void test_degenerate(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("degenerate constraints");
+	struct dice d = dice_for_test("degenerate constraints");
 	static struct hand h;
 	static struct constraint k[3];
 	static struct constraint_system m;
@@ -375,7 +375,7 @@ static void test_degenerate(void **state)
 	hand_camera(&h, 2, vec3_sub(vec3_scale(2, h.x.v[1].x.p), h.x.v[0].x.p));
 	hand_join(&h);
 	h.x.edge[1].w = h.x.edge[0].w;
-	constraints_of(&h.w, &h.x, 2, 0, k);
+	constraints_compute(&h.w, &h.x, 2, 0, k);
 	assert_true(isinf(k[1].h.x) && isinf(k[1].h.y));
 	assert_true(k[1].b.xx == 0 && k[1].b.xy == 0 && k[1].b.yx == 0 && k[1].b.yy == 0);
 	assert_int_equal(constraint_double.factor(k, 2, 0, &m), CONSTRAINT_SINGULAR);
@@ -388,7 +388,7 @@ static void test_degenerate(void **state)
 	assert_true(vec3_length(h.x.v[1].x.axis) == 0);
 	hand_camera(&h, 2, (vec3){-0.5, 0.1, 0.25});
 	hand_join(&h);
-	constraints_of(&h.w, &h.x, 2, 0, k);
+	constraints_compute(&h.w, &h.x, 2, 0, k);
 	assert_true(isfinite(mat2_norm2(k[1].a)) && isfinite(mat2_norm2(k[1].b)) && isfinite(mat2_norm2(k[1].c)));
 }
 

@@ -118,7 +118,7 @@ static void check_one(const struct path_vertex *z, const struct path_vertex *y, 
 static struct tally check(const char *name, struct world *w, unsigned tries)
 {
 	struct tally t = {0};
-	struct dice dice = dice_of(name);
+	struct dice dice = dice_for_test(name);
 	begin(w);
 	for (unsigned i = 0; i < tries; i++) {
 		struct path_vertex from = {.kind = VERTEX_CAMERA,
@@ -133,8 +133,8 @@ static struct tally check(const char *name, struct world *w, unsigned tries)
 		    !path_scatters_smoothly(&z))
 			continue;
 		for (int k = 0; k < 3; k++)
-			z.next_event[k] = dice_throw(&dice);
-		if (path_next_event(&c, &z, &y, &pdf) && halfvec_refract(&c, &z, &y, &r))
+			z.next_event[k] = dice_uniform(&dice);
+		if (path_draw_next_event(&c, &z, &y, &pdf) && halfvec_refract(&c, &z, &y, &r))
 			check_one(&z, &y, &r, &t);
 	}
 	print_message("%s: %u of %u found, largest miss %.3g, T off by %.3g\n", name, t.found, tries, t.miss,
@@ -167,14 +167,14 @@ static void test_lamps(void **state)
 {
 	(void)state;
 	struct tally t = check("a lamp in a ball",
-			       world_of_text(8, 8, "%s",
-					     FLOOR BALL("x='0' y='1' z='0'", "1", GLASS)
-						     BALL("x='.2' y='1.3' z='0'", ".1", LAMP)),
+			       world_from_text(8, 8, "%s",
+					       FLOOR BALL("x='0' y='1' z='0'", "1", GLASS)
+						       BALL("x='.2' y='1.3' z='0'", ".1", LAMP)),
 			       400);
 	assert_true(t.found > 200);
 	t = check(
 		"a point behind a ball and a pane",
-		world_of_text(
+		world_from_text(
 			8, 8, "%s",
 			FLOOR BALL(
 				"x='0' y='1' z='0'", ".6",
@@ -186,7 +186,7 @@ static void test_lamps(void **state)
 	assert_true(t.found > 100 && t.several > 10);
 	t = check(
 		"the sun through a ball and a pane",
-		world_of_text(
+		world_from_text(
 			8, 8, "%s",
 			FLOOR BALL(
 				"x='0' y='1' z='0'", ".6",
@@ -204,13 +204,13 @@ static void test_around_a_wall(void **state)
 	static const char *const between[] = {SURFACE WALL, SURFACE WALL BALL("x='0' y='-1.9' z='0'", ".05", GLASS)};
 	for (size_t i = 0; i < sizeof between / sizeof *between; i++) {
 		struct tally t =
-			check("a pool under a low sun", world_of_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
+			check("a pool under a low sun", world_from_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
 		assert_true(t.found > 80);
 	}
 	/* Points in the air beside a glass ball, in the shadow of a wall, have no refracted connection. */
 	struct tally t =
 		check("a ball in the air",
-		      world_of_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
+		      world_from_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
 	assert_int_equal(t.found, 0);
 }
 
@@ -221,7 +221,7 @@ static void test_one_of_several(void **state)
 	(void)state;
 	unsigned made = 0, others = 0;
 	double film[2];
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		8, 8, "%s",
 		FLOOR BALL("x='0' y='-.8' z='0'", ".5",
 			   GLASS) "<emitter type='point'><point name='position' x='.1' y='1' z='0'/></emitter>");
@@ -237,7 +237,7 @@ static void test_one_of_several(void **state)
 		sampler_random_init(&u, 0x666f637573, RNG_TEST, i, 0);
 		path_walk_camera(&c, &u.base, 1, film); /* sets the wavelengths and the time */
 		unsigned n = path_walk_light(&c, &u.base, 4);
-		if (n < 4 || !path_is_refracted(&c.light[1]) || !path_is_refracted(&c.light[2]) ||
+		if (n < 4 || !path_vertex_is_refracting(&c.light[1]) || !path_vertex_is_refracting(&c.light[2]) ||
 		    !path_scatters_smoothly(&c.light[3]))
 			continue;
 		struct path_vertex above = c.light[3];
@@ -264,8 +264,8 @@ static void test_one_of_several(void **state)
  * height of 3; 0: not connected by refraction. */
 static unsigned joined_by(const char *between)
 {
-	struct world *w = world_of_text(8, 8, "%s%s%s", FLOOR, between,
-					"<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>");
+	struct world *w = world_from_text(8, 8, "%s%s%s", FLOOR, between,
+					  "<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>");
 	struct path_vertex from = {.kind = VERTEX_CAMERA,
 				   .x = {.p = in_world(w, (vec3){.1, -1.9, 0}), .prim = PRIM_NONE}},
 			   z, y;
@@ -274,7 +274,7 @@ static unsigned joined_by(const char *between)
 	begin(w);
 	assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
 	memset(z.next_event, 0, sizeof z.next_event);
-	assert_true(path_next_event(&c, &z, &y, &pdf));
+	assert_true(path_draw_next_event(&c, &z, &y, &pdf));
 	unsigned count = halfvec_refract(&c, &z, &y, &r) ? r.count : 0;
 	world_free(w);
 	return count;
@@ -287,10 +287,10 @@ static enum sight sight_of(const struct path_vertex *z, const struct path_vertex
 	struct path_vertex first;
 	double distance2;
 	vec3 d = path_direction(z, y, &distance2);
-	if (path_visible(&c, z, y))
+	if (path_is_visible(&c, z, y))
 		return OPEN;
 	assert_true(path_extend(&c, z, d, 0, sqrt(distance2), &first));
-	return bsdf_is_passed(first.bsdf) ? THROUGH_SHEET : BLOCKED;
+	return bsdf_passes_connections(first.bsdf) ? THROUGH_SHEET : BLOCKED;
 }
 
 /* A connection between points that see each other is straight, possibly through the holes of a sheet, and must not be
@@ -301,7 +301,7 @@ static void test_not_where_straight(void **state)
 	(void)state;
 	unsigned count[SIGHTS] = {0}, found[SIGHTS] = {0};
 	/* clang-format off */
-	struct world *w = world_of_text(8, 8, "%s",
+	struct world *w = world_from_text(8, 8, "%s",
 		FLOOR BALL("x='0' y='0' z='0'", ".7", "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
 			"<float name='ext_ior' value='1.5'/></bsdf>")
 		"<shape type='rectangle'><transform name='to_world'><scale value='3.5'/><rotate x='1' angle='90'/>"
@@ -319,7 +319,7 @@ static void test_not_where_straight(void **state)
 		double pdf;
 		assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
 		memset(z.next_event, 0, sizeof z.next_event);
-		assert_true(path_next_event(&c, &z, &y, &pdf));
+		assert_true(path_draw_next_event(&c, &z, &y, &pdf));
 		enum sight sight = sight_of(&z, &y);
 		count[sight]++;
 		found[sight] += halfvec_refract(&c, &z, &y, &r);
@@ -344,14 +344,14 @@ static void test_what_lies_between(void **state)
 	assert_int_equal(joined_by(PANE("<bsdf type='roughdielectric'/>")), 0);
 	assert_int_equal(joined_by(PANE("<bsdf type='conductor'/>")), 0);
 	assert_int_equal(joined_by(PANE(GLASS) BALL("x='0' y='1' z='0'", ".5", "<bsdf type='diffuse'/>")), 0);
-	for (unsigned i = 0; i <= PATH_REFRACTED_MOST; i++) {
+	for (unsigned i = 0; i <= PATH_REFRACTED_MAX; i++) {
 		size_t used = strlen(panes);
 		snprintf(
 			panes + used, sizeof panes - used,
 			"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/>"
 			"<translate y='%g'/></transform>" GLASS "</shape>",
 			0.1 * i);
-		assert_int_equal(joined_by(panes), i < PATH_REFRACTED_MOST ? i + 1 : 0);
+		assert_int_equal(joined_by(panes), i < PATH_REFRACTED_MAX ? i + 1 : 0);
 	}
 }
 

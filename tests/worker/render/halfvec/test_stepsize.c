@@ -17,8 +17,8 @@
 
 #include <cmocka.h>
 
-static struct constraint k[FULL_PATH_MAX_VERTICES];
-static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
+static struct constraint k[FULL_PATH_VERTICES_MAX];
+static struct halfvec_step step[FULL_PATH_VERTICES_MAX];
 static struct hand h;
 
 /* Computes the steps with a film step of `pixels` pixels. */
@@ -26,14 +26,14 @@ static void steps(unsigned b, double pixels)
 {
 	const struct path_context c = {.w = &h.w};
 	h.w.camera.width = h.w.camera.height = pixels / 0.02;
-	halfvec_steps(&c, &h.x, k, b, 0, step);
+	halfvec_compute_steps(&c, &h.x, k, b, 0, step);
 }
 
 static bool is_good(const struct halfvec_step *s, double limit)
 {
-	double turn = s->u.xx * s->u.yy - s->u.xy * s->u.yx;
+	double turn = s->rotation.xx * s->rotation.yy - s->rotation.xy * s->rotation.yx;
 	return s->sigma[0] > 0 && s->sigma[1] > 0 && s->sigma[0] <= limit && s->sigma[1] <= limit &&
-	       fabs(turn - 1) < 1e-15 * 8 && fabs(s->u.xx - s->u.yy) < 1e-300 &&
+	       fabs(turn - 1) < 1e-15 * 8 && fabs(s->rotation.xx - s->rotation.yy) < 1e-300 &&
 	       isfinite(halfvec_step_log_pdf(s, (vec2){0.1 * limit, -0.2 * limit}));
 }
 
@@ -64,31 +64,31 @@ static void jacobi(mat2 e, long double s[2], long double left[2])
 static void test_singular_values(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("singular values");
+	struct dice d = dice_for_test("singular values");
 	double worst[3] = {0, 0, 0};
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		double size = exp(dice_between(&d, -200, 200)), thin = i % 3 ? 1 : exp(dice_between(&d, -12, 0));
 		double a = dice_between(&d, -4, 4), b = dice_between(&d, -4, 4);
 		mat2 left = {cos(a), -sin(a), sin(a), cos(a)}, right = {cos(b), -sin(b), sin(b), cos(b)};
 		mat2 e = mat2_mul(mat2_mul(left, (mat2){size, 0, 0, size * thin * dice_between(&d, 0.1, 1)}), right);
 		long double s[2], u[2];
 		jacobi(e, s, u);
-		struct halfvec_step r = halfvec_step_of(e, 1, (double)s[0] * 2);
+		struct halfvec_step r = halfvec_step_from_matrix(e, 1, (double)s[0] * 2);
 		double ratio = (double)(s[1] / s[0]);
 		assert_true(is_good(&r, (double)s[0] * 2));
 		worst[0] = fmax(worst[0], (double)fabsl(r.sigma[0] / s[0] - 1));
 		if (ratio > 1e-5)
 			worst[1] = fmax(worst[1], (double)fabsl(r.sigma[1] / s[1] - 1) * ratio);
-		double across = (double)fabsl(u[0] * r.u.yx - u[1] * r.u.xx);
+		double across = (double)fabsl(u[0] * r.rotation.yx - u[1] * r.rotation.xx);
 		worst[2] = fmax(worst[2], across * (1 - ratio * ratio));
 	}
 	print_message("larger %.1e, smaller %.1e / (ratio), direction %.1e / (1 - ratio^2)\n", worst[0], worst[1],
 		      worst[2]);
 	assert_true(worst[0] < 1e-15 && worst[1] < 2e-15 && worst[2] < 2e-15);
 	/* Afterwards each is clipped separately, at both ends. */
-	struct halfvec_step r = halfvec_step_of((mat2){3, 0, 0, 0.25}, 2, 1);
+	struct halfvec_step r = halfvec_step_from_matrix((mat2){3, 0, 0, 0.25}, 2, 1);
 	assert_true(r.sigma[0] == 1 && r.sigma[1] == 0.5);
-	r = halfvec_step_of((mat2){1, 1, 1, 1}, 0.1, 1);
+	r = halfvec_step_from_matrix((mat2){1, 1, 1, 1}, 0.1, 1);
 	assert_true(fabs(r.sigma[0] - 0.2) < 1e-15 && r.sigma[1] > 0 && r.sigma[1] < 1e-5);
 }
 
@@ -101,9 +101,9 @@ static bool make_seen(struct dice *d)
 	hand_triangle(&h, 1, vec3_scale(0.2, dice_direction(d)), n, bent, &t, d);
 	hand_sphere(&h, 0, dice_direction(d), dice_direction(d), 0.3, 1, 1, d);
 	hand_camera(&h, 2, (vec3){dice_between(d, -0.2, 0.2), dice_between(d, -0.2, 0.2), -1});
-	h.bsdf[1].alpha = INFINITY;
+	h.bsdf[1].min_alpha = INFINITY;
 	hand_join(&h);
-	hand_scatters(&h, 1, dice_throw(d) < 0.5 ? 0 : 1.5);
+	hand_scatters(&h, 1, dice_uniform(d) < 0.5 ? 0 : 1.5);
 	vec3 sum = vec3_sub(vec3_scale(full_path_eta(&h.x, 1), h.x.edge[1].w), h.x.edge[0].w);
 	return fabs(vec3_dot(sum, h.x.v[1].x.sh.n)) > 0.2 && fabs(vec3_dot(h.x.v[1].x.ng, h.x.edge[1].w)) > 0.1 &&
 	       fabs(vec3_dot(h.x.v[1].x.sh.n, h.x.edge[1].w)) > 0.1;
@@ -136,9 +136,9 @@ static vec2 seen_half(double x, double y)
 static void test_differentials(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("ray differentials");
+	struct dice d = dice_for_test("ray differentials");
 	double worst = 0;
-	for (size_t made = 0; made < dice_count(300);) {
+	for (size_t made = 0; made < dice_scaled_count(300);) {
 		if (!make_seen(&d))
 			continue;
 		made++;
@@ -153,12 +153,12 @@ static void test_differentials(void **state)
 			column[i] = vec2_scale(1.0 / 3, vec2_sub(vec2_scale(4, g[1]), g[0]));
 		}
 		mat2 e = mat2_of_columns(column[0], column[1]);
-		constraints_of(&h.w, &h.x, 2, 0, k);
+		constraints_compute(&h.w, &h.x, 2, 0, k);
 		/* a film step for which neither limit applies: then sigma and U describe e e^T */
 		const double pixels = 0.25 / mat2_largest(e);
 		steps(2, pixels);
 		double s0 = step[1].sigma[0] / pixels, s1 = step[1].sigma[1] / pixels;
-		mat2 u = step[1].u, us = {u.xx * s0, u.xy * s1, u.yx * s0, u.yy * s1};
+		mat2 u = step[1].rotation, us = {u.xx * s0, u.xy * s1, u.yx * s0, u.yy * s1};
 		mat2 made_of = mat2_mul(us, (mat2){us.xx, us.yx, us.xy, us.yy}),
 		     expected = mat2_mul(e, (mat2){e.xx, e.yx, e.xy, e.yy});
 		worst = fmax(worst, mat2_largest(mat2_sub(made_of, expected)) / mat2_largest(expected));
@@ -172,10 +172,10 @@ static void test_differentials(void **state)
 static void test_shares(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("shares of the step");
+	struct dice d = dice_for_test("shares of the step");
 	static struct dense dense;
 	double worst = 0;
-	for (size_t made = 0; made < dice_count(200);) {
+	for (size_t made = 0; made < dice_scaled_count(200);) {
 		unsigned edges = 3 + dice_below(&d, 4);
 		if (!hand_chain(&h, edges, 0.2, &d))
 			continue;
@@ -183,12 +183,12 @@ static void test_shares(void **state)
 		h.w.camera.axes = frame_around(vec3_neg(h.x.edge[edges - 1].w));
 		double sum = 0;
 		for (unsigned j = 1; j < edges; j++) {
-			h.bsdf[j].alpha = exp(dice_between(&d, -3, 1));
-			h.x.v[j].delta = j > 1 && dice_throw(&d) < 0.3;
+			h.bsdf[j].min_alpha = exp(dice_between(&d, -3, 1));
+			h.x.v[j].delta = j > 1 && dice_uniform(&d) < 0.3;
 			if (!h.x.v[j].delta)
-				sum += fmin(h.bsdf[j].alpha, 1);
+				sum += fmin(h.bsdf[j].min_alpha, 1);
 		}
-		constraints_of(&h.w, &h.x, edges, 0, k);
+		constraints_compute(&h.w, &h.x, edges, 0, k);
 		dense_fill(&dense, k, edges, 0);
 		assert_true(dense_invert(&dense));
 		if (dense_det_condition(&dense) > 1e4)
@@ -209,8 +209,9 @@ static void test_shares(void **state)
 			unsigned r = 2 * (edges - 2), s = 2 * (v - 1);
 			double det = (double)(dense.inverse[r][s] * dense.inverse[r + 1][s + 1] -
 					      dense.inverse[r][s + 1] * dense.inverse[r + 1][s]);
-			double share = pixels * fmin(h.bsdf[v].alpha, 1) / sum;
-			double expected = share * share * j / fabs(det), limit = fmin(h.bsdf[v].alpha, 1) / sqrt(M_PI);
+			double share = pixels * fmin(h.bsdf[v].min_alpha, 1) / sum;
+			double expected = share * share * j / fabs(det),
+			       limit = fmin(h.bsdf[v].min_alpha, 1) / sqrt(M_PI);
 			assert_true(is_good(&step[v], limit));
 			if (step[v].sigma[0] < limit && step[v].sigma[1] > 1e-6 * limit)
 				worst = fmax(worst, fabs(step[v].sigma[0] * step[v].sigma[1] / expected - 1));
@@ -219,8 +220,8 @@ static void test_shares(void **state)
 		steps(edges - 1, pixels);
 		for (unsigned v = 1; v + 1 < edges; v++)
 			if (!h.x.v[v].delta)
-				assert_true(step[v].u.xx == 1 && step[v].u.xy == 0 &&
-					    step[v].sigma[0] == fmin(h.bsdf[v].alpha, 1) / sqrt(M_PI) &&
+				assert_true(step[v].rotation.xx == 1 && step[v].rotation.xy == 0 &&
+					    step[v].sigma[0] == fmin(h.bsdf[v].min_alpha, 1) / sqrt(M_PI) &&
 					    step[v].sigma[1] == step[v].sigma[0]);
 	}
 	print_message("area of the step over its share: %.1e\n", worst);
@@ -231,10 +232,10 @@ static void test_shares(void **state)
 static void test_extremes(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("extreme steps");
+	struct dice d = dice_for_test("extreme steps");
 	const double alphas[] = {1e-4, 0.1, 1, 7, INFINITY};
 	const double values[] = {0, 1e-200, 1e-20, 1, 1e20, 1e69, 1e200, INFINITY};
-	for (size_t i = 0; i < dice_count(20000); i++) {
+	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		if (!make_seen(&d))
 			continue;
 		double *entry = &k[1].a.xx;
@@ -242,24 +243,24 @@ static void test_extremes(void **state)
 			entry[q] = values[dice_below(&d, 8)] * dice_between(&d, -1, 1);
 		for (int q = 4; q < 8 && i % 2; q++)
 			entry[q] = entry[4 + q % 2];
-		h.bsdf[1].alpha = alphas[dice_below(&d, 5)];
+		h.bsdf[1].min_alpha = alphas[dice_below(&d, 5)];
 		if (i % 5 == 0)
 			h.x.edge[1].w = h.w.camera.axes.n;
 		if (i % 7 == 0)
 			h.x.edge[1].w = vec3_cross(h.x.edge[1].w, h.x.v[1].x.ng);
 		if (i % 11 == 0)
-			h.w.camera.scale = 1e-30;
+			h.w.camera.pixels_per_slope = 1e-30;
 		feclearexcept(FE_INVALID);
 		steps(2, i % 3 ? 10 : 1e-12);
 		assert_false(fetestexcept(FE_INVALID));
-		assert_true(is_good(&step[1], fmin(h.bsdf[1].alpha, 1) / sqrt(M_PI)));
+		assert_true(is_good(&step[1], fmin(h.bsdf[1].min_alpha, 1) / sqrt(M_PI)));
 	}
 	const double one[] = {0, 1e-320, 1, 1e300, INFINITY};
 	for (unsigned q = 0; q < 625; q++) {
 		mat2 e = {one[q % 5], one[q / 5 % 5], one[q / 25 % 5], one[q / 125]};
 		for (int p = 0; p < 5; p++) {
 			feclearexcept(FE_INVALID);
-			struct halfvec_step s = halfvec_step_of(e, one[p], 0.3);
+			struct halfvec_step s = halfvec_step_from_matrix(e, one[p], 0.3);
 			assert_false(fetestexcept(FE_INVALID));
 			assert_true(is_good(&s, 0.3));
 		}
@@ -271,14 +272,14 @@ static void test_extremes(void **state)
 static void test_density(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("density of steps");
+	struct dice d = dice_for_test("density of steps");
 	enum { SIDE = 18, PARTS = 12, CELLS = SIDE * SIDE + 1 };
 	static uint64_t observed[CELLS];
 	static double expected[CELLS];
 	const mat2 jacobian[] = {{0.2, 0.1, -0.05, 0.3}, {1e-3, 2e-3, 0.3, 0.1}};
 	for (size_t t = 0; t < sizeof jacobian / sizeof *jacobian; t++) {
-		struct halfvec_step s = halfvec_step_of(jacobian[t], 1.3, 0.35);
-		size_t count = dice_count(200000);
+		struct halfvec_step s = halfvec_step_from_matrix(jacobian[t], 1.3, 0.35);
+		size_t count = dice_scaled_count(200000);
 		double reach = 3 * s.sigma[0], cell[2];
 		memset(observed, 0, sizeof observed);
 		memset(expected, 0, sizeof expected);
@@ -290,16 +291,16 @@ static void test_density(void **state)
 			for (int p = 0; p < PARTS * PARTS; p++) {
 				double x = ((q % SIDE) + (p % PARTS + 0.5) / PARTS) * cell[0] - reach;
 				double y = ((q / SIDE) + (p / PARTS + 0.5) / PARTS) * cell[1] - 3 * s.sigma[1];
-				expected[q] += exp(halfvec_step_log_pdf(&s, mat2_apply(s.u, (vec2){x, y})));
+				expected[q] += exp(halfvec_step_log_pdf(&s, mat2_apply(s.rotation, (vec2){x, y})));
 			}
 			expected[q] *= (double)count * cell[0] * cell[1] / (PARTS * PARTS);
 			expected[CELLS - 1] -= expected[q];
 		}
 		for (size_t i = 0; i < count; i++) {
-			double r = sqrt(-2 * log(1 - dice_throw(&d))), phi = 2 * M_PI * dice_throw(&d);
-			vec2 dh = halfvec_step_take(&s, r * cos(phi), r * sin(phi));
-			double x = (s.u.xx * dh.x + s.u.yx * dh.y + reach) / cell[0];
-			double y = (s.u.xy * dh.x + s.u.yy * dh.y + 3 * s.sigma[1]) / cell[1];
+			double r = sqrt(-2 * log(1 - dice_uniform(&d))), phi = 2 * M_PI * dice_uniform(&d);
+			vec2 dh = halfvec_step_sample(&s, r * cos(phi), r * sin(phi));
+			double x = (s.rotation.xx * dh.x + s.rotation.yx * dh.y + reach) / cell[0];
+			double y = (s.rotation.xy * dh.x + s.rotation.yy * dh.y + 3 * s.sigma[1]) / cell[1];
 			bool inside = x >= 0 && x < SIDE && y >= 0 && y < SIDE;
 			observed[inside ? (int)y * SIDE + (int)x : CELLS - 1]++;
 		}

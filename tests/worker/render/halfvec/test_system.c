@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-static struct constraint k[FULL_PATH_MAX_VERTICES];
+static struct constraint k[FULL_PATH_VERTICES_MAX];
 static struct constraint_system system_;
 static struct dense dense;
 /* The solver under test, and the size of its rounding errors. */
@@ -44,7 +44,7 @@ static void first_block_singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
 	vec2 p = {dice_between(d, -1, 1), dice_between(d, -1, 1)}, q = {dice_between(d, -1, 1), dice_between(d, -1, 1)};
-	double on = dice_throw(d) < 0.3 ? 0 : 1;
+	double on = dice_uniform(d) < 0.3 ? 0 : 1;
 	k[b - 1].b = (mat2){on * p.x * q.x, on * p.x * q.y, on * p.y * q.x, on * p.y * q.y};
 }
 
@@ -60,7 +60,7 @@ static void focus(struct dice *d, unsigned b, unsigned c)
 static void singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
-	vec2 x[FULL_PATH_MAX_VERTICES] = {{0, 0}};
+	vec2 x[FULL_PATH_VERTICES_MAX] = {{0, 0}};
 	for (unsigned j = c + 1; j < b; j++)
 		x[j] = (vec2){dice_between(d, 0.5, 1), dice_between(d, 0.5, 1)};
 	for (unsigned j = c + 1; j < b; j++) {
@@ -78,8 +78,8 @@ static void singular(struct dice *d, unsigned b, unsigned c)
  */
 static void rescale(struct dice *d, unsigned b, unsigned c, int most)
 {
-	double row[FULL_PATH_MAX_VERTICES][2], column[FULL_PATH_MAX_VERTICES + 1][2];
-	for (unsigned j = 0; j < FULL_PATH_MAX_VERTICES; j++)
+	double row[FULL_PATH_VERTICES_MAX][2], column[FULL_PATH_VERTICES_MAX + 1][2];
+	for (unsigned j = 0; j < FULL_PATH_VERTICES_MAX; j++)
 		for (int i = 0; i < 2; i++) {
 			row[j][i] = ldexp(1, (int)dice_below(d, (uint32_t)(2 * most + 1)) - most);
 			column[j][i] = ldexp(1, (int)dice_below(d, (uint32_t)(2 * most + 1)) - most);
@@ -206,11 +206,11 @@ static double long_log_transfer(unsigned b, unsigned c, double *condition)
 /* Returns whether the system was pivoted; counts in *refused the systems that are singular in float. */
 static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct worst *w, size_t *refused)
 {
-	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
-	mat2 dj[FULL_PATH_MAX_VERTICES];
+	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
+	mat2 dj[FULL_PATH_VERTICES_MAX];
 	dense_fill(&dense, k, b, c);
 	assert_true(dense_invert(&dense));
-	enum constraint_end end = solver->factor(k, b, c, &system_);
+	enum constraint_result end = solver->factor(k, b, c, &system_);
 	if (solver == &constraint_single && end != CONSTRAINT_OK) {
 		++*refused;
 		return 0;
@@ -226,11 +226,11 @@ static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct wo
 	end = solver->differentials(k, b, c, dj);
 	if (solver == &constraint_single && end != CONSTRAINT_OK) {
 		++*refused;
-		return system_.pivoted;
+		return system_.is_pivoted;
 	}
 	assert_int_equal(end, CONSTRAINT_OK);
 	compare_differentials(dj, b, c, w);
-	return system_.pivoted;
+	return system_.is_pivoted;
 }
 
 static bool row(const char *name, const struct worst *w)
@@ -245,12 +245,12 @@ static void compare_all(void)
 {
 	bool good = true;
 	for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
-		struct dice d = dice_of(kinds[i].name);
+		struct dice d = dice_for_test(kinds[i].name);
 		struct worst w = {0, 0, 0};
-		size_t pivoted = 0, refused = 0, count = dice_count(kinds[i].most > 12 ? 10 : 300);
+		size_t pivoted = 0, refused = 0, count = dice_scaled_count(kinds[i].most > 12 ? 10 : 300);
 		for (size_t s = 0; s < count; s++) {
 			unsigned inside = kinds[i].least + dice_below(&d, kinds[i].most - kinds[i].least + 1);
-			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_MAX_VERTICES - 1 - inside)),
+			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_VERTICES_MAX - 1 - inside)),
 				 b = c + inside + 1;
 			make_system(&kinds[i], &d, b, c);
 			pivoted += compare_system(&d, b, c, &w, &refused);
@@ -288,9 +288,9 @@ static void test_dense_in_float(void **state)
 static void test_singular(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("singular systems");
-	size_t count = dice_count(2000);
-	mat2 dj[FULL_PATH_MAX_VERTICES];
+	struct dice d = dice_for_test("singular systems");
+	size_t count = dice_scaled_count(2000);
+	mat2 dj[FULL_PATH_VERTICES_MAX];
 	for (size_t s = 0; s < count; s++) {
 		unsigned inside = 1 + dice_below(&d, 8), c = dice_below(&d, 4), b = c + inside + 1;
 		singular(&d, b, c);
@@ -300,9 +300,9 @@ static void test_singular(void **state)
 		assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
 		/* A slightly perturbed system is not singular. */
 		for (unsigned j = c + 1; j < b; j++)
-			k[j].b =
-				(mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)),
-				       k[j].b.yx, k[j].b.yy * (1 - 1e-6 * dice_throw(&d))};
+			k[j].b = (mat2){k[j].b.xx * (1 + 1e-6 * dice_uniform(&d)),
+					k[j].b.xy * (1 - 1e-6 * dice_uniform(&d)), k[j].b.yx,
+					k[j].b.yy * (1 - 1e-6 * dice_uniform(&d))};
 		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_OK);
 	}
 }
@@ -310,10 +310,10 @@ static void test_singular(void **state)
 /* Entries of any size, some of them equal: no operation is invalid, and accepted results are finite. */
 static void extremes_of(const struct constraint_solver *solver_, const double *values)
 {
-	struct dice d = dice_of("extreme systems");
-	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
-	mat2 dj[FULL_PATH_MAX_VERTICES];
-	size_t refused = 0, count = dice_count(20000);
+	struct dice d = dice_for_test("extreme systems");
+	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
+	mat2 dj[FULL_PATH_VERTICES_MAX];
+	size_t refused = 0, count = dice_scaled_count(20000);
 	for (size_t s = 0; s < count; s++) {
 		unsigned inside = 1 + dice_below(&d, s % 50 ? 6 : 31), b = inside + 1, few = s % 2 ? 12 : 9;
 		for (unsigned j = 1; j < b; j++) {
@@ -358,13 +358,13 @@ static void test_extremes(void **state)
 static void test_units(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("units of the system");
-	for (size_t s = 0; s < dice_count(500); s++) {
+	struct dice d = dice_for_test("units of the system");
+	for (size_t s = 0; s < dice_scaled_count(500); s++) {
 		unsigned b = 2 + dice_below(&d, 6);
 		struct dice same = d;
 		random_system(&d, b, 0, 1);
 		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
-		bool pivoted = system_.pivoted;
+		bool pivoted = system_.is_pivoted;
 		double transfer = system_.log_transfer;
 		random_system(&same, b, 0, 1);
 		for (unsigned j = 1; j < b; j++) {
@@ -373,7 +373,7 @@ static void test_units(void **state)
 			k[j].c = mat2_scale(0x1p-60, k[j].c);
 		}
 		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
-		assert_int_equal(system_.pivoted, pivoted);
+		assert_int_equal(system_.is_pivoted, pivoted);
 		assert_true(fabs(system_.log_transfer - transfer) < 1e-11 * (1 + b * 85));
 	}
 }
@@ -382,7 +382,7 @@ static void test_units(void **state)
 static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2],
 			 unsigned edges, quad h[][2])
 {
-	struct quad_place p[FULL_PATH_MAX_VERTICES];
+	struct quad_place p[FULL_PATH_VERTICES_MAX];
 	for (unsigned j = 0; j <= edges; j++)
 		p[j] = quad_at(&v[j], offset[j][0], offset[j][1]);
 	for (unsigned j = 1; j < edges; j++)
@@ -393,8 +393,8 @@ static void chain_halves(const struct quad_vertex *v, const struct quad_problem 
 static void solve_chain(const struct quad_vertex *v, const struct quad_problem *q, const quad target[][2],
 			quad offset[][2], unsigned edges)
 {
-	quad h[FULL_PATH_MAX_VERTICES][2];
-	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
+	quad h[FULL_PATH_VERTICES_MAX][2];
+	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
 	for (int turn = 0; turn < 6; turn++) {
 		chain_halves(v, q, (const quad(*)[2])offset, edges, h);
 		double scale = 0;
@@ -419,10 +419,10 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 {
 	unsigned edges = h->x.edges;
-	struct quad_vertex v[FULL_PATH_MAX_VERTICES];
-	struct quad_problem q[FULL_PATH_MAX_VERTICES];
-	quad base[FULL_PATH_MAX_VERTICES][2], result[2][2];
-	const quad still[FULL_PATH_MAX_VERTICES][2] = {{0, 0}};
+	struct quad_vertex v[FULL_PATH_VERTICES_MAX];
+	struct quad_problem q[FULL_PATH_VERTICES_MAX];
+	quad base[FULL_PATH_VERTICES_MAX][2], result[2][2];
+	const quad still[FULL_PATH_VERTICES_MAX][2] = {{0, 0}};
 	const double step = 1e-13;
 	for (unsigned j = 0; j <= edges; j++)
 		v[j] = quad_of_surface(h, j);
@@ -430,7 +430,7 @@ static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 		q[j] = quad_problem_of(h, j);
 	chain_halves(v, q, still, edges, base);
 	for (int side = 0; side < 2; side++) {
-		quad offset[FULL_PATH_MAX_VERTICES][2] = {{0, 0}}, target[FULL_PATH_MAX_VERTICES][2],
+		quad offset[FULL_PATH_VERTICES_MAX][2] = {{0, 0}}, target[FULL_PATH_VERTICES_MAX][2],
 		     move = side ? -step : step;
 		memcpy(target, base, sizeof target);
 		if (what == 0)
@@ -450,16 +450,16 @@ static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 static void test_solved_again(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("paths solved again");
+	struct dice d = dice_for_test("paths solved again");
 	static struct hand h;
-	mat2 dj[FULL_PATH_MAX_VERTICES];
+	mat2 dj[FULL_PATH_VERTICES_MAX];
 	double worst_transfer = 0, worst_differential = 0;
 	size_t pivoted = 0;
-	for (size_t made = 0; made < dice_count(100);) {
+	for (size_t made = 0; made < dice_scaled_count(100);) {
 		unsigned edges = 2 + dice_below(&d, 4);
 		if (!hand_chain(&h, edges, 0.2, &d))
 			continue;
-		constraints_of(&h.w, &h.x, edges, 0, k);
+		constraints_compute(&h.w, &h.x, edges, 0, k);
 		if (constraint_double.factor(k, edges, 0, &system_) != CONSTRAINT_OK)
 			continue;
 		dense_fill(&dense, k, edges, 0);
@@ -467,7 +467,7 @@ static void test_solved_again(void **state)
 		if (dense_det_condition(&dense) > 1e4)
 			continue;
 		made++;
-		pivoted += system_.pivoted;
+		pivoted += system_.is_pivoted;
 		mat2 t = mat2_of_columns(change_by_quad(&h, 0, 0), change_by_quad(&h, 0, 1));
 		worst_transfer = fmax(worst_transfer, fabs(log(fabs(mat2_det(t))) - system_.log_transfer));
 		assert_int_equal(constraint_double.differentials(k, edges, 0, dj), CONSTRAINT_OK);

@@ -57,14 +57,15 @@ static wide wide_cross(wide a, wide b)
 /* Returns a point of the shape in world space; only instances have a transform. */
 static wide placed(const struct geom_shape *g, wide p)
 {
-	const struct placement *m = g->place;
-	return m ? wide_add(wide_add(wide_add(widen(m->at), p.x, widen(m->x)), p.y, widen(m->y)), p.z, widen(m->z)) : p;
+	const struct placement *m = g->placement;
+	return m ? wide_add(wide_add(wide_add(widen(m->origin), p.x, widen(m->x)), p.y, widen(m->y)), p.z, widen(m->z))
+		 : p;
 }
 
 /* Transforms a normal by cofactors, without inverting the matrix. */
 static wide placed_normal(const struct geom_shape *g, wide n)
 {
-	const struct placement *m = g->place;
+	const struct placement *m = g->placement;
 	if (!m)
 		return n;
 	wide x = widen(m->x), y = widen(m->y), z = widen(m->z), a = wide_cross(y, z), zero = {0, 0, 0};
@@ -176,14 +177,14 @@ static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct 
 	if (x->v[0].kind == VERTEX_SURFACE && x->v[0].emitter >= 0)
 		x->v[0].kind = VERTEX_EMITTER;
 	for (unsigned e = 0; e < x->edges; e++)
-		if (!full_path_join(x, e))
+		if (!full_path_compute_edge(x, e))
 			return false;
 	return true;
 }
 
 static double gauss(struct dice *d)
 {
-	return sqrt(-2 * log(1 - dice_throw(d))) * cos(2 * M_PI * dice_throw(d));
+	return sqrt(-2 * log(1 - dice_uniform(d))) * cos(2 * M_PI * dice_uniform(d));
 }
 
 /* Moves x_b to the hit of a slightly turned ray from the vertex before it, if that hit has the same material. */
@@ -199,7 +200,7 @@ static void move_end(struct path_context *c, struct dice *d, struct full_path *y
 	struct ray_hit hit;
 	if (!accel_closest(c->w->accel, &start, w, 0, INFINITY, &hit))
 		return;
-	if (&c->w->bsdfs[c->w->parts[hit.prim.shape].bsdf] != at->bsdf)
+	if (&c->w->bsdfs[c->w->shape_bindings[hit.prim.shape].bsdf] != at->bsdf)
 		return;
 	surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, w, &hit, &at->x);
 }
@@ -210,7 +211,7 @@ static double step_of(const struct full_path *x, const struct constraint *k, uns
 {
 	if (x->v[j].delta)
 		return 0;
-	double alpha = fmin(x->v[j].bsdf->alpha, 1), reach = 0.01 * sqrt(x->edge[j].distance2);
+	double alpha = fmin(x->v[j].bsdf->min_alpha, 1), reach = 0.01 * sqrt(x->edge[j].distance2);
 	return fmin(alpha / sqrt(M_PI), reach * sqrt(mat2_norm2(k[j].b)));
 }
 
@@ -235,7 +236,7 @@ static void check_arrival(struct path_context *c, const struct full_path *x, str
 	check_residuals(c->w, y, b, end, target, scale, t);
 	for (unsigned j = end + 1; j < b; j++) {
 		assert_ptr_equal(y->v[j].bsdf, x->v[j].bsdf);
-		assert_int_equal(y->v[j].emitter, c->w->parts[y->v[j].x.prim.shape].emitter);
+		assert_int_equal(y->v[j].emitter, c->w->shape_bindings[y->v[j].x.prim.shape].emitter);
 		t->seams += y->v[j].x.prim.prim != x->v[j].x.prim.prim || y->v[j].x.prim.shape != x->v[j].x.prim.shape;
 	}
 	for (unsigned e = end; e < b; e++) {
@@ -244,7 +245,7 @@ static void check_arrival(struct path_context *c, const struct full_path *x, str
 		assert_memory_equal(&w, &y->edge[e].w, sizeof w);
 		assert_memory_equal(&w, &y->v[e].to_prev, sizeof w);
 		assert_true(distance2 == y->edge[e].distance2);
-		t->occluded += !full_path_visible(c, y, e);
+		t->occluded += !full_path_edge_is_visible(c, y, e);
 	}
 }
 
@@ -261,7 +262,7 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE, &s);
+	enum walk_result back = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE_ALL, &s);
 	t->back_ends[back]++;
 	if (back != WALK_OK)
 		return;
@@ -297,7 +298,7 @@ static void walk_nowhere(struct path_context *c, const struct full_path *x, unsi
 		target[j].h = k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	t->stays++;
-	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK || s.iterations != 1)
+	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
 	else
 		t->worst_stay = fmax(t->worst_stay, largest_distance(x, &y, b, end));
@@ -311,30 +312,30 @@ static void walk_again(struct path_context *c, const struct full_path *start, co
 	static struct full_path z;
 	z = *start;
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	limits.scale = 0.5;
+	limits.tolerance_scale = 0.5;
 	t->again++;
-	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK ||
+	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE_ALL, &s) != WALK_OK ||
 	    largest_distance(&z, y, b, end) > 0.01 * largest_distance(start, y, b, end))
 		t->elsewhere++;
 	else
-		check_residuals(c->w, &z, b, end, target, limits.scale, t);
+		check_residuals(c->w, &z, b, end, target, limits.tolerance_scale, t);
 }
 
 static void walk_once(struct path_context *c, struct dice *d, const struct full_path *x, struct tally *t)
 {
 	static struct full_path y, start;
-	static struct constraint k[FULL_PATH_MAX_VERTICES];
-	struct walk_target target[FULL_PATH_MAX_VERTICES];
+	static struct constraint k[FULL_PATH_VERTICES_MAX];
+	struct walk_target target[FULL_PATH_VERTICES_MAX];
 	unsigned b = 2 + dice_below(d, x->edges - 1), end = dice_below(d, b - 1);
 	y = *x;
-	constraints_of(c->w, x, b, end, k);
+	constraints_compute(c->w, x, b, end, k);
 	double all = 0;
 	for (unsigned j = end + 1; j < b; j++) {
 		double step = step_of(x, k, j);
 		all += step;
 		target[j].h =
 			x->v[j].delta ? (vec2){0, 0} : (vec2){k[j].h.x + step * gauss(d), k[j].h.y + step * gauss(d)};
-		target[j].tolerance = x->v[j].delta ? 1e-9 : 1e-3 * fmin(step, x->v[j].bsdf->alpha);
+		target[j].tolerance = x->v[j].delta ? 1e-9 : 1e-3 * fmin(step, x->v[j].bsdf->min_alpha);
 	}
 	if (b < x->edges)
 		move_end(c, d, &y, b);
@@ -343,9 +344,9 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	uint64_t before = batch_rays(c->counters);
-	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE, &s);
-	t->rays += batch_rays(c->counters) - before;
+	uint64_t before = batch_ray_count(c->counters);
+	enum walk_result e = halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &s);
+	t->rays += batch_ray_count(c->counters) - before;
 	t->walks++;
 	t->ends[e]++;
 	t->iterations += s.iterations;
@@ -354,7 +355,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	t->arrived++;
 	assert_memory_equal(&first, &y.v[b], sizeof first);
 	assert_memory_equal(&last.x, &y.v[end].x, sizeof last.x);
-	check_arrival(c, x, &y, b, end, target, limits.scale, t);
+	check_arrival(c, x, &y, b, end, target, limits.tolerance_scale, t);
 	for (unsigned j = end + 1; j < b; j++) { /* the caller gets the constraints at the new path */
 		vec2 h = halfvec_of(&y, j);
 		assert_memory_equal(&h, &s.k[j].h, sizeof h);
@@ -398,10 +399,10 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 	static struct full_path x;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct tally t = {0};
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	c = context_of(w, counters);
 	bool watched = fptrap_watch();
-	for (uint64_t i = 0; i < dice_count(20000); i++)
+	for (uint64_t i = 0; i < dice_scaled_count(20000); i++)
 		if (draw_path(&c, d.seed, i, &x))
 			walk_once(&c, &d, &x, &t);
 	fptrap_unwatch(watched);
@@ -440,9 +441,9 @@ static void test_spheres(void **state)
 {
 	(void)state;
 	walk_in("spheres",
-		world_of_text(32, 32,
-			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
-				      BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))),
+		world_from_text(32, 32,
+				SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
+					BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))),
 		0.908, 0.999);
 }
 
@@ -450,9 +451,9 @@ static void test_rough_glass(void **state)
 {
 	(void)state;
 	walk_in("rough glass",
-		world_of_text(32, 32,
-			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
-				      BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")),
+		world_from_text(32, 32,
+				SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
+					BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")),
 		0.891, 0.996);
 }
 
@@ -460,11 +461,12 @@ static void test_smooth_glass(void **state)
 {
 	(void)state;
 	walk_in("smooth glass",
-		world_of_text(32, 32,
-			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-				      BALL(".9", "-.5", "0",
-					   "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
-					      FLOOR(METAL(".1"))),
+		world_from_text(
+			32, 32,
+			SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+				BALL(".9", "-.5", "0",
+				     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
+					FLOOR(METAL(".1"))),
 		0.907, 0.998);
 }
 
@@ -472,9 +474,9 @@ static void test_sky(void **state)
 {
 	(void)state;
 	walk_in("sky",
-		world_of_text(32, 32,
-			      SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-				      BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))),
+		world_from_text(32, 32,
+				SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+					BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))),
 		0.909, 0.993);
 }
 
@@ -484,17 +486,18 @@ static void test_nearly_matched(void **state)
 {
 	(void)state;
 	walk_in("nearly matched",
-		world_of_text(32, 32,
-			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL(
-				      "-.3", "-.2", ".3",
-				      "<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
-				      "<float name='ext_ior' value='1'/></bsdf>")
-				      BALL(".9", "-.5", "0",
-					   "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
-					   "<float name='ext_ior' value='1'/></bsdf>")
-					      BALL("0", "-.5", "-1",
-						   "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
-						   "<float name='ext_ior' value='1'/></bsdf>") FLOOR(METAL(".1"))),
+		world_from_text(
+			32, 32,
+			SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL(
+				"-.3", "-.2", ".3",
+				"<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
+				"<float name='ext_ior' value='1'/></bsdf>")
+				BALL(".9", "-.5", "0",
+				     "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
+				     "<float name='ext_ior' value='1'/></bsdf>")
+					BALL("0", "-.5", "-1",
+					     "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
+					     "<float name='ext_ior' value='1'/></bsdf>") FLOOR(METAL(".1"))),
 		0.65, 0.983);
 }
 
@@ -503,12 +506,12 @@ static void test_poles(void **state)
 {
 	(void)state;
 	walk_in("poles",
-		world_of_text(32, 32,
-			      "<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
-			      "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
-			      "<integer name='width' value='32'/><integer name='height' value='32'/>"
-			      "<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
-				      BALL("0", "0", "-2", METAL(".05"))),
+		world_from_text(32, 32,
+				"<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
+				"<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+				"<integer name='width' value='32'/><integer name='height' value='32'/>"
+				"<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
+					BALL("0", "0", "-2", METAL(".05"))),
 		0.839, 0.989);
 }
 
@@ -539,7 +542,7 @@ static struct world *bumpy_world(int n, const char *bsdf, const char *instances)
 			 *instances ? "<shape type='shapegroup' id='g'>" : "", bsdf, instances);
 	assert_true(m > 0 && (size_t)m < sizeof scene);
 	const struct memory_file files[] = {{"bumps.xml", scene, (size_t)m}, {"bumps.obj", obj, at}, {NULL, NULL, 0}};
-	return world_of_files(32, 32, files);
+	return world_from_files(32, 32, files);
 }
 
 static void test_meshes(void **state)
@@ -555,7 +558,7 @@ static void test_meshes(void **state)
 			    "</shape><shape type='instance'><ref id='g'/><transform name='to_world'>"
 			    "<scale x='-1.2' y='1' z='0.9'/></transform></shape><shape type='instance'><ref id='g'/>"
 			    "<transform name='to_world'><translate y='-0.5'/></transform></shape>");
-	assert_int_equal(w->sharing_count, 2);
+	assert_int_equal(w->sharing_shape_count, 2);
 	walk_in("instances of water", w, 0.99, 0.998);
 }
 

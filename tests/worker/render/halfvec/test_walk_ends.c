@@ -21,7 +21,7 @@ static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
 static struct full_path x, y;
 static struct walk_scratch s;
-static struct constraint k[FULL_PATH_MAX_VERTICES];
+static struct constraint k[FULL_PATH_VERTICES_MAX];
 
 static vec3 in_world(const struct world *w, vec3 p)
 {
@@ -36,7 +36,7 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 	c = (struct path_context){.w = w, .window = {-100, -100, 300, 300}, .counters = counters};
 	memset(&x, 0, sizeof x);
 	x.edges = n - 1;
-	x.wl.grey = true;
+	x.wl.is_grey = true;
 	x.v[n - 1] = (struct path_vertex){
 		.kind = VERTEX_CAMERA, .emitter = -1, .x = {.p = in_world(w, p[0]), .prim = PRIM_NONE}};
 	for (unsigned j = n - 1; j-- > 0;) {
@@ -47,7 +47,7 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 		if (j > 0)
 			assert_true(
 				path_extend(&c, from, vec3_normalize(vec3_sub(target, from->x.p)), 0, INFINITY, to));
-		assert_true(full_path_join(&x, j));
+		assert_true(full_path_compute_edge(&x, j));
 	}
 	for (unsigned j = 1; j + 1 < n; j++) {
 		assert_int_equal(x.v[j].kind, VERTEX_SURFACE);
@@ -57,20 +57,20 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 }
 
 /* Walks from x to half vectors that differ by h from its own, to 1e-9. */
-static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits limits)
+static enum walk_result walk_by(const vec2 *h, bool visible, struct walk_limits limits)
 {
-	struct walk_target target[FULL_PATH_MAX_VERTICES];
-	constraints_of(c.w, &x, x.edges, 0, k);
+	struct walk_target target[FULL_PATH_VERTICES_MAX];
+	constraints_compute(c.w, &x, x.edges, 0, k);
 	for (unsigned j = 1; j < x.edges; j++)
 		target[j] = (struct walk_target){vec2_add(k[j].h, h[j]), 1e-9};
 	y = x;
-	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, WALK_STALE, &s);
+	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, WALK_STALE_ALL, &s);
 }
 
 /* Computes the differences h that move vertex 1 by about d (scene units) and no other vertex. */
 static void ask_move(const struct world *w, vec3 d, vec2 *h)
 {
-	constraints_of(w, &x, x.edges, 0, k);
+	constraints_compute(w, &x, x.edges, 0, k);
 	vec3 du, dv, m = vec3_scale(w->scale, d);
 	surface_tangents(&x.v[1].x, &du, &dv);
 	vec2 dx = {vec3_dot(m, du), vec3_dot(m, dv)};
@@ -98,12 +98,12 @@ static void test_occluder(void **state)
 {
 	(void)state;
 	for (int same = 0; same < 2; same++) {
-		struct world *w = same ? world_of_text(32, 32,
-						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal")
-							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "metal"))
-				       : world_of_text(32, 32,
-						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
-							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
+		struct world *w = same ? world_from_text(32, 32,
+							 SENSOR("0,1,3", "0,0,0") MATERIAL("metal")
+								 FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "metal"))
+				       : world_from_text(32, 32,
+							 SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+								 FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
 		lay_path(w, (vec3[]){{0, 1, 1}, {0.5, 0, 0}, {0, 1, -1}}, 3);
 		vec2 h[3];
 		/* vertex 1 moves to (0.2, 0, 0), where the middle of the edge to the light lies at the ball's centre */
@@ -124,13 +124,13 @@ static void test_occluder(void **state)
 static void test_names(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(32, 32,
-					SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
-						FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
+	struct world *w = world_from_text(32, 32,
+					  SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+						  FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
 	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
-	once.iterations = 1;
+	once.max_iterations = 1;
 	/* Beyond the border of the floor; the walk's own rays cannot reach this position. */
 	ask_move(w, (vec3){40, 0, 0}, h);
 	assert_int_equal(walk_by(h, false, once), WALK_MISSED);
@@ -145,16 +145,16 @@ static void test_names(void **state)
 	struct path_vertex camera = x.v[2];
 	vec3 mirrored = in_world(w, (vec3){0, -1, 1});
 	ask_move(w, (vec3){0, 0, 0}, h);
-	constraints_of(w, &x, 2, 0, k);
+	constraints_compute(w, &x, 2, 0, k);
 	struct walk_target target[3] = {{{0, 0}, 0}, {k[1].h, 1e-9}, {{0, 0}, 0}};
 	y = x;
 	y.v[2].x.p = mirrored;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_MODE);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_MODE);
 	y.v[2] = camera;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_OK);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_OK);
 	/* The fixed end coincides with a vertex. */
 	y.v[2].x.p = y.v[1].x.p;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_SINGULAR);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_SINGULAR);
 	world_free(w);
 }
 
@@ -164,21 +164,21 @@ static void test_few_iterations(void **state)
 {
 	(void)state;
 	enum { WALKS = 200 };
-	struct dice d = dice_of("few iterations");
-	struct world *w = world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") FLOOR);
+	struct dice d = dice_for_test("few iterations");
+	struct world *w = world_from_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") FLOOR);
 	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
 	unsigned later = 0;
 	for (int i = 0; i < WALKS; i++) {
 		vec2 h[3];
 		struct walk_limits few = normal;
-		ask_move(w, (vec3){dice_throw(&d) - 0.5, 0, dice_throw(&d) - 0.5}, h);
+		ask_move(w, (vec3){dice_uniform(&d) - 0.5, 0, dice_uniform(&d) - 0.5}, h);
 		assert_int_equal(walk_by(h, false, normal), WALK_OK);
-		few.iterations = s.iterations;
+		few.max_iterations = s.iterations;
 		assert_int_equal(walk_by(h, true, few), WALK_OK);
-		later += s.iterations > few.iterations;
-		if (few.iterations == 1)
+		later += s.iterations > few.max_iterations;
+		if (few.max_iterations == 1)
 			continue;
-		few.iterations--;
+		few.max_iterations--;
 		assert_int_equal(walk_by(h, false, few), WALK_ITERATIONS);
 		assert_int_equal(walk_by(h, true, few), WALK_ITERATIONS);
 	}
@@ -190,7 +190,7 @@ static void test_few_iterations(void **state)
 static void test_other_material(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK(
 			"0", "0", "0", ".5",
@@ -199,7 +199,7 @@ static void test_other_material(void **state)
 	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
-	once.iterations = 1;
+	once.max_iterations = 1;
 	ask_move(w, (vec3){-2, 0, 0}, h);
 	assert_int_equal(walk_by(h, false, once), WALK_BLOCKED);
 	/* No point of the ball has this half vector: the residual stops shrinking before the silhouette. */
@@ -227,26 +227,26 @@ static void test_focus(void **state)
 	const double a = 0.4, away = 1.2;
 	double at;
 	vec3 camera = {away * sin(a), -1 + away * cos(a), 0}, image = image_point(a, away, &at);
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL
 		"<shape type='rectangle'><transform name='to_world'><scale value='.1'/>"
 		"<lookat origin='%.17g,%.17g,%.17g' target='0,-0.7,0.4' up='0,1,0'/></transform><ref id='metal'/></shape>",
 		image.x, image.y, image.z);
 	lay_path(w, (vec3[]){camera, {0, -1, 0}, image, {-0.1, -0.5, 0.6}}, 4);
-	constraints_of(w, &x, 3, 0, k);
+	constraints_compute(w, &x, 3, 0, k);
 	double det = fabs(mat2_det(k[2].b)) / mat2_norm2(k[2].b);
 	assert_true(det < 1e-6);
 	assert_int_equal(constraint_double.factor(k, 3, 0, &s.system), CONSTRAINT_OK);
-	assert_true(s.system.pivoted);
-	struct dice d = dice_of("walks at a focus");
-	size_t ends[WALK_ITERATIONS + 1] = {0}, n = dice_count(2000);
+	assert_true(s.system.is_pivoted);
+	struct dice d = dice_for_test("walks at a focus");
+	size_t ends[WALK_ITERATIONS + 1] = {0}, n = dice_scaled_count(2000);
 	double iterations = 0;
 	for (size_t i = 0; i < n; i++) {
 		vec2 h[4];
 		for (unsigned j = 1; j < 3; j++)
 			h[j] = (vec2){dice_between(&d, -0.01, 0.01), dice_between(&d, -0.01, 0.01)};
-		enum walk_end e = walk_by(h, false, normal);
+		enum walk_result e = walk_by(h, false, normal);
 		ends[e]++;
 		iterations += s.iterations;
 		for (unsigned j = 1; j < 3 && e == WALK_OK; j++) {
@@ -269,13 +269,13 @@ static void test_singular(void **state)
 	const double a = 0.4, away = 1.2;
 	double at;
 	vec3 camera = {away * sin(a), -1 + away * cos(a), 0}, image = image_point(a, away, &at);
-	struct world *w = world_of_text(32, 32, SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL);
+	struct world *w = world_from_text(32, 32, SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL);
 	lay_path(w, (vec3[]){camera, {0, -1, 0}, image}, 3);
-	constraints_of(w, &x, 2, 0, k);
+	constraints_compute(w, &x, 2, 0, k);
 	assert_true(fabs(mat2_det(k[1].b)) < 1e-12 * mat2_norm2(k[1].b));
 	vec2 h[3] = {{0, 0}, {0.01, 0.01}, {0, 0}};
 	/* Rounding may leave a nonzero pivot, and then a huge step that leads nowhere. */
-	enum walk_end e = walk_by(h, false, normal);
+	enum walk_result e = walk_by(h, false, normal);
 	assert_true(e == WALK_SINGULAR || e == WALK_DIVERGED);
 	world_free(w);
 }

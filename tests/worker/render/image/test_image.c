@@ -310,7 +310,7 @@ static unsigned char *make_exr(const char *const *names, uint32_t channels, cons
 			      .full_height = EXR_HEIGHT};
 	float planes[3][EXR_PIXELS];
 	for (uint32_t k = 0; k < channels; k++) {
-		snprintf(x.names[k], sizeof x.names[k], "%s", names[k]);
+		snprintf(x.channel_names[k], sizeof x.channel_names[k], "%s", names[k]);
 		x.planes[k] = planes[k];
 		for (int i = 0; i < EXR_PIXELS; i++)
 			planes[k][i] = value[k] * (float)(i + 1);

@@ -103,7 +103,7 @@ static void test_damaged(void **state)
 {
 	(void)state;
 	uint8_t rgba[4 * WIDTH * HEIGHT], *file = NULL;
-	struct dice d = dice_of("damaged WebP");
+	struct dice d = dice_for_test("damaged WebP");
 	draw(rgba);
 	size_t size = WebPEncodeRGBA(rgba, WIDTH, HEIGHT, 4 * WIDTH, 50, &file);
 	uint8_t *copy = mem_alloc(size, 1);

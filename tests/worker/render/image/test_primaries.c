@@ -90,7 +90,7 @@ static unsigned char *make_exr(const struct primaries *p, const float *colour, s
 	unsigned char *bytes;
 	struct error e;
 	for (int k = 0; k < 3; k++) {
-		snprintf(x.names[k], sizeof x.names[k], "%c", "BGR"[k]);
+		snprintf(x.channel_names[k], sizeof x.channel_names[k], "%c", "BGR"[k]);
 		planes[k] = colour[2 - k];
 		x.planes[k] = planes + k;
 	}

@@ -26,14 +26,14 @@ static void ours_seen_on_entering_a_library(void)
 {
 	fptrap_watch();
 	invalid();
-	fptrap_return(fptrap_leave());
+	fptrap_leave_library(fptrap_enter_library());
 	_exit(0);
 }
 
 static void ours_seen_at_the_end(void)
 {
 	bool before = fptrap_watch();
-	fptrap_return(fptrap_leave());
+	fptrap_leave_library(fptrap_enter_library());
 	invalid();
 	fptrap_unwatch(before);
 }
@@ -41,17 +41,17 @@ static void ours_seen_at_the_end(void)
 static void in_a_library(void)
 {
 	bool before = fptrap_watch();
-	unsigned left = fptrap_leave();
+	unsigned left = fptrap_enter_library();
 	invalid();
-	fptrap_return(left);
-	fptrap_return(fptrap_leave());
+	fptrap_leave_library(left);
+	fptrap_leave_library(fptrap_enter_library());
 	fptrap_unwatch(before);
 }
 
 static void not_watched(void)
 {
 	invalid();
-	fptrap_return(fptrap_leave());
+	fptrap_leave_library(fptrap_enter_library());
 	fptrap_unwatch(fptrap_watch());
 }
 

@@ -59,7 +59,7 @@ static struct passage passage_of(struct dice *d)
 			    .begin = vec3_scale(3, dice_direction(d)),
 			    .end = vec3_scale(3, dice_direction(d)),
 			    .angle = dice_between(d, 0, 179),
-			    .hand = dice_throw(d) < 0.5 ? -1 : 1};
+			    .hand = dice_uniform(d) < 0.5 ? -1 : 1};
 	return p;
 }
 
@@ -82,16 +82,16 @@ static void assert_same(const mat4 *a, const mat4 *b)
 static void test_between_two(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("motion between two keyframes");
-	for (size_t n = dice_count(2000); n > 0; n--) {
+	struct dice d = dice_for_test("motion between two keyframes");
+	for (size_t n = dice_scaled_count(2000); n > 0; n--) {
 		const struct passage p = passage_of(&d);
 		const struct keyframe key[2] = {{-1, expected(&p, 0)}, {3, expected(&p, 1)}};
 		const struct animation a = {2, key};
 		struct motion_key room[2];
 		struct motion m;
-		double open = dice_between(&d, -1, 2), close = dice_between(&d, open + 0.1, 3), t = dice_throw(&d);
+		double open = dice_between(&d, -1, 2), close = dice_between(&d, open + 0.1, 3), t = dice_uniform(&d);
 		assert_true(motion_make(&m, &a, open, close, room));
-		mat4 got = motion_at(&m, t), right = expected(&p, (open + t * (close - open) + 1) / 4);
+		mat4 got = motion_transform_at(&m, t), right = expected(&p, (open + t * (close - open) + 1) / 4);
 		assert_same(&got, &right);
 	}
 }
@@ -100,8 +100,8 @@ static void test_between_two(void **state)
 static void test_many(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("motion along many keyframes");
-	for (size_t n = dice_count(500); n > 0; n--) {
+	struct dice d = dice_for_test("motion along many keyframes");
+	for (size_t n = dice_scaled_count(500); n > 0; n--) {
 		const struct passage p = passage_of(&d);
 		struct keyframe key[9];
 		for (int i = 0; i < 9; i++) /* at unequal distances */
@@ -111,8 +111,8 @@ static void test_many(void **state)
 		struct motion m;
 		assert_true(motion_make(&m, &a, -1, 2, room));
 		for (int k = 0; k < 8; k++) {
-			double t = dice_throw(&d);
-			mat4 got = motion_at(&m, t), right = expected(&p, fmin(fmax(3 * t - 1, 0), 1));
+			double t = dice_uniform(&d);
+			mat4 got = motion_transform_at(&m, t), right = expected(&p, fmin(fmax(3 * t - 1, 0), 1));
 			assert_same(&got, &right);
 		}
 	}
@@ -131,17 +131,17 @@ static void test_when_it_moves(void **state)
 	assert_false(motion_make(&m, &a, 2, 3, room));
 	assert_false(motion_make(&m, &a, 5, 9, room));
 	assert_false(motion_make(&m, &a, 1.25, 1.25, room));
-	mat4 at = motion_at(&m, 0);
+	mat4 at = motion_transform_at(&m, 0);
 	assert_true(at.m[0][3] == 1);
 	assert_true(motion_make(&m, &a, 1.5, 1.75, room));
-	at = motion_at(&m, 1);
+	at = motion_transform_at(&m, 1);
 	assert_true(at.m[0][3] == 3);
 	assert_true(motion_make(&m, &a, -8, 8, room));
 	assert_int_equal(m.count, 4);
 	assert_true(motion_make(&m, &a, 1.5, 1.75, room));
 	assert_int_equal(m.count, 2);
 	motion_rescale(&m, (vec3){1, 2, 3}, 0.5);
-	at = motion_at(&m, 1);
+	at = motion_transform_at(&m, 1);
 	assert_true(at.m[0][3] == 1 && at.m[1][3] == -1 && at.m[2][3] == -1.5 && at.m[0][0] == 0.5);
 }
 
@@ -157,8 +157,8 @@ static void widen(vec3 p, double low[3], double high[3])
 static void test_bounds(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("motion's bounds");
-	for (size_t n = dice_count(200); n > 0; n--) {
+	struct dice d = dice_for_test("motion's bounds");
+	for (size_t n = dice_scaled_count(200); n > 0; n--) {
 		const struct passage p = passage_of(&d);
 		const struct keyframe key[3] = {
 			{-0.5, expected(&p, 0)}, {0.3, expected(&p, 0.7)}, {0.8, expected(&p, 1)}};
@@ -168,11 +168,11 @@ static void test_bounds(void **state)
 		vec3 low, high, size = {1, 2, 0.5};
 		double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
 		assert_true(motion_make(&m, &a, 0, 1, room));
-		m.before = mat4_mul(mat4_translate((vec3){0.3, 0, 1}), mat4_rotate((vec3){1, 0, 1}, 30));
+		m.pre_transform = mat4_mul(mat4_translate((vec3){0.3, 0, 1}), mat4_rotate((vec3){1, 0, 1}, 30));
 		motion_bounds(&m, vec3_neg(size), size, &low, &high);
 		for (int i = 0; i <= 1000; i++)
 			for (int k = 0; k < 8; k++) {
-				const mat4 at = motion_at(&m, i / 1000.0);
+				const mat4 at = motion_transform_at(&m, i / 1000.0);
 				widen(mat4_point(&at, (vec3){k & 1 ? -1 : 1, k & 2 ? -2 : 2, k & 4 ? -0.5 : 0.5}),
 				      least, most);
 			}

@@ -56,7 +56,7 @@ static void test_against_all(void **state)
 				vec3 q = k % 8 < 4 ? point_of_cloud(EVERYWHERE, MOST + k)
 						   : point_of_cloud((enum cloud)cloud, k);
 				memset(found, 0, sizeof found);
-				point_tree_within(&t, q, r, count, NULL);
+				point_tree_visit_within(&t, q, r, count, NULL);
 				for (size_t i = 0; i < n; i++) {
 					vec3 d = vec3_sub(at[i], q);
 					assert_int_equal(found[i], vec3_dot(d, d) <= r * r);

@@ -67,7 +67,7 @@ static void test_wavelengths_in_range_and_apart(void **state)
 	(void)state;
 	for (size_t n = 0; n < HARD_US; n++) {
 		struct wavelengths w = wavelengths_sample(hard_us[n]);
-		assert_false(w.grey);
+		assert_false(w.is_grey);
 		assert_true(w.u == hard_us[n]);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
 			double want = hard_us[n] + 0.25 * i;
@@ -133,10 +133,10 @@ static void test_few_wavelengths(void **state)
 	(void)state;
 	for (size_t n = 0; n < HARD_US; n++) {
 		double u = hard_us[n];
-		struct wavelengths all = wavelengths_sample_few(u, 4), old = wavelengths_sample(u);
-		struct wavelengths one = wavelengths_sample_few(u, 1), two = wavelengths_sample_few(u, 2);
+		struct wavelengths all = wavelengths_sample_distinct(u, 4), old = wavelengths_sample(u);
+		struct wavelengths one = wavelengths_sample_distinct(u, 1), two = wavelengths_sample_distinct(u, 2);
 		assert_memory_equal(all.nm, old.nm, sizeof all.nm);
-		assert_true(all.few == 0 && old.few == 0 && one.few == 1 && two.few == 2);
+		assert_true(all.period == 0 && old.period == 0 && one.period == 1 && two.period == 2);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
 			assert_true(one.nm[i] == old.nm[0]);
 			assert_true(two.nm[i] == two.nm[i % 2]);
@@ -155,7 +155,7 @@ static void unbiased_of(unsigned count)
 			exact[k] += cie_observer[i][k] * bump(CIE_FIRST_NM + i) / CIE_Y_SUM;
 	for (int n = 0; n < N; n++) {
 		double xyz[3];
-		struct wavelengths w = wavelengths_sample_few((n + 0.5) / N, count);
+		struct wavelengths w = wavelengths_sample_distinct((n + 0.5) / N, count);
 		spectrum s;
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			s.v[k] = bump(w.nm[k]);
@@ -182,7 +182,8 @@ static void test_xyz_is_unbiased(void **state)
 static void test_intensity_weights(void **state)
 {
 	(void)state;
-	const struct wavelengths all[] = {wavelengths_sample(0.3), wavelengths_sample_few(0.7, 2), {.rgb = true}};
+	const struct wavelengths all[] = {
+		wavelengths_sample(0.3), wavelengths_sample_distinct(0.7, 2), {.is_rgb = true}};
 	const spectrum l = {{0.3, 1.7, 0.9, 5}};
 	for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
 		spectrum weights = spectrum_intensity_weights(&all[k]);
@@ -192,7 +193,7 @@ static void test_intensity_weights(void **state)
 			sum += l.v[i] * weights.v[i];
 		assert_true(fabs(sum / (xyz[0] + xyz[1] + xyz[2]) - 1) < 1e-12);
 		rec709_from_xyz(xyz, rgb);
-		for (int i = 0; i < 3 && all[k].rgb; i++)
+		for (int i = 0; i < 3 && all[k].is_rgb; i++)
 			assert_true(fabs(rgb[i] - l.v[i]) < 1e-14);
 	}
 }
@@ -202,7 +203,7 @@ static void test_intensity_weights(void **state)
 static void test_mean(void **state)
 {
 	(void)state;
-	assert_true(spectrum_mean(spectrum_of(DBL_MAX)) == DBL_MAX);
+	assert_true(spectrum_mean(spectrum_constant(DBL_MAX)) == DBL_MAX);
 	for (int i = 1; i < 1000; i++) {
 		const spectrum s = {{1.0 / i, i / 7.0, sqrt(i), exp(0.1 * i)}};
 		assert_true(spectrum_mean(s) == (((s.v[0] + s.v[1]) + s.v[2]) + s.v[3]) / 4);

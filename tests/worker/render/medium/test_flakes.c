@@ -65,7 +65,7 @@ static void check_depths(const struct world *w, const char *name)
 	enum { STEPS = 200000 };
 	const struct medium *m = &w->media[0];
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	struct dice d = dice_of(name);
+	struct dice d = dice_for_test(name);
 	double most = 0;
 	for (int round = 0; round < 5; round++) {
 		vec3 from = {dice_between(&d, -1.2, 1), dice_between(&d, 0, 1.7), dice_between(&d, -0.2, 1)},
@@ -76,16 +76,17 @@ static void check_depths(const struct world *w, const char *name)
 		for (int i = 0; i < STEPS; i++)
 			sum += medium_extinction(m, vec3_madd(o, (i + 0.5) * length / STEPS, r.d), r.d, &wl).v[0];
 		sum *= length / STEPS;
-		struct medium_lanes forth = medium_at(m, r.d, &wl), back = medium_at(m, vec3_neg(r.d), &wl);
+		struct medium_lanes forth = medium_lanes_along(m, r.d, &wl),
+				    back = medium_lanes_along(m, vec3_neg(r.d), &wl);
 		const struct grid_ray turned = {in_world(w, to), vec3_neg(r.d), 0, length};
-		double depth = medium_depth(&forth, &r).v[0];
+		double depth = medium_optical_depth(&forth, &r).v[0];
 		assert_true(depth > 0.01);
 		most = fmax(most, fabs(depth / sum - 1));
-		assert_true(fabs(medium_depth(&back, &turned).v[0] / depth - 1) < 1e-9);
+		assert_true(fabs(medium_optical_depth(&back, &turned).v[0] / depth - 1) < 1e-9);
 		spectrum reached, left;
-		double t = medium_reach(&forth, &r, 0, 0.4 * depth, &reached);
+		double t = medium_invert_depth(&forth, &r, 0, 0.4 * depth, &reached);
 		assert_true(t > 0 && t < length && fabs(reached.v[0] / (0.4 * depth) - 1) < 1e-6);
-		left = medium_depth(&forth, &(struct grid_ray){o, r.d, t, length});
+		left = medium_optical_depth(&forth, &(struct grid_ray){o, r.d, t, length});
 		assert_true(fabs(left.v[0] / (0.6 * depth) - 1) < 1e-5);
 	}
 	printf("%s: depths off by %.1e at most\n", name, most);
@@ -107,7 +108,7 @@ static void test_grids(void **state)
 			vol_make(&density, side, channels, density_at);
 			const struct memory_file *files = scene_of("3.0.0", "heterogeneous", cases[k].sigma_t,
 								   "<phase type='sggx'>" MATRICES "</phase>");
-			struct world *w = world_of_files(8, 8, files);
+			struct world *w = world_from_files(8, 8, files);
 			check_depths(w, cases[k].name);
 			world_free(w);
 		}
@@ -120,12 +121,12 @@ static void test_values(void **state)
 	static const uint32_t side[3] = {2, 2, 2};
 	vol_make(&matrices, side, 6, matrix_at);
 	vol_make(&density, side, 1, density_at);
-	struct world *w = world_of_files(8, 8,
-					 scene_of("3.0.0", "heterogeneous",
-						  "<volume type='gridvolume' name='sigma_t'><string name='filename' "
-						  "value='d.vol'/></volume>",
-						  "<phase type='sggx'><volume type='gridvolume' name='S'><string "
-						  "name='filename' value='s.vol'/></volume></phase>"));
+	struct world *w = world_from_files(8, 8,
+					   scene_of("3.0.0", "heterogeneous",
+						    "<volume type='gridvolume' name='sigma_t'><string name='filename' "
+						    "value='d.vol'/></volume>",
+						    "<phase type='sggx'><volume type='gridvolume' name='S'><string "
+						    "name='filename' value='s.vol'/></volume></phase>"));
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	for (int k = 0; k < 8; k++) {
 		double x = k & 1, y = k >> 1 & 1, z = k >> 2;
@@ -160,14 +161,14 @@ static void test_even(void **state)
 	vec3 d = {0.36, 0.48, 0.8};
 	double area = sqrt(0.5 * 0.1296 + 0.3 * 0.2304 + 0.4 * 0.64 + 0.2 * 0.1728 - 0.1 * 0.288 + 0.04 * 0.384);
 	for (int k = 0; k < 4; k++) {
-		struct world *w = world_of_files(8, 8,
-						 scene_of("3.0.0", k & 1 ? "heterogeneous" : "homogeneous",
-							  "<float name='sigma_t' value='3'/>", kinds[k >> 1]));
+		struct world *w = world_from_files(8, 8,
+						   scene_of("3.0.0", k & 1 ? "heterogeneous" : "homogeneous",
+							    "<float name='sigma_t' value='3'/>", kinds[k >> 1]));
 		vec3 p = in_world(w, (vec3){0.5, 0.5, 0.5});
 		double found = medium_extinction(&w->media[0], p, d, &wl).v[0] * w->scale;
 		assert_true(fabs(found / (3 * area) - 1) < 1e-6);
-		struct medium_lanes lanes = medium_at(&w->media[0], d, &wl);
-		double depth = medium_depth(&lanes, &(struct grid_ray){p, d, 0, 0.1 * w->scale}).v[0];
+		struct medium_lanes lanes = medium_lanes_along(&w->media[0], d, &wl);
+		double depth = medium_optical_depth(&lanes, &(struct grid_ray){p, d, 0, 0.1 * w->scale}).v[0];
 		assert_true(fabs(depth / (0.3 * area) - 1) < 1e-6);
 		world_free(w);
 	}
@@ -214,16 +215,18 @@ static void test_refused(void **state)
 	vol_make(&matrices, (const uint32_t[3]){4, 3, 5}, 6, matrix_at);
 	vol_make(&density, (const uint32_t[3]){4, 3, 4}, 1, density_at);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		world_of_files_refused(scene_of("3.0.0", cases[i].type, cases[i].sigma_t, cases[i].phase),
-				       cases[i].why);
-	world_of_files_refused(scene_of("0.6.0", "homogeneous", "<float name='sigma_t' value='1'/>", FLAKES("")),
-			       "a scene of 0.6 has no \"sggx\"");
+		world_check_files_refused(scene_of("3.0.0", cases[i].type, cases[i].sigma_t, cases[i].phase),
+					  cases[i].why);
+	world_check_files_refused(scene_of("0.6.0", "homogeneous", "<float name='sigma_t' value='1'/>", FLAKES("")),
+				  "a scene of 0.6 has no \"sggx\"");
 	matrices.value[6 * 7 + 2] = -1;
 	vol_write(&matrices);
-	world_of_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))), "is not positive definite");
+	world_check_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
+				  "is not positive definite");
 	matrices.value[6 * 7 + 2] = 1e13F;
 	vol_write(&matrices);
-	world_of_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))), "S: its values go from ");
+	world_check_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
+				  "S: its values go from ");
 }
 
 int main(void)

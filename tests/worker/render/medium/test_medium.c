@@ -22,8 +22,8 @@ static const vec3 along_z = {0, 0, 1};
 
 static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
 {
-	const struct medium_lanes lanes = medium_at(m, along_z, w);
-	return spectrum_attenuation(medium_depth(&lanes, &(struct grid_ray){nowhere, along_z, 0, distance}));
+	const struct medium_lanes lanes = medium_lanes_along(m, along_z, w);
+	return spectrum_transmittance(medium_optical_depth(&lanes, &(struct grid_ray){nowhere, along_z, 0, distance}));
 }
 
 static double transmittance_through(double sigma, double per_length, double distance)
@@ -73,9 +73,9 @@ static const double sigma_t[] = {2, 0.25, 4, 0}, albedo[] = {0.75, 1, 0.75, 0.5}
 
 static struct medium coloured_medium(bool by_albedo)
 {
-	return (struct medium){.first.color = color_of_table(4, nm, by_albedo ? sigma_t : sigma_a, false, false),
-			       .second.color = color_of_table(4, nm, by_albedo ? albedo : sigma_s, false, false),
-			       .by_albedo = by_albedo,
+	return (struct medium){.first.color = color_from_samples(4, nm, by_albedo ? sigma_t : sigma_a, false, false),
+			       .second.color = color_from_samples(4, nm, by_albedo ? albedo : sigma_s, false, false),
+			       .uses_albedo = by_albedo,
 			       .absorbs = true,
 			       .scatters = true,
 			       .per_length = 2,
@@ -116,13 +116,13 @@ static struct world *world_with(const char *version, const char *inner)
 					   "<medium type='homogeneous' name='interior'>%s</medium></shape></scene>",
 		 version, inner);
 	const struct memory_file files[] = {{"test.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 static void check_rgb(const char *version, const char *inner, double red_s, double red_t)
 {
 	struct world *w = world_with(version, inner);
-	const struct wavelengths rgb = {.rgb = true};
+	const struct wavelengths rgb = {.is_rgb = true};
 	double s = medium_scattering(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale,
 	       t = medium_extinction(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale;
 	if (fabs(s - red_s) > 1e-9 || fabs(t - red_t) > 1e-9)
@@ -158,14 +158,14 @@ static void test_descriptions(void **state)
 	check_rgb("3.0.0", "<rgb name='sigma_t' value='4,2,1'/>", 3, 4);
 	check_rgb("3.0.0", "<float name='sigma_s' value='2'/>", 2, 2);
 #define INSIDE(inner) "<shape type='sphere'><medium type='homogeneous' name='interior'>" inner "</medium></shape>"
-	world_refused(INSIDE("<string name='material' value='tea'/>"),
-		      "there is no material 'tea' (supported: apple, chicken1, ");
-	world_refused(INSIDE("<float name='sigma_a' value='2'/><float name='g' value='0.5'/>"),
-		      "g is a parameter of the phase function in 3.x");
-	world_refused(INSIDE("<float name='sigma_a' value='2'/><float name='albedo' value='0.5'/>"),
-		      "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
-	world_refused(INSIDE("<float name='sigma_t' value='2'/><string name='material' value='apple'/>"),
-		      "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
+	world_check_refused(INSIDE("<string name='material' value='tea'/>"),
+			    "there is no material 'tea' (supported: apple, chicken1, ");
+	world_check_refused(INSIDE("<float name='sigma_a' value='2'/><float name='g' value='0.5'/>"),
+			    "g is a parameter of the phase function in 3.x");
+	world_check_refused(INSIDE("<float name='sigma_a' value='2'/><float name='albedo' value='0.5'/>"),
+			    "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
+	world_check_refused(INSIDE("<float name='sigma_t' value='2'/><string name='material' value='apple'/>"),
+			    "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
 }
 
 #define AMBER(attribute)     \
@@ -185,13 +185,13 @@ static void test_numbers(void **state)
 			       i % 3 == 0   ? AMBER("name='interior'")
 			       : i % 3 == 1 ? "<ref name='exterior' id='shared'/>"
 					    : "");
-	struct world *w = world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>%s%s",
-					AMBER("id='shared'"), text);
+	struct world *w = world_from_text(8, 8, SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>%s%s",
+					  AMBER("id='shared'"), text);
 	free(text);
 	assert_int_equal(w->media_count, SHAPES / 3 + 1);
 	for (uint32_t i = 0; i < SHAPES; i++) {
-		assert_int_equal(w->parts[i].exterior, i % 3 == 1 ? 2 : 0);
-		assert_int_equal(w->parts[i].interior, i == 0 ? 1 : i % 3 == 0 ? i / 3 + 2 : 0);
+		assert_int_equal(w->shape_bindings[i].exterior, i % 3 == 1 ? 2 : 0);
+		assert_int_equal(w->shape_bindings[i].interior, i == 0 ? 1 : i % 3 == 0 ? i / 3 + 2 : 0);
 	}
 	world_free(w);
 }

@@ -107,7 +107,7 @@ static void check(const struct phase *p, double mean, unsigned parts)
 static void make_phase(struct phase *p, const struct scene_node *n)
 {
 	static struct arena arena;
-	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
+	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .world_scale = 1};
 	struct error e;
 	if (phase_create(p, n, &build, &e))
 		fail_msg("%s", e.text);
@@ -215,7 +215,7 @@ static void test_parts(void **state)
 	for (int k = 0; k <= 4; k++) {
 		make_phase(&p, &NODE("blendphase", NUMBER("weight", k / 4.0), INSIDE(2, &forwards, &backwards)));
 		check(&p, 0.8 * (1 - k / 4.0) - 0.5 * k / 4.0, 2);
-		assert_true(p.absorbed == 0);
+		assert_true(p.absorbed_share == 0);
 	}
 	const struct scene_node blend = NODE("blendphase", INSIDE(2, &forwards, &table));
 	make_phase(&p, &blend);
@@ -231,7 +231,7 @@ static void test_parts(void **state)
 		make_phase(&p, &NODE("mixturephase", TEXT("weights", mixtures[i].weights),
 				     INSIDE(3, &backwards, &even, &blend)));
 		check(&p, mixtures[i].mean, 4);
-		assert_true(fabs(p.absorbed - mixtures[i].absorbed) < 1e-15);
+		assert_true(fabs(p.absorbed_share - mixtures[i].absorbed) < 1e-15);
 	}
 }
 

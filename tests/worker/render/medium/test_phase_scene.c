@@ -57,7 +57,7 @@ static void test_weight_on_grid(void **state)
 		double x, weight;
 	} places[] = {{-1, 0.25}, {0.1, 0.25}, {0.25, 0.25}, {0.5, 0.5}, {0.6, 0.6}, {0.75, 0.75}, {0.9, 0.75}};
 	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, along_x);
-	struct world *w = world_of_files(8, 8, scene_of(BLEND(ON_GRID)));
+	struct world *w = world_from_files(8, 8, scene_of(BLEND(ON_GRID)));
 	const struct phase *p = &w->media[0].phase;
 	vec3 wo = {0, 0.6, 0.8}, wi = {0, 0, -1}; /* the cosine of the scattering angle is 0.8 */
 	double even = 1 / (4 * M_PI), forwards = even * 0.75 / pow(0.45, 1.5);
@@ -81,7 +81,7 @@ static void test_what_weights_leave(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	struct world *w = world_of_files(8, 8, scene_of(MIXTURE(".2; .5", FORWARDS TABLE)));
+	struct world *w = world_from_files(8, 8, scene_of(MIXTURE(".2; .5", FORWARDS TABLE)));
 	const struct medium *m = &w->media[0];
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(medium_scattering(m, o, along_z, &wl).v[0] * w->scale - 0.7 * 2) < 1e-12);
@@ -96,7 +96,7 @@ static void test_what_weights_leave(void **state)
 static void test_weight_above_one(void **state)
 {
 	(void)state;
-	struct world *w = world_of_files(8, 8, scene_of(BLEND("<float name='weight' value='1.5'/>")));
+	struct world *w = world_from_files(8, 8, scene_of(BLEND("<float name='weight' value='1.5'/>")));
 	const struct phase *p = &w->media[0].phase;
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(p->ops->eval(p, o, 0.4) - 0.75 / (4 * M_PI * pow(0.85, 1.5))) < 1e-12);
@@ -132,12 +132,12 @@ static void test_refused(void **state)
 	};
 	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 3, along_x);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		world_of_files_refused(scene_of(cases[i].phase), cases[i].why);
+		world_check_files_refused(scene_of(cases[i].phase), cases[i].why);
 	char many[2000] = "<phase type='mixturephase'>";
 	for (int i = 0; i < 17; i++)
 		strcat(many, "<phase type='isotropic'/>");
 	strcat(many, "</phase>");
-	world_of_files_refused(scene_of(many), "more than 16 phase functions inside");
+	world_check_files_refused(scene_of(many), "more than 16 phase functions inside");
 }
 
 int main(void)

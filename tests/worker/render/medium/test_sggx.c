@@ -31,7 +31,7 @@ static struct phase made_of(const double s[6])
 {
 	static struct arena arena;
 	static struct phase p;
-	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
+	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .world_scale = 1};
 	char text[200];
 	struct error e;
 	snprintf(text, sizeof text, "%.17g, %.17g, %.17g, %.17g, %.17g, %.17g", s[0], s[1], s[2], s[3], s[4], s[5]);
@@ -137,8 +137,8 @@ static void check_ellipsoid(int k)
 {
 	struct ellipsoid e = one_of(k);
 	struct phase p = made_of(e.s);
-	struct dice d = dice_of("sggx");
-	size_t rays = dice_count(1 << 18);
+	struct dice d = dice_for_test("sggx");
+	size_t rays = dice_scaled_count(1 << 18);
 	d.seed += (uint64_t)k;
 	vec3 wo = dice_direction(&d);
 	struct frame across = frame_around(wo);
@@ -151,7 +151,7 @@ static void check_ellipsoid(int k)
 		bool hit = reflected(&e, wo, offset, &wi);
 		hits += hit;
 		mirrored[hit ? bin_of(wi) : 0] += hit;
-		const double u[] = {dice_throw(&d), dice_throw(&d)};
+		const double u[] = {dice_uniform(&d), dice_uniform(&d)};
 		double pdf;
 		wi = phase_sample(&p, nowhere, wo, u, &pdf);
 		assert_true(fabs(vec3_length(wi) - 1) < 1e-12);
@@ -185,7 +185,7 @@ static void test_ellipsoids(void **state)
 static void test_reciprocity(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("sggx both ways");
+	struct dice d = dice_for_test("sggx both ways");
 	for (int k = 0; k < ELLIPSOIDS; k++) {
 		struct phase p = made_of(one_of(k).s);
 		for (int i = 0; i < 1000; i++) {
@@ -202,7 +202,7 @@ static void test_reciprocity(void **state)
 static void test_isotropic(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("sggx isotropic");
+	struct dice d = dice_for_test("sggx isotropic");
 	for (double c = 1e-6; c < 1e7; c *= 1e3) {
 		struct phase p = made_of((const double[6]){c, c, c, 0, 0, 0});
 		for (int i = 0; i < 100; i++) {
@@ -222,10 +222,10 @@ static void test_limits(void **state)
 		{0, 0, 1, 0, 0, 0}, {1, 1, 0, 0, 0, 0}, {1, 1, 1, 1, 1, 1}, {1e12, 0, 0, 0, 0, 0}};
 	for (size_t k = 0; k < sizeof flat / sizeof *flat; k++) {
 		struct phase p = made_of(flat[k]);
-		struct dice d = dice_of("sggx flat");
+		struct dice d = dice_for_test("sggx flat");
 		for (int i = 0; i < 1000; i++) {
 			vec3 a = dice_direction(&d);
-			const double u[] = {dice_throw(&d), dice_throw(&d)};
+			const double u[] = {dice_uniform(&d), dice_uniform(&d)};
 			double pdf;
 			vec3 b = phase_sample(&p, nowhere, a, u, &pdf);
 			assert_true(isfinite(pdf) && pdf > 0 && fabs(vec3_length(b) - 1) < 1e-12);

@@ -106,8 +106,8 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
 		} else {
 			vec2 h = halfvec_of(y, j), from = explicit_turned(x, y, j);
-			double sigma =
-				EXPLICIT_HALFVEC * 0.5 * (fmin(x->v[j].bsdf->alpha, 1) + fmin(v->bsdf->alpha, 1));
+			double sigma = EXPLICIT_HALFVEC * 0.5 *
+				       (fmin(x->v[j].bsdf->min_alpha, 1) + fmin(v->bsdf->min_alpha, 1));
 			*log_choices += explicit_log_gauss(h.x - from.x, h.y - from.y, sigma);
 			sum -= explicit_log_turn(y, j, 1);
 		}
@@ -121,17 +121,17 @@ static inline double explicit_log_between(const struct path_context *c, const st
 					  const struct full_path *y, unsigned b, unsigned c_end, const vec2 *dh,
 					  double sign)
 {
-	static struct constraint at_x[FULL_PATH_MAX_VERTICES], at_y[FULL_PATH_MAX_VERTICES];
+	static struct constraint at_x[FULL_PATH_VERTICES_MAX], at_y[FULL_PATH_VERTICES_MAX];
 	static struct constraint_system system;
-	static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
+	static struct halfvec_step step[FULL_PATH_VERTICES_MAX];
 	if (b < c_end + 2)
 		return 0;
-	constraints_of(c->w, y, b, c_end, at_y);
+	constraints_compute(c->w, y, b, c_end, at_y);
 	constraint_double.factor(at_y, b, c_end, &system);
 	double sum = system.log_det;
 	if (dh) {
-		constraints_of(c->w, x, b, c_end, at_x);
-		halfvec_steps(c, x, at_x, b, c_end, step);
+		constraints_compute(c->w, x, b, c_end, at_x);
+		halfvec_compute_steps(c, x, at_x, b, c_end, step);
 	}
 	for (unsigned j = c_end + 1; j < b; j++) {
 		if (y->v[j].delta)
@@ -144,10 +144,10 @@ static inline double explicit_log_between(const struct path_context *c, const st
 
 /* Returns the logarithm of the probability of b and c, if the strategy draws them by the heuristic; otherwise 0. */
 static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
-					 const struct mutation_setting *how, const struct full_path *x, unsigned b,
-					 unsigned c_end)
+					 const struct mutation_forced_choice *how, const struct full_path *x,
+					 unsigned b, unsigned c_end)
 {
-	double weight[FULL_PATH_MAX_VERTICES], p = 1;
+	double weight[FULL_PATH_VERTICES_MAX], p = 1;
 	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
 	if (hslt || light) {
 		heuristic_roughness.weigh_b(c, x, weight);
@@ -167,7 +167,7 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 	if (strcmp(strategy, "rejoin") == 0) {
 		/* 1 for each inner vertex that can be connected to the one before it, 0.1 for an emitter that can be
 		 * hit. */
-		double found = c->w->emitters[x->v[0].emitter].delta ? 0 : 0.1, all = found;
+		double found = c->w->emitters[x->v[0].emitter].is_delta ? 0 : 0.1, all = found;
 		for (unsigned i = 1; i < x->edges; i++)
 			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);
 		p = (b == 0 ? found : 1) / all;

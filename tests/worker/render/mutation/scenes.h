@@ -134,11 +134,11 @@ static inline struct world *test_world(const char *name)
 		if (strcmp(s->name, name) != 0)
 			continue;
 		if (!s->mesh)
-			return world_of_text(32, 32, "%s", s->text);
+			return world_from_text(32, 32, "%s", s->text);
 		int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->text);
 		const struct memory_file files[] = {
 			{"test.xml", xml, (size_t)n}, {"ball.obj", obj, ball_obj(obj, sizeof obj)}, {NULL, NULL, 0}};
-		return world_of_files(32, 32, files);
+		return world_from_files(32, 32, files);
 	}
 	return NULL;
 }

@@ -6,7 +6,7 @@
  */
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/rooms.h"
 #include "worker/render/world/build.h"
 
@@ -34,7 +34,7 @@ static bool is_default(const struct world *w, const struct mutation_ops *ops)
 {
 	struct render_summary summary;
 	world_summary(w, &summary);
-	return ops->useful && ops->useful(&summary) > 0;
+	return ops->default_weight && ops->default_weight(&summary) > 0;
 }
 
 static unsigned repeats_of(const struct world *w, const struct mutation_ops *ops)
@@ -51,16 +51,16 @@ static void check_alone(const struct world *w, const struct room *room, const st
 {
 	static struct balance_trial t;
 	struct balance_verdict v = balance_judge(few);
-	double times = pow(v.power / MUST_FIND, 2) * few->repeat / REPEAT_MORE;
+	double times = pow(v.power / MUST_FIND, 2) * few->proposals_per_start / REPEAT_MORE;
 	size_t more = (size_t)fmin(ceil(1.2 * times), MOST_STARTS);
 	do {
-		t = (struct balance_trial){.ops = few->ops, .how = {-1, -1}, .repeat = REPEAT_MORE};
-		balance_run(w, room->name, &t, 1, dice_count(STARTS) * more, 800 * more);
+		t = (struct balance_trial){.ops = few->ops, .setting = {-1, -1}, .proposals_per_start = REPEAT_MORE};
+		balance_run(w, room->name, &t, 1, dice_scaled_count(STARTS) * more, 800 * more);
 		v = balance_judge(&t);
 		more *= 2;
-	} while (more <= MOST_STARTS && v.power > MUST_FIND && v.balanced);
+	} while (more <= MOST_STARTS && v.power > MUST_FIND && v.is_balanced);
 	balance_print(room->name, &t, &v);
-	assert_true(v.balanced && (v.power <= MUST_FIND || dice_count(STARTS) < STARTS));
+	assert_true(v.is_balanced && (v.power <= MUST_FIND || dice_scaled_count(STARTS) < STARTS));
 }
 
 /* Only one room has an aperture: it must find alone what for other strategies all rooms find together. */
@@ -68,36 +68,37 @@ static void pool_rare(const struct world *w, const struct room *room, const stru
 		      struct balance_pool *p)
 {
 	static struct balance_trial t;
-	t = (struct balance_trial){.ops = ops, .how = {-1, -1}, .repeat = REPEAT_RARE};
-	balance_run(w, room->name, &t, 1, dice_count(STARTS_RARE), 4000);
+	t = (struct balance_trial){.ops = ops, .setting = {-1, -1}, .proposals_per_start = REPEAT_RARE};
+	balance_run(w, room->name, &t, 1, dice_scaled_count(STARTS_RARE), 4000);
 	balance_pool_add(p, &t);
 }
 
 /* Each b and c is forced in three rooms; with FULL=1 in all, and in a room selected by ROOM. */
 static bool is_forced_here(const char *room)
 {
-	return test_full() || getenv("ROOM") || strcmp(room, "rough glass") == 0 || strcmp(room, "bent normals") == 0 ||
-	       strcmp(room, "prism") == 0;
+	return test_is_full() || getenv("ROOM") || strcmp(room, "rough glass") == 0 ||
+	       strcmp(room, "bent normals") == 0 || strcmp(room, "prism") == 0;
 }
 
 static size_t all_trials(const struct world *w, const char *room, struct balance_trial *t)
 {
 	size_t n = 0;
 	for (size_t i = 0; mutation_registry[i]; i++)
-		t[n++] = (struct balance_trial){
-			.ops = mutation_registry[i], .how = {-1, -1}, .repeat = repeats_of(w, mutation_registry[i])};
+		t[n++] = (struct balance_trial){.ops = mutation_registry[i],
+						.setting = {-1, -1},
+						.proposals_per_start = repeats_of(w, mutation_registry[i])};
 	if (!is_forced_here(room))
 		return n;
 	const struct mutation_ops *hslt = mutation_find("hslt", 4);
-	t[n++] = (struct balance_trial){.ops = hslt, .how = {0, 0}, .repeat = 1};
-	for (int b = 1; b <= BALANCE_EDGES; b++)
+	t[n++] = (struct balance_trial){.ops = hslt, .setting = {0, 0}, .proposals_per_start = 1};
+	for (int b = 1; b <= BALANCE_EDGES_MAX; b++)
 		for (int c = 0; c < b; c++)
 			for (int side = BALANCE_CAMERA; side <= BALANCE_TRACED; side++)
-				if (side == BALANCE_CAMERA || b < BALANCE_EDGES)
+				if (side == BALANCE_CAMERA || b < BALANCE_EDGES_MAX)
 					t[n++] = (struct balance_trial){.ops = hslt,
-									.how = {b, c},
+									.setting = {b, c},
 									.side = (enum balance_side)side,
-									.repeat = 1};
+									.proposals_per_start = 1};
 	return n;
 }
 
@@ -107,13 +108,13 @@ static void check_room(const struct room *room)
 	struct world *w = room->build();
 	size_t count = all_trials(w, room->name, trials);
 	unsigned faults = 0;
-	balance_run(w, room->name, trials, count, dice_count(STARTS), 800);
+	balance_run(w, room->name, trials, count, dice_scaled_count(STARTS), 800);
 	for (size_t i = 0; i < count; i++) {
-		if (trials[i].expected == 0)
+		if (trials[i].acceptance_sum == 0)
 			continue;
 		struct balance_verdict v = balance_judge(&trials[i]);
 		balance_print(room->name, &trials[i], &v);
-		faults += !v.balanced;
+		faults += !v.is_balanced;
 	}
 	for (size_t i = 0; mutation_registry[i]; i++) {
 		if (is_default(w, mutation_registry[i])) {
@@ -121,7 +122,7 @@ static void check_room(const struct room *room)
 				pool_rare(w, room, mutation_registry[i], &pool[i]);
 			else
 				balance_pool_add(&pool[i], &trials[i]);
-			if (test_full())
+			if (test_is_full())
 				check_alone(w, room, &trials[i]);
 		}
 	}
@@ -144,9 +145,9 @@ static void test_all_rooms(void **state)
 		if (!(v.power < INFINITY))
 			continue;
 		printf("all rooms      %-22s worst t %+6.2f (%s), finds %5.2f %%%s\n", mutation_registry[i]->name, v.t,
-		       v.function, 100 * v.power, v.balanced ? "" : " NOT BALANCED");
-		faults += !v.balanced;
-		weak += !(v.power <= MUST_FIND) && dice_count(STARTS) >= STARTS && !getenv("ROOM");
+		       v.function_name, 100 * v.power, v.is_balanced ? "" : " NOT BALANCED");
+		faults += !v.is_balanced;
+		weak += !(v.power <= MUST_FIND) && dice_scaled_count(STARTS) >= STARTS && !getenv("ROOM");
 	}
 	assert_int_equal(faults, 0);
 	assert_int_equal(weak, 0);
@@ -154,7 +155,7 @@ static void test_all_rooms(void **state)
 
 int main(void)
 {
-	struct CMUnitTest tests[ROOMS_MOST] = {0};
+	struct CMUnitTest tests[ROOMS_MAX] = {0};
 	const char *only = getenv("ROOM");
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)

@@ -20,9 +20,9 @@
 static const struct mutation_ops *real;
 static struct full_path *from; /* x of the current proposal */
 
-static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
-				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				 struct move *move)
+static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				    const struct mutation_forced_choice *how, struct full_path *x, struct full_path *y,
+				    struct move *move)
 {
 	(void)self;
 	from = x;
@@ -38,7 +38,7 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 /* Returns log P(b) P(c | b) by the heuristic. */
 static double log_selection(struct mutation_ctx *m, const struct full_path *x, unsigned b, unsigned c)
 {
-	double weight[FULL_PATH_MAX_VERTICES], p;
+	double weight[FULL_PATH_VERTICES_MAX], p;
 	heuristic_roughness.weigh_b(m->path, x, weight);
 	p = heuristic_probability(weight, x->edges + 1, b);
 	if (b > 0) {
@@ -63,7 +63,7 @@ static double no_selection(struct mutation_ctx *m, struct full_path *into, const
 static double denser_upwards(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction)
 {
-	bool up = direction == X_TO_Y && sin(2 * M_PI * (into->wavelength - from->wavelength)) > 0;
+	bool up = direction == X_TO_Y && sin(2 * M_PI * (into->wavelength_u - from->wavelength_u)) > 0;
 	return log_weight(m, into, move, direction) - (up ? log(1.03) : 0);
 }
 
@@ -71,16 +71,16 @@ static double denser_upwards(struct mutation_ctx *m, struct full_path *into, con
 static double denser_above(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
-	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
+	return log_weight(m, into, move, direction) - (into->wavelength_u > 0.5 ? log(1.1) : 0);
 }
 
-static enum proposal_end propose_with_drift(const struct mutation_ops *self, struct mutation_ctx *m,
-					    const struct mutation_setting *how, struct full_path *x,
-					    struct full_path *y, struct move *move)
+static enum proposal_result propose_with_drift(const struct mutation_ops *self, struct mutation_ctx *m,
+					       const struct mutation_forced_choice *how, struct full_path *x,
+					       struct full_path *y, struct move *move)
 {
 	const double mean = 0.1; /* pixels; the deviation is 0.64 */
 	x->film[0] += mean;
-	enum proposal_end end = propose(self, m, how, x, y, move);
+	enum proposal_result end = propose(self, m, how, x, y, move);
 	x->film[0] -= mean;
 	return end;
 }
@@ -88,7 +88,7 @@ static enum proposal_end propose_with_drift(const struct mutation_ops *self, str
 static void keep_f(struct path_context *c, struct full_path *y, unsigned j)
 {
 	y->f[j] = full_path_f(c, from, j);
-	vertex_set_add(&y->known_f, j);
+	vertex_set_add(&y->cached_f, j);
 }
 
 static double stale_fixed(struct mutation_ctx *m, struct full_path *into, const struct move *move,
@@ -122,11 +122,11 @@ static double no_transfer(struct mutation_ctx *m, struct full_path *into, const 
 }
 
 /* Uses the step sizes of x for the reverse direction from y as well. */
-static enum proposal_end one_sigma(const struct mutation_ops *self, struct mutation_ctx *m,
-				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				   struct move *move)
+static enum proposal_result one_sigma(const struct mutation_ops *self, struct mutation_ctx *m,
+				      const struct mutation_forced_choice *how, struct full_path *x,
+				      struct full_path *y, struct move *move)
 {
-	enum proposal_end end = propose(self, m, how, x, y, move);
+	enum proposal_result end = propose(self, m, how, x, y, move);
 	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
 		vec2 back = vec2_scale(-1, m->scratch.dh[j]);
 		if (!x->v[j].delta)
@@ -137,15 +137,15 @@ static enum proposal_end one_sigma(const struct mutation_ops *self, struct mutat
 }
 
 /* Proposes y even if the walk back was refused; only with forced b and c, whose choice has no density. */
-static enum proposal_end no_way_back(const struct mutation_ops *self, struct mutation_ctx *m,
-				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				     struct move *move)
+static enum proposal_result no_way_back(const struct mutation_ops *self, struct mutation_ctx *m,
+					const struct mutation_forced_choice *how, struct full_path *x,
+					struct full_path *y, struct move *move)
 {
-	enum proposal_end end = propose(self, m, how, x, y, move);
+	enum proposal_result end = propose(self, m, how, x, y, move);
 	if (end != PROPOSAL_REVERSE)
 		return end;
 	unsigned ends[2] = {move->b, move->c};
-	full_path_forget(y, move->c + 1, y->edges);
+	full_path_invalidate(y, move->c + 1, y->edges);
 	for (int i = 0; i < 2; i++) {
 		if (ends[i] == 0 || ends[i] == y->edges)
 			continue;
@@ -163,19 +163,19 @@ static double flat_emitter(struct mutation_ctx *m, struct full_path *into, const
 	const struct path_vertex *v = &into->v[0];
 	const struct emitter *em = &m->path->w->emitters[v->emitter];
 	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
+	p.is_infinite = v->kind == VERTEX_INFINITE;
 	bool moves = move->b > 0 && move->c == 0 && em->ops->point_inverse;
 	return log_weight(m, into, move, direction) + (moves ? log(em->ops->pdf_point(em, &p)) : 0);
 }
 
 struct fault {
 	const char *name, *room, *strategy;
-	struct mutation_setting how;
+	struct mutation_forced_choice how;
 	enum balance_side side;
 	unsigned starts, repeat;
-	enum proposal_end (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
-				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				     struct move *move);
+	enum proposal_result (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
+					const struct mutation_forced_choice *how, struct full_path *x,
+					struct full_path *y, struct move *move);
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };
@@ -200,21 +200,22 @@ static void check_fault(void **state)
 	static struct balance_trial t[2];
 	struct mutation_ops broken = {.name = f->name, .propose = f->propose, .log_weight = f->log_weight};
 	real = mutation_find(f->strategy, strlen(f->strategy));
-	t[0] = (struct balance_trial){.ops = real, .how = f->how, .side = f->side, .repeat = f->repeat};
+	t[0] = (struct balance_trial){
+		.ops = real, .setting = f->how, .side = f->side, .proposals_per_start = f->repeat};
 	t[1] = t[0];
 	t[1].ops = &broken;
-	t[1].broken = true;
-	struct world *w = room_of(f->room);
-	balance_run(w, f->name, t, 2, dice_count(f->starts), 1000);
+	t[1].is_broken = true;
+	struct world *w = room_build_named(f->room);
+	balance_run(w, f->name, t, 2, dice_scaled_count(f->starts), 1000);
 	world_free(w);
 	struct balance_verdict v[2];
 	for (int i = 0; i < 2; i++) {
 		v[i] = balance_judge(&t[i]);
 		balance_print(f->room, &t[i], &v[i]);
 	}
-	assert_true(v[0].balanced);
-	if (dice_count(16) >= 16)
-		assert_false(v[1].balanced);
+	assert_true(v[0].is_balanced);
+	if (dice_scaled_count(16) >= 16)
+		assert_false(v[1].is_balanced);
 }
 
 int main(void)

@@ -28,7 +28,7 @@ enum { EDGES = 8, TRIALS = 48 };
 
 struct trial {
 	const struct mutation_ops *ops;
-	struct mutation_setting how;
+	struct mutation_forced_choice how;
 	unsigned long compared, beyond;
 	double worst, worst_choice;
 };
@@ -70,8 +70,8 @@ static void compare(struct trial *t, struct full_path *x, struct full_path *y)
 {
 	struct move move = {0};
 	m.step++;
-	m.count = strategy_counters;
-	enum proposal_end end = t->ops->propose(t->ops, &m, &t->how, x, y, &move);
+	m.counters = strategy_counters;
+	enum proposal_result end = t->ops->propose(t->ops, &m, &t->how, x, y, &move);
 	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, X_TO_Y);
 	if (to_y > -INFINITY) {
 		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;
@@ -104,14 +104,14 @@ static void test_ratio(void **state)
 	static struct full_path x, y;
 	struct world *w = room->build();
 	struct starts s;
-	size_t count = all_trials(trials), n = dice_count(400), bad = 0;
-	starts_context(&c, w, 1, EDGES, counters);
+	size_t count = all_trials(trials), n = dice_scaled_count(400), bad = 0;
+	starts_init_context(&c, w, 1, EDGES, counters);
 	m = (struct mutation_ctx){
 		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&s, &c, m.seed, 0, 2000);
 	for (unsigned k = 1; k <= EDGES; k++)
 		for (size_t i = 0; i < n; i++) {
-			if (!starts_path(&s, k, ((double)i + 0.5) / (double)n, &x))
+			if (!starts_make_path(&s, k, ((double)i + 0.5) / (double)n, &x))
 				continue;
 			full_path_copy(&y, &x, 0, k);
 			for (size_t j = 0; j < count; j++)
@@ -130,7 +130,7 @@ static void test_ratio(void **state)
 /* Light passes between equal indices, through a narrow lobe and a wide one. */
 static struct world *thin_sheet(void)
 {
-	return world_of_text(
+	return world_from_text(
 		32, 32, "%s",
 		VIEW WALLS LAMP BALL(
 			"0,-0.6,-0.3", "0.8",
@@ -141,7 +141,7 @@ static struct world *thin_sheet(void)
 int main(void)
 {
 	static const struct room sheet = {"thin sheet", thin_sheet};
-	struct CMUnitTest tests[ROOMS_MOST] = {0};
+	struct CMUnitTest tests[ROOMS_MAX] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		tests[n++] = (struct CMUnitTest){r->name, test_ratio, NULL, NULL, (void *)(uintptr_t)r};

@@ -32,7 +32,7 @@ static struct full_path x, y;
 
 static void begin(const struct world *w)
 {
-	starts_context(&c, w, 1, STARTS_MAX_EDGES, counters);
+	starts_init_context(&c, w, 1, STARTS_EDGES_MAX, counters);
 	c.max_depth = EDGES;
 }
 
@@ -47,8 +47,8 @@ static bool choose_candidate(unsigned k)
 {
 	double before = 0;
 	for (unsigned j = 0; j < k; j++)
-		before += drawn.of[j].intensity;
-	return ensemble_choose(&c, &drawn, (before + 0.5 * drawn.of[k].intensity) / drawn.total, &x);
+		before += drawn.candidates[j].intensity;
+	return ensemble_choose(&c, &drawn, (before + 0.5 * drawn.candidates[k].intensity) / drawn.total, &x);
 }
 
 static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, struct ensemble *out)
@@ -63,11 +63,11 @@ static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, st
 static bool has_candidate(const struct ensemble *e, unsigned edges, double intensity, bool whole)
 {
 	for (unsigned i = 0; i < e->count; i++) {
-		const struct candidate *a = &e->of[i];
-		if (!whole && a->s == 1 && a->passed == 0 && path_is_refracted(&x.v[1]))
+		const struct candidate *a = &e->candidates[i];
+		if (!whole && a->s == 1 && a->passed_count == 0 && path_vertex_is_refracting(&x.v[1]))
 			continue;
-		double want =
-			whole ? intensity : intensity / (chance_of(edges + 1 - a->s - a->passed) * chance_of(a->s));
+		double want = whole ? intensity
+				    : intensity / (chance_of(edges + 1 - a->s - a->passed_count) * chance_of(a->s));
 		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
 			return true;
 	}
@@ -80,9 +80,9 @@ static unsigned check_candidates(const char *name)
 {
 	unsigned checked = 0;
 	double before = 0;
-	for (unsigned k = 0; k < around.count; before += around.of[k++].intensity) {
-		const struct candidate *a = &around.of[k];
-		double log_pdf[FULL_PATH_MAX_VERTICES];
+	for (unsigned k = 0; k < around.count; before += around.candidates[k++].intensity) {
+		const struct candidate *a = &around.candidates[k];
+		double log_pdf[FULL_PATH_VERTICES_MAX];
 		/* The path's own point on the emitter differs from the one that the random numbers draw. */
 		bool own = a->s == 1 && a->edges == x.edges;
 		if (own || a->intensity < 1e-6 * around.total ||
@@ -90,8 +90,8 @@ static unsigned check_candidates(const char *name)
 			continue;
 		for (unsigned i = 0; i <= y.edges; i++)
 			assert_true(y.v[i].x.prim.time == full_path_time(&x));
-		full_path_log_techniques(&c, &y, log_pdf);
-		double chances = chance_of(y.edges + 1 - a->s - a->passed) * chance_of(a->s),
+		full_path_log_technique_pdfs(&c, &y, log_pdf);
+		double chances = chance_of(y.edges + 1 - a->s - a->passed_count) * chance_of(a->s),
 		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
 		if (!(fabs(a->intensity / want - 1) < 1e-6))
 			fail_msg("%s: %u edges by technique %u: %.9g, not %.9g", name, y.edges, a->s, a->intensity,
@@ -105,17 +105,17 @@ static unsigned check_candidates(const char *name)
  * probability of the lengths. */
 static void check_own_candidate(const char *name)
 {
-	struct world *w = room_of(name);
+	struct world *w = room_build_named(name);
 	uint64_t seed = stats_seed(name);
 	unsigned checked = 0, longest = 0, others = 0;
 	begin(w);
-	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	const struct ensemble_lengths all = ensemble_max_lengths(&c);
 	for (uint64_t i = 0; i < TRIALS; i++) {
 		draw(seed, i, &all, &drawn);
 		if (drawn.count == 0)
 			continue;
 		unsigned k = (unsigned)(i % drawn.count);
-		const struct candidate own = drawn.of[k];
+		const struct candidate own = drawn.candidates[k];
 		const double u[3] = {(double)i / TRIALS, 0.5, 0.5};
 		struct sampler_random s;
 		/* Far out in the tail of a lobe, its two evaluations share no digits. */
@@ -123,7 +123,7 @@ static void check_own_candidate(const char *name)
 			continue;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
 		c.time = (double)i / TRIALS; /* any time, as left by the previous draw */
-		ensemble_around(&c, &s.base, &x, u, &around);
+		ensemble_draw_containing(&c, &s.base, &x, u, &around);
 		if (!has_candidate(&around, own.edges, own.intensity, false))
 			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
 				 (unsigned long long)i, own.edges, own.s, own.intensity);
@@ -154,20 +154,20 @@ static void test_own_candidate(void **state)
 static void test_drawn_lengths(void **state)
 {
 	(void)state;
-	struct world *w = room_of("gold");
+	struct world *w = room_build_named("gold");
 	uint64_t seed = stats_seed("drawn lengths");
 	unsigned checked = 0;
 	begin(w);
-	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	const struct ensemble_lengths all = ensemble_max_lengths(&c);
 	for (uint64_t i = 0; i < TRIALS; i++) {
 		const double u[2] = {(double)i / TRIALS, (double)(i * 7 % TRIALS) / TRIALS};
-		const struct ensemble_lengths some = ensemble_lengths_of(&c, u, 1, 1);
+		const struct ensemble_lengths some = ensemble_draw_lengths(&c, u, 1, 1);
 		draw(seed, i, &some, &capped);
 		draw(seed, i, &all, &drawn);
 		for (unsigned k = 0; k < capped.count; k++) {
-			const struct candidate *a = &capped.of[k];
+			const struct candidate *a = &capped.candidates[k];
 			unsigned t = a->edges + 1 - a->s;
-			assert_true(t <= some.camera && a->s <= some.light);
+			assert_true(t <= some.max_camera && a->s <= some.max_light);
 			assert_true(
 				has_candidate(&drawn, a->edges, a->intensity * chance_of(t) * chance_of(a->s), true));
 			checked += chance_of(t) * chance_of(a->s) < 1;
@@ -188,11 +188,12 @@ static void test_chance_of_lengths(void **state)
 		memset(count, 0, sizeof count);
 		for (int i = 0; i < N; i++) {
 			const double u[2] = {(i + 0.5) / N, 1 - (i + 0.5) / N};
-			struct ensemble_lengths n = ensemble_lengths_of(&c, u, least, least);
-			assert_true(n.camera >= sure && n.camera <= EDGES + 1 && n.light >= sure && n.light <= EDGES);
-			for (unsigned k = 0; k <= n.camera; k++)
+			struct ensemble_lengths n = ensemble_draw_lengths(&c, u, least, least);
+			assert_true(n.max_camera >= sure && n.max_camera <= EDGES + 1 && n.max_light >= sure &&
+				    n.max_light <= EDGES);
+			for (unsigned k = 0; k <= n.max_camera; k++)
 				count[0][k]++;
-			for (unsigned k = 0; k <= n.light; k++)
+			for (unsigned k = 0; k <= n.max_light; k++)
 				count[1][k]++;
 		}
 		for (unsigned side = 0; side < 2; side++)
@@ -207,18 +208,18 @@ static void test_chance_of_lengths(void **state)
 static void test_streams_of_a_proposal(void **state)
 {
 	(void)state;
-	struct world *w = room_of("gold");
+	struct world *w = room_build_named("gold");
 	const struct mutation_ops *ops = mutation_find("bidirectional", strlen("bidirectional"));
 	static struct mutation_ctx m;
 	static uint64_t count[STRATEGY_COUNTERS];
 	uint64_t seed = stats_seed("streams");
 	unsigned proposed = 0, same = 0;
 	begin(w);
-	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	const struct ensemble_lengths all = ensemble_max_lengths(&c);
 	m = (struct mutation_ctx){.path = &c,
 				  .seed = seed,
 				  .chain = 5,
-				  .count = count,
+				  .counters = count,
 				  .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; i < TRIALS / 4; i++) {
 		draw(seed, i, &all, &drawn);
@@ -226,21 +227,21 @@ static void test_streams_of_a_proposal(void **state)
 			continue;
 		struct move move = {0};
 		m.step = i;
-		if (ops->propose(ops, &m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
+		if (ops->propose(ops, &m, &(struct mutation_forced_choice){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
 			continue;
 		double total[2], v[4], r[4];
-		const enum rng_stream stream[2] = {RNG_AROUND, RNG_CHAIN};
+		const enum rng_stream stream[2] = {RNG_BIDIRECTIONAL_MUTATION, RNG_CHAIN};
 		struct sampler_random s;
 		mutation_random(&m, BLOCK_VERTEX + 1, v);
 		for (int k = 0; k < 2; k++) {
 			sampler_random_init(&s, seed, stream[k], m.chain, m.step);
-			ensemble_around(&c, &s.base, &x, v, &around);
+			ensemble_draw_containing(&c, &s.base, &x, v, &around);
 			total[k] = around.total;
 		}
 		assert_true(move.log_density[Y_TO_X] == -log(total[0]));
 		same += total[0] == total[1];
 		mutation_random(&m, BLOCK_VERTEX, r);
-		const struct ensemble_lengths n = ensemble_lengths_of(&c, r, 1, 1);
+		const struct ensemble_lengths n = ensemble_draw_lengths(&c, r, 1, 1);
 		sampler_random_init(&s, seed, RNG_CHAIN, m.chain, m.step);
 		ensemble_draw(&c, &s.base, &n, &drawn);
 		assert_true(move.log_density[X_TO_Y] == -log(drawn.total));
@@ -256,7 +257,7 @@ static void test_streams_of_a_proposal(void **state)
 static void test_bootstrap_is_of_candidates(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		SENSOR("0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>"
 					 "<shape type='sphere'><point name='center' x='1.2' y='0' z='1'/>"
@@ -265,7 +266,7 @@ static void test_bootstrap_is_of_candidates(void **state)
 	const uint64_t seed = stats_seed("bootstrap of candidates");
 	unsigned lit = 0;
 	begin(w);
-	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	const struct ensemble_lengths all = ensemble_max_lengths(&c);
 	for (uint64_t i = 0; i < TRIALS; i++) {
 		static struct path_sample sample;
 		struct sampler_random s;
@@ -286,14 +287,14 @@ static void test_bootstrap_is_of_candidates(void **state)
 static void test_aperture_is_left(void **state)
 {
 	(void)state;
-	struct world *w = room_of("lens");
+	struct world *w = room_build_named("lens");
 	static struct mutation_ctx m;
 	const double rim[2] = {0.999999, 0.5};
 	unsigned refused = 0;
 	begin(w);
 	m = (struct mutation_ctx){.path = &c, .seed = stats_seed("aperture"), .chain = 1};
 	x.edges = y.edges = 2;
-	x.v[2].x.p = camera_point(&w->camera, rim);
+	x.v[2].x.p = camera_sample_point(&w->camera, rim);
 	for (m.step = 0; m.step < 1000; m.step++) {
 		double u[2];
 		if (!trace_move_aperture(&m, &x, &y)) {

@@ -8,7 +8,7 @@
  * in each room.
  */
 #include "tests/support/dice.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
@@ -34,12 +34,12 @@ static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, siz
 {
 	static struct full_path x, y;
 	static uint64_t count[STRATEGY_COUNTERS];
-	m->count = count;
+	m->counters = count;
 	for (size_t i = 0; i < n; i++) {
 		struct move move = {0};
 		x.edges = 0;
 		m->step++;
-		if (ops->propose(ops, m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
+		if (ops->propose(ops, m, &(struct mutation_forced_choice){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
 			mean[y.edges] += exp(ops->log_weight(m, &y, &move, X_TO_Y)) / (double)n;
 	}
 }
@@ -53,7 +53,7 @@ static size_t rooms_pooled;
 /* Factor by which the samples grow so that a room alone finds 2 %. */
 static size_t more_paths(void)
 {
-	return test_full() ? 8 : 1;
+	return test_is_full() ? 8 : 1;
 }
 
 /* Compares each number of edges, and all together; returns the number of faults. */
@@ -85,7 +85,7 @@ static unsigned compare(const char *room, const char *strategy, double a[GROUPS]
 		pool.certainty += 1 / (error * error);
 		pool.weighted += s.mean / sum / (error * error);
 		rooms_pooled++;
-		faults += more_paths() > 1 && dice_count(1000) > 1000 && !(FINDS * error <= 0.02);
+		faults += more_paths() > 1 && dice_scaled_count(1000) > 1000 && !(FINDS * error <= 0.02);
 	}
 	return faults;
 }
@@ -98,7 +98,7 @@ static void test_all_rooms(void **state)
 	       100 * error, 100 * FINDS * error);
 	assert_true(rooms_pooled >= 10);
 	assert_true(stats_student_t_p(t, GROUPS - 1) >= LEVEL);
-	assert_true(FINDS * error <= 0.02 || dice_count(1000) < 1000);
+	assert_true(FINDS * error <= 0.02 || dice_scaled_count(1000) < 1000);
 }
 
 static void test_integral(void **state)
@@ -109,16 +109,16 @@ static void test_integral(void **state)
 	static uint64_t counters[BATCH_COUNTERS];
 	static double want[GROUPS][EDGES + 1];
 	struct world *w = room->build();
-	size_t n = dice_count(1000) * more_paths();
+	size_t n = dice_scaled_count(1000) * more_paths();
 	unsigned faults = 0;
-	starts_context(&c, w, 1, EDGES, counters);
+	starts_init_context(&c, w, 1, EDGES, counters);
 	m = (struct mutation_ctx){
 		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	for (unsigned g = 0; g < GROUPS; g++) {
 		struct starts s;
 		starts_init(&s, &c, m.seed, g, n);
 		for (unsigned k = 1; k <= EDGES; k++)
-			want[g][k] = starts_weight(&s, k);
+			want[g][k] = starts_contribution(&s, k);
 		starts_fini(&s);
 	}
 	for (size_t i = 0; mutation_registry[i]; i++) {
@@ -134,7 +134,7 @@ static void test_integral(void **state)
 
 int main(void)
 {
-	struct CMUnitTest tests[ROOMS_MOST] = {0};
+	struct CMUnitTest tests[ROOMS_MAX] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		tests[n++] = (struct CMUnitTest){r->name, test_integral, NULL, NULL, (void *)(uintptr_t)r};

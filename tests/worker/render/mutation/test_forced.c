@@ -15,7 +15,7 @@
  * About 70 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
  * SCENE="rough glass" runs one scene alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
  */
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stationary.h"
 #include "tests/worker/render/mutation/scenes.h"
 #include "worker/render/render.h"
@@ -59,22 +59,23 @@ static const struct scene_cases shorter[] = {
 };
 enum { SCENES = sizeof shorter / sizeof *shorter };
 
-static void print(const char *scene, const struct stationary_how *how, const struct stationary_result *r,
+static void print(const char *scene, const struct stationary_options *how, const struct stationary_result *r,
 		  const char *verdict)
 {
 	char worst[96] = "nothing differs";
-	if (r->worst >= 0)
-		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function(r->worst),
-			 100 * r->bias[r->worst], 100 * r->error[r->worst]);
+	if (r->worst_function >= 0)
+		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function_name(r->worst_function),
+			 100 * r->bias[r->worst_function], 100 * r->error[r->worst_function]);
 	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, "
 	       "%.1f %% of vertices; %s (p %.1g); %s\n",
-	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->share,
-	       100 * r->least_block, 100 * r->least_colour, 100 * r->least_other, worst, r->p, verdict);
+	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals,
+	       100 * r->accepted_share, 100 * r->detectable_block_bias, 100 * r->detectable_colour_bias,
+	       100 * r->detectable_other_bias, worst, r->p, verdict);
 	if (!getenv("HSLT_TEST_ROWS"))
 		return;
 	for (int i = 0; i < STRATEGY_COUNTERS; i++)
 		printf(" %.3f", (double)r->strategy[i] / (double)r->proposals);
-	printf(" %.2f s %s\n", r->seconds, r->failure);
+	printf(" %.2f s %s\n", r->cpu_seconds, r->failure);
 }
 
 struct tally {
@@ -92,32 +93,33 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 	/* Independent proposals lie anywhere on the film, so far less of the noise cancels. */
 	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
 	bool fresh = ops && ops->independent, weak;
-	uint32_t enough = edges == 2 ? 2 : 1, more = fresh && test_full() && edges == 3 ? 16 : enough;
-	struct stationary_how how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_SOUND};
+	uint32_t enough = edges == 2 ? 2 : 1, more = fresh && test_is_full() && edges == 3 ? 16 : enough;
+	struct stationary_options how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_NO_FAULT};
 	if (more == enough)
-		stationary_run_from(w, scene, &how, from, &r);
+		stationary_run_with_starts(w, scene, &how, from, &r);
 	else
 		stationary_run(w, scene, &how, &r);
-	for (; (weak = !test_scaled() && r.least_block > 0.02 && !fresh) && test_full() && more < 16; more *= 2) {
+	for (; (weak = !test_is_scaled() && r.detectable_block_bias > 0.02 && !fresh) && test_is_full() && more < 16;
+	     more *= 2) {
 		how.starts *= 2;
 		how.bootstrap *= 2;
 		stationary_run(w, scene, &how, &r);
 	}
 	/* A mutation cannot move what a scene lacks, so only mutations listed for the scene must move. */
-	bool idle = chosen && !test_scaled() && r.share < 0.1;
-	const char *verdict = !stationary_holds(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
+	bool idle = chosen && !test_is_scaled() && r.accepted_share < 0.1;
+	const char *verdict = !stationary_passes(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
 	print(scene, &how, &r, verdict);
 	t->cases++;
 	t->failed += strcmp(verdict, "ok") != 0;
-	t->worst_block = fmax(t->worst_block, fresh ? 0 : r.least_block);
-	t->seconds += r.seconds;
+	t->worst_block = fmax(t->worst_block, fresh ? 0 : r.detectable_block_bias);
+	t->seconds += r.cpu_seconds;
 	t->mutations += r.proposals;
 }
 
 static void check_all(const struct world *w, const char *scene, unsigned k, struct tally *t)
 {
 	char text[32];
-	struct stationary_starts from = {.index = NULL};
+	struct stationary_starts from = {.indices = NULL};
 	check(w, scene, k, "hslt@b0", false, &from, t);
 	for (unsigned b = 1; b <= k; b++)
 		for (unsigned c = 0; c < b; c++) {
@@ -128,17 +130,17 @@ static void check_all(const struct world *w, const char *scene, unsigned k, stru
 		}
 	for (size_t i = 0; mutation_registry[i]; i++)
 		check(w, scene, k, mutation_registry[i]->name, false, &from, t);
-	stationary_forget(&from);
+	stationary_starts_fini(&from);
 }
 
 static void check_list(const struct world *w, const char *scene, const struct forced *f, struct tally *t)
 {
 	char list[256], *rest = list, *one;
-	struct stationary_starts from = {.index = NULL};
+	struct stationary_starts from = {.indices = NULL};
 	snprintf(list, sizeof list, "%s", f->mutations);
 	while ((one = strtok_r(rest, " ", &rest)))
 		check(w, scene, f->edges, one, true, &from, t);
-	stationary_forget(&from);
+	stationary_starts_fini(&from);
 }
 
 static void test_scene(void **state)
@@ -150,8 +152,8 @@ static void test_scene(void **state)
 	struct world *w = test_world(s->scene);
 	struct tally t = {0};
 	assert_non_null(w);
-	stationary_keep_long_starts(w);
-	if (test_full()) {
+	stationary_disable_roulette(w);
+	if (test_is_full()) {
 		for (unsigned k = 2; k <= 6; k += k < 4 ? 1 : 2)
 			check_all(w, s->scene, k, &t);
 		if (strcmp(s->scene, "rough glass") == 0 || strcmp(s->scene, "specular chain") == 0)
@@ -184,15 +186,16 @@ static void test_planted(void **state)
 	};
 	static struct stationary_result r;
 	struct world *w = test_world("rough glass");
-	struct stationary_starts from = {.index = NULL};
-	stationary_keep_long_starts(w);
+	struct stationary_starts from = {.indices = NULL};
+	stationary_disable_roulette(w);
 	for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
-		struct stationary_how how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
-		stationary_run_from(w, "planted", &how, &from, &r);
-		printf("%s, %s: p %.1g by the %s\n", planted[i].what, how.mutation, r.p, stationary_function(r.worst));
-		assert_true(test_scaled() || !stationary_holds(&r));
+		struct stationary_options how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
+		stationary_run_with_starts(w, "planted", &how, &from, &r);
+		printf("%s, %s: p %.1g by the %s\n", planted[i].what, how.mutation, r.p,
+		       stationary_function_name(r.worst_function));
+		assert_true(test_is_scaled() || !stationary_passes(&r));
 	}
-	stationary_forget(&from);
+	stationary_starts_fini(&from);
 	world_free(w);
 }
 

@@ -32,7 +32,7 @@ enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 
 
 struct example {
 	const char *room, *strategy;
-	struct mutation_setting how;
+	struct mutation_forced_choice how;
 	unsigned edges, b, c; /* the case that is tested, if b and c are drawn */
 };
 
@@ -68,7 +68,7 @@ struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
 	struct full_path *x, *y;
-	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* moving vertices; ends: of these, path ends */
+	unsigned vertex[FULL_PATH_VERTICES_MAX], count, ends; /* moving vertices; ends: of these, path ends */
 	double mean[MOST], factor[MOST][MOST];		      /* factor: Cholesky's, of the covariance */
 	unsigned long failures;
 };
@@ -101,7 +101,7 @@ static void on_aperture(const struct sampling *s, double *z, double *log_plane)
 	z[0] = d.x;
 	z[1] = d.y;
 	/* The density counts the aperture's area as 1. */
-	*log_plane += log(M_PI * camera->aperture * camera->aperture);
+	*log_plane += log(M_PI * camera->aperture_radius * camera->aperture_radius);
 }
 
 /* Stores positions in the tangent planes of x, and the logarithm of the area in these planes per area of the
@@ -132,11 +132,11 @@ static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 static enum outcome propose(struct sampling *s, double *z, double *log_density)
 {
 	const struct example *e = s->example;
-	struct move move = {.b = FULL_PATH_MAX_VERTICES};
+	struct move move = {.b = FULL_PATH_VERTICES_MAX};
 	double log_plane, unused;
 	m.step++;
-	m.count = strategy_counters;
-	enum proposal_end end = s->ops->propose(s->ops, &m, &e->how, s->x, s->y, &move);
+	m.counters = strategy_counters;
+	enum proposal_result end = s->ops->propose(s->ops, &m, &e->how, s->x, s->y, &move);
 	enum outcome out = move.b != e->b || move.c != e->c ? OTHER : end ? FAILED : ELSEWHERE;
 	if (out == ELSEWHERE && coordinates(s, z, &log_plane)) {
 		out = ARRIVED;
@@ -258,7 +258,7 @@ static int bin_of(const struct sampling *s, const double *z, double radius)
 static void sample(struct sampling *s, const char *name)
 {
 	unsigned d = 2 * s->count;
-	size_t n = dice_count(120000), failures = 0, bins = d < BITS ? 1u << d : BINS;
+	size_t n = dice_scaled_count(120000), failures = 0, bins = d < BITS ? 1u << d : BINS;
 	double radius = radius_of(s), volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
 	for (unsigned a = 0; a < d; a++)
 		volume *= s->factor[a][a];
@@ -302,9 +302,9 @@ static void test_example(void **state)
 	static struct sampling s;
 	char name[64];
 	snprintf(name, sizeof name, "%s, %s, k = %u, b = %u, c = %u", e->room, e->strategy, e->edges, e->b, e->c);
-	struct world *w = room_of(e->room);
+	struct world *w = room_build_named(e->room);
 	struct starts starts;
-	starts_context(&c, w, 1, e->edges, counters);
+	starts_init_context(&c, w, 1, e->edges, counters);
 	m = (struct mutation_ctx){
 		.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&starts, &c, m.seed, 0, 12000);
@@ -313,7 +313,7 @@ static void test_example(void **state)
 	assert_true(s.count >= 1 && 2 * s.count <= MOST);
 	bool found = false;
 	for (unsigned i = 0; i < STARTS && !found; i++) {
-		if (!starts_path(&starts, e->edges, ((i * 377) % STARTS + 0.5) / STARTS, &x) || !all_smooth(&x))
+		if (!starts_make_path(&starts, e->edges, ((i * 377) % STARTS + 0.5) / STARTS, &x) || !all_smooth(&x))
 			continue;
 		full_path_copy(&y, &x, 0, e->edges);
 		found = run_pilot(&s);

@@ -42,11 +42,11 @@ static unsigned block_of(const double film[2])
 
 static double propose(const struct mutation_ops *ops, double scale, struct full_path *into)
 {
-	const struct mutation_setting how = {-1, -1};
+	const struct mutation_forced_choice how = {-1, -1};
 	struct move move = {0};
 	full_path_copy(into, &x, 0, x.edges);
 	mutation.limits = walk_limits_of(&accuracy_settings_default);
-	mutation.limits.scale = scale;
+	mutation.limits.tolerance_scale = scale;
 	if (ops->propose(ops, &mutation, &how, &x, into, &move))
 		return 0;
 	double to_y = ops->log_weight(&mutation, into, &move, X_TO_Y);
@@ -81,12 +81,12 @@ static void run_group(const struct room *room, int group, struct tally t[STRATEG
 	char test[64];
 	snprintf(test, sizeof test, "tolerance %s", room->name);
 	uint64_t seed = stats_seed(test);
-	starts_init(&s, &context, seed, (uint64_t)group, dice_count(PAIRS));
+	starts_init(&s, &context, seed, (uint64_t)group, dice_scaled_count(PAIRS));
 	for (unsigned k = 2; k <= EDGES; k++)
-		for (uint64_t i = 0; i < dice_count(STARTS) / EDGES; i++) {
+		for (uint64_t i = 0; i < dice_scaled_count(STARTS) / EDGES; i++) {
 			double r[4];
 			rng_uniform4(seed + 1, RNG_TEST, i, k, (uint64_t)group, r);
-			if (!starts_path(&s, k, r[0], &x))
+			if (!starts_make_path(&s, k, r[0], &x))
 				continue;
 			mutation.seed = seed;
 			mutation.chain = (uint64_t)group;
@@ -124,7 +124,7 @@ static void judge_bias(const struct room *room, const char *name, const struct t
 	bool fog = strcmp(room->name, "fog") == 0 || strcmp(room->name, "misfit") == 0;
 	unsigned rare = fog ? 50 : 5;
 	assert_true(t->both * rare > t->proposals && t->farthest < 0.02);
-	assert_true(dice_count(STARTS) < STARTS || 9.4 * error < 0.004);
+	assert_true(dice_scaled_count(STARTS) < STARTS || 9.4 * error < 0.004);
 }
 
 static void check(const struct room *room)
@@ -133,9 +133,9 @@ static void check(const struct room *room)
 	static uint64_t counters[BATCH_COUNTERS], counts[STRATEGY_COUNTERS];
 	struct world *w = room->build();
 	memset(t, 0, sizeof t);
-	starts_context(&context, w, 2, EDGES, counters);
+	starts_init_context(&context, w, 2, EDGES, counters);
 	mutation.path = &context;
-	mutation.count = counts;
+	mutation.counters = counts;
 	for (int g = 0; g < GROUPS; g++)
 		run_group(room, g, t);
 	world_free(w);

@@ -8,8 +8,8 @@
  * Level: five standard errors of 32 groups (t), which is 2e-5 for each of 19 comparisons. Power: standard errors are
  * below 0.5 %.
  */
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/base/options.h"
@@ -37,19 +37,19 @@ enum { SIDE = 16, GROUPS = 32 };
 static void check(const char *name, const struct world *w, double expected, const char *const *integrators,
 		  uint64_t spp)
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	double whole = expected * (w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2]), mean[GROUPS];
 	assert_false(w->effects.colour);
 	for (size_t i = 0; integrators[i]; i++) {
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
-		struct agree_side side = {integrators[i], spp, GROUPS, 0, 0};
-		agree_render(w, test, integrators[i], &side, &image);
+		struct agreement_options side = {integrators[i], spp, GROUPS, 0, 0};
+		agreement_render(w, test, integrators[i], &side, &image);
 		for (int g = 0; g < GROUPS; g++)
-			mean[g] = image.mean[g][AGREE_CELLS] / whole;
+			mean[g] = image.mean[g][AGREEMENT_CELLS] / whole;
 		struct stats_mean m = stats_mean_test(mean, GROUPS, 1);
 		print_message("%s: %.6f +- %.6f\n", test, m.mean, m.error);
-		if (!(fabs(m.mean - 1) < 5 * m.error + 1e-5) || (!test_scaled() && !(m.error < 0.005)))
+		if (!(fabs(m.mean - 1) < 5 * m.error + 1e-5) || (!test_is_scaled() && !(m.error < 0.005)))
 			fail_msg("%s: %g +- %g of what is known", test, m.mean, m.error);
 	}
 }
@@ -70,12 +70,12 @@ static double film_mean(const struct world *w, double intensity, vec3 place)
 static void test_spot(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(SIDE, SIDE,
-					DEPTH("2") SENSOR("0.5,0.3,3", "0,0,0") BEAM("-1,2,4", "0.2,0.1,0")
-						PLATE("<scale value='2'/>", GREY("0.6")));
+	struct world *w = world_from_text(SIDE, SIDE,
+					  DEPTH("2") SENSOR("0.5,0.3,3", "0,0,0") BEAM("-1,2,4", "0.2,0.1,0")
+						  PLATE("<scale value='2'/>", GREY("0.6")));
 	vec3 to = vec3_normalize((vec3){0.5 - 0.2, 0.3 - 0.1, 3});
 	double expected = film_mean(w, 3 * 0.6 / M_PI * to.z, (vec3){0.2, 0.1, 0});
-	assert_true(w->emitters[0].delta && w->emitters[0].beam && expected > 0);
+	assert_true(w->emitters[0].is_delta && w->emitters[0].is_beam && expected > 0);
 	check("spot", w, expected, all, 1536);
 	world_free(w);
 }
@@ -84,7 +84,7 @@ static void test_spot(void **state)
 static void test_mirror(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE,
 		DEPTH("3") SENSOR("0.5,0.3,3", "0,0,0") BEAM("0,0,1.6", "1,0.05,0.8")
 			PLATE("<scale value='2'/>", GREY("0.6"))
@@ -99,12 +99,12 @@ static void test_mirror(void **state)
 static void test_plate_lit_by_the_spot(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(SIDE, SIDE,
-					DEPTH("3") SENSOR("0.8,0,1.5", "0.2,0,0") BEAM("-1.5,0.5,1", "0,0,2")
-						PLATE("<scale value='4'/>", GREY("0.7"))
-							PLATE("<scale value='3'/><rotate x='1' angle='180'/>"
-							      "<translate z='2'/>",
-							      GREY("0.5")));
+	struct world *w = world_from_text(SIDE, SIDE,
+					  DEPTH("3") SENSOR("0.8,0,1.5", "0.2,0,0") BEAM("-1.5,0.5,1", "0,0,2")
+						  PLATE("<scale value='4'/>", GREY("0.7"))
+							  PLATE("<scale value='3'/><rotate x='1' angle='180'/>"
+								"<translate z='2'/>",
+								GREY("0.5")));
 	enum { FINE = 200 };
 	double sum = 0;
 	for (int i = 0; i < FINE * FINE; i++) {
@@ -127,7 +127,7 @@ static void test_fog(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(SIDE, SIDE,
+	struct world *w = world_from_text(SIDE, SIDE,
 		"<medium type='homogeneous' id='fog'>"
 			"<float name='sigma_t' value='0.4'/>"
 			"<float name='albedo' value='0.75'/>"
@@ -167,15 +167,16 @@ static void test_fog(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	world_refused("<emitter type='collimated'><float name='power' value='-1'/></emitter>", "power");
-	world_refused("<emitter type='collimated'><transform name='to_world'><scale z='0'/></transform></emitter>",
-		      "to_world gives the beam no direction");
+	world_check_refused("<emitter type='collimated'><float name='power' value='-1'/></emitter>", "power");
+	world_check_refused(
+		"<emitter type='collimated'><transform name='to_world'><scale z='0'/></transform></emitter>",
+		"to_world gives the beam no direction");
 	/* `path` would leave the light of the beam out. */
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE, SENSOR("0,0,3", "0,0,0") BEAM("-1,2,4", "0,0,0") PLATE("<scale value='2'/>", ""));
 	struct render_summary summary;
 	world_summary(w, &summary);
-	assert_true(summary.beams);
+	assert_true(summary.has_beam);
 	struct render_arguments a = {.plan = {.spp = 4, .integrator = "path"}};
 	struct error e = {""};
 	assert_int_equal(render_plan_from_scene(&a, &summary, &e), -EINVAL);

@@ -27,15 +27,15 @@ static void add_samples(struct brightness *b, unsigned a_cell, double (*of)(doub
 
 static void fill(struct brightness *b, double (*of)(double x, double y))
 {
-	add_samples(b, BRIGHTNESS_A_CELL, of);
-	brightness_settle(b, SAMPLES);
+	add_samples(b, BRIGHTNESS_SAMPLES_PER_CELL, of);
+	brightness_compute_scales(b, SAMPLES);
 }
 
 /* 64 x 64 cells with two samples each, so that each cell covers one pixel. */
 static void fill_near(struct brightness *b, double (*of)(double x, double y))
 {
 	add_samples(b, 1, of);
-	brightness_settle_near(b, SAMPLES);
+	brightness_compute_neighbourhood_scales(b, SAMPLES);
 }
 
 static double relative(const struct brightness *b, double x, double y)
@@ -119,12 +119,12 @@ static void a_sample_counts_once_in_a_cell(void **state)
 	assert_int_equal(brightness_init(&b, &window, SAMPLES, 1, &e), 0);
 	brightness_add(&b, &here, 2);
 	brightness_add(&b, &there, 1);
-	b.target.splat(&b.target, &here, 1.0 / (SIDE * SIDE)); /* adds 3 to the brightness */
+	b.target.add_splat(&b.target, &here, 1.0 / (SIDE * SIDE)); /* adds 3 to the brightness */
 	brightness_end_sample(&b);
 	brightness_add(&b, &here, 1);
 	brightness_end_sample(&b);
-	assert_true(b.sum[0] == 9 + 3 && b.square[0] == 9 * 9 + 3 * 3);
-	assert_true(b.sum[b.across - 1] == 1 && b.square[b.across - 1] == 1);
+	assert_true(b.sum[0] == 9 + 3 && b.square_sum[0] == 9 * 9 + 3 * 3);
+	assert_true(b.sum[b.resolution - 1] == 1 && b.square_sum[b.resolution - 1] == 1);
 	brightness_fini(&b);
 }
 

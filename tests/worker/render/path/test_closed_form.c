@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Images known in closed form, which need no rendering: furnaces, directly lit planes, two plates, and lamps smaller
- * than a pixel. test_closed_form_media.c tests media. Statistics as in tests/support/agree.h (level 1e-4 over the
+ * than a pixel. test_closed_form_media.c tests media. Statistics as in tests/support/agreement.h (level 1e-4 over the
  * suite, power printed and bounded).
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/known_radiance.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -27,15 +27,15 @@ static double sum3(const double v[3])
 static void test_furnace(void **state)
 {
 	(void)state;
-	known_constant(
+	known_radiance_check(
 		"furnace",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("5") SENSOR(
 				"0.2,0.1,0.3",
 				"0.5,1,0") "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
 					   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
-		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct known_effort){64, 256, 0});
+		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct known_radiance_spp){64, 256, 0});
 }
 
 /* Like test_furnace(), but seen in all directions from a point off the centre, with a filter that wraps around the
@@ -43,16 +43,16 @@ static void test_furnace(void **state)
 static void test_furnace_all_around(void **state)
 {
 	(void)state;
-	known_constant(
+	known_radiance_check(
 		"furnace, all around",
-		world_of_text(
+		world_from_text(
 			16, 8,
 			DEPTH("5") "<sensor type='spherical'><film type='hdrfilm'/><transform name='to_world'>"
 				   "<translate x='0.3' y='0.5'/></transform></sensor>"
 				   "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
 				   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
 		1 + 0.5 + 0.25 + 0.125 + 0.0625,
-		(struct known_effort){512, 1024, test_full() ? 49152 : 0}); /* pssmlt takes a minute */
+		(struct known_radiance_spp){512, 1024, test_is_full() ? 49152 : 0}); /* pssmlt takes a minute */
 }
 
 /* Seen through a telecentric lens, whose points lie a million radii away: the states of chains must represent them
@@ -60,20 +60,21 @@ static void test_furnace_all_around(void **state)
 static void test_furnace_far_lens(void **state)
 {
 	(void)state;
-	static struct agree_image image;
-	struct world *w = world_of_text(
+	static struct agreement_image image;
+	struct world *w = world_from_text(
 		16, 16,
 		DEPTH("5") "<sensor type='telecentric'><film type='hdrfilm'/><float name='aperture_radius' value='.2'/>"
 			   "<float name='focus_distance' value='.5'/><transform name='to_world'><scale value='0.3'/>"
 			   "<lookat origin='0.2,0.1,0.3' target='0.5,1,0' up='0,1,0'/></transform></sensor>"
 			   "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
 			   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>");
-	struct agree_side side = {"hslt", 512, 32, 0, 0};
-	agree_render(w, "furnace, far lens, hslt", "hslt", &side, &image);
+	struct agreement_options side = {"hslt", 512, 32, 0, 0};
+	agreement_render(w, "furnace, far lens, hslt", "hslt", &side, &image);
 	if (!(image.counters[COUNT_ACCEPTED] > 0 && image.counters[COUNT_STATES_LOST] == 0))
 		fail_msg("%llu accepted, %llu states lost", (unsigned long long)image.counters[COUNT_ACCEPTED],
 			 (unsigned long long)image.counters[COUNT_STATES_LOST]);
-	known_constant("furnace, far lens", w, 1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct known_effort){64, 256, 0});
+	known_radiance_check("furnace, far lens", w, 1 + 0.5 + 0.25 + 0.125 + 0.0625,
+			     (struct known_radiance_spp){64, 256, 0});
 }
 
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
@@ -83,43 +84,47 @@ static void test_furnace_far_lens(void **state)
 static void test_invisible(void **state)
 {
 	(void)state;
-	known_constant(
+	known_radiance_check(
 		"invisible glass",
-		world_of_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")), 0.7,
-		(struct known_effort){128, 192, 0});
-	known_constant("invisible mirror",
-		       world_of_text(16, 16,
-				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
-					     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")),
-		       0.7, (struct known_effort){64, 64, 16384});
-	known_constant(
+		world_from_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")),
+		0.7, (struct known_radiance_spp){128, 192, 0});
+	known_radiance_check(
+		"invisible mirror",
+		world_from_text(16, 16,
+				DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					"<bsdf type='conductor'><string name='material' value='none'/></bsdf>")),
+		0.7, (struct known_radiance_spp){64, 64, 16384});
+	known_radiance_check(
 		"invisible glass in glass",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL(
 				"<bsdf type='dielectric'/>") "<shape type='sphere'><float name='radius' value='.5'/>"
 							     "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
 							     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
-		0.7, (struct known_effort){320, 0, 0});
+		0.7, (struct known_radiance_spp){320, 0, 0});
 	/* The surface is rough, but only slightly: a model of single scattering loses 0.065 % +- 0.007 % of this
 	 * image at alpha = 0.01, in proportion to alpha^2, which is far below the bias that the test can find. */
-	known_constant("invisible rough glass",
-		       world_of_text(16, 16,
-				     DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
-					     "<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
-		       0.7, (struct known_effort){256, 256, 0});
-	known_constant("invisible rough metal",
-		       world_of_text(16, 16,
-				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
-					     "<bsdf type='roughconductor'><string name='material' value='none'/>"
-					     "<float name='alpha' value='.001'/></bsdf>")),
-		       0.7, (struct known_effort){128, 64, 0});
+	known_radiance_check(
+		"invisible rough glass",
+		world_from_text(16, 16,
+				DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					"<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
+		0.7, (struct known_radiance_spp){256, 256, 0});
+	known_radiance_check(
+		"invisible rough metal",
+		world_from_text(16, 16,
+				DEPTH("8") SENSOR("0,0,4", "0,0,0")
+					SKY BALL("<bsdf type='roughconductor'><string name='material' value='none'/>"
+						 "<float name='alpha' value='.001'/></bsdf>")),
+		0.7, (struct known_radiance_spp){128, 64, 0});
 	/* A white diffuse ball: every path ends in the sky. */
-	known_constant("invisible white ball",
-		       world_of_text(16, 16,
-				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
-					     "<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>")),
-		       0.7, (struct known_effort){1536, 1024, 0});
+	known_radiance_check(
+		"invisible white ball",
+		world_from_text(16, 16,
+				DEPTH("8") SENSOR("0,0,4", "0,0,0")
+					SKY BALL("<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>")),
+		0.7, (struct known_radiance_spp){1536, 1024, 0});
 }
 
 /* A lamp at height h over the floor: either a square of side a that faces down, integrated by the midpoint rule, or a
@@ -170,40 +175,40 @@ static double irradiance(const struct lamp *l, double x, double z)
 }
 
 /* Compares the mean over each block of a film of n x n pixels that sees the floor straight from above; there are
- * AGREE_BLOCKS squared blocks. The 40-degree camera at height `up` sees a square of the floor of side 2 up tan 20.
+ * AGREEMENT_BLOCKS squared blocks. The 40-degree camera at height `up` sees a square of the floor of side 2 up tan 20.
  * Film x runs along +x, film y along +z. */
-static void expect_floor(const char *test, const struct agree_image *image, double up, const struct lamp *lamp,
+static void expect_floor(const char *test, const struct agreement_image *image, double up, const struct lamp *lamp,
 			 double x, double z, double scale)
 {
 	enum { N = 24 };
-	static struct agree_image part;
+	static struct agreement_image part;
 	double half = up * tan(20 * M_PI / 180), whole = 0;
-	for (int c = 0; c <= AGREE_CELLS; c++) {
+	for (int c = 0; c <= AGREEMENT_CELLS; c++) {
 		double sum = 0;
-		for (int i = 0; c < AGREE_CELLS && i < N * N; i++) {
-			double u = (c % AGREE_BLOCKS + (i % N + 0.5) / N) / AGREE_BLOCKS,
-			       v = (c / AGREE_BLOCKS + (i / N + 0.5) / N) / AGREE_BLOCKS;
+		for (int i = 0; c < AGREEMENT_CELLS && i < N * N; i++) {
+			double u = (c % AGREEMENT_BLOCKS + (i % N + 0.5) / N) / AGREEMENT_BLOCKS,
+			       v = (c / AGREEMENT_BLOCKS + (i / N + 0.5) / N) / AGREEMENT_BLOCKS;
 			sum += scale * irradiance(lamp, half * (2 * u - 1) - x, half * (2 * v - 1) - z) / (N * N);
 		}
-		whole += c < AGREE_CELLS ? sum / AGREE_CELLS : 0;
-		double expected = c < AGREE_CELLS ? sum : whole;
+		whole += c < AGREEMENT_CELLS ? sum / AGREEMENT_CELLS : 0;
+		double expected = c < AGREEMENT_CELLS ? sum : whole;
 		/* Each cell is divided by its expected value, so that all cells are compared with 1. */
 		for (uint32_t g = 0; g < image->groups; g++)
 			part.mean[g][c] = image->mean[g][c] / expected;
 	}
 	part.groups = image->groups;
-	agree_expect(test, &part, 1);
+	agreement_check_constant(test, &part, 1);
 }
 
 /* A camera above the floor looks down; the lamp hangs over (3, 1), out of its view. */
-static void check_lit_floor(const char *name, struct lamp lamp, const char *xml, struct known_effort e)
+static void check_lit_floor(const char *name, struct lamp lamp, const char *xml, struct known_radiance_spp e)
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	const struct {
 		const char *integrator;
 		uint64_t spp;
 	} runs[] = {{"path", e.path}, {"bdpt", e.bdpt}, {"pssmlt", e.pssmlt}};
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		16, 16,
 		"%s<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
@@ -216,8 +221,8 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 			continue;
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
-		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, 0, 0};
-		agree_render(w, test, runs[i].integrator, &side, &image);
+		struct agreement_options side = {runs[i].integrator, runs[i].spp, 32, 0, 0};
+		agreement_render(w, test, runs[i].integrator, &side, &image);
 		expect_floor(test, &image, 4, &lamp, 3, 1, 0.5 / M_PI * sum3(w->grey_xyz));
 	}
 	world_free(w);
@@ -230,34 +235,34 @@ static void test_lit_floor(void **state)
 		"floor under a square", (struct lamp){1, 0, 2, 0},
 		"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
 		"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
-		(struct known_effort){3072, 6144, test_full() ? 32768 : 0});
+		(struct known_radiance_spp){3072, 6144, test_is_full() ? 32768 : 0});
 	check_lit_floor("floor under a sphere", (struct lamp){0, 0.4, 2, 0},
 			"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/>"
 			"<emitter type='area'/></shape>",
-			(struct known_effort){1024, 2048, 0});
+			(struct known_radiance_spp){1024, 2048, 0});
 	check_lit_floor(
 		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2, 0},
 		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/>"
 		"<emitter type='area'/></shape>",
-		(struct known_effort){512, 0, 0});
+		(struct known_radiance_spp){512, 0, 0});
 #define GLASS                                                                                                       \
 	"<shape type='cube'><transform name='to_world'><scale x='90' y='.5' z='90'/><translate y='5'/></transform>" \
 	"<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/></bsdf></shape>"
 	check_lit_floor("floor behind glass, under a tiny sphere", (struct lamp){0, 1e-5, 7, 1},
 			GLASS "<shape type='sphere'><point name='center' x='3' y='7' z='1'/>"
 			      "<float name='radius' value='1e-5'/><emitter type='area'/></shape>",
-			(struct known_effort){64, 512, 0});
+			(struct known_radiance_spp){64, 512, 0});
 	check_lit_floor("floor behind glass, under a point", (struct lamp){0, 1 / sqrt(M_PI), 7, 1},
 			GLASS "<emitter type='point'><point name='position' x='3' y='7' z='1'/></emitter>",
-			(struct known_effort){64, 512, 0});
+			(struct known_radiance_spp){64, 512, 0});
 }
 
 /* A beam straight down, wider than the part of the floor in view: the radiance is M rho / pi. */
 static void test_beam(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("beam", "floor.xml", 16, 16);
-	known_constant("floor under a beam", w, 1.5 * 0.5 / M_PI, (struct known_effort){128, 832, 0});
+	struct world *w = world_from_own_scene("beam", "floor.xml", 16, 16);
+	known_radiance_check("floor under a beam", w, 1.5 * 0.5 / M_PI, (struct known_radiance_spp){128, 832, 0});
 }
 
 /* The sun shines straight down through thin glass and a filter, which also lie between the camera and the floor. The
@@ -268,7 +273,7 @@ static void test_seen_through(void **state)
 {
 	(void)state;
 	const double n = 1.5, R = (n - 1) * (n - 1) / ((n + 1) * (n + 1));
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		16, 16,
 		"%s<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
 		"<lookat origin='0,2,0' target='0,0,0' up='0,0,-1'/></transform></sensor>"
@@ -282,8 +287,8 @@ static void test_seen_through(void **state)
 		"<emitter type='directional'><vector name='direction' value='0,-1,0'/>"
 		"<float name='irradiance' value='3'/></emitter>",
 		DEPTH("5"));
-	known_constant("floor seen through a filter", w, 3 * 0.5 / M_PI * (1 - 2 * R / (1 + R)) / 4,
-		       (struct known_effort){128, 832, 0});
+	known_radiance_check("floor seen through a filter", w, 3 * 0.5 / M_PI * (1 - 2 * R / (1 + R)) / 4,
+			     (struct known_radiance_spp){128, 832, 0});
 }
 
 /* Two plates of reflectance rho, of which the lower emits radiance 1. Between infinite plates every ray from one
@@ -299,30 +304,33 @@ static void test_plates(void **state)
 		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='90'/>"
 		"<translate y='1'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.6'/></bsdf></shape>";
-	known_constant("lower plate", world_of_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,0,0.1") "%s", plates),
-		       1 + pow(rho, 2) + pow(rho, 4), (struct known_effort){512, 0, 0});
-	known_constant("upper plate", world_of_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,1,0.1") "%s", plates),
-		       rho + pow(rho, 3) + pow(rho, 5), (struct known_effort){1024, 0, 0});
+	known_radiance_check("lower plate",
+			     world_from_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,0,0.1") "%s", plates),
+			     1 + pow(rho, 2) + pow(rho, 4), (struct known_radiance_spp){512, 0, 0});
+	known_radiance_check("upper plate",
+			     world_from_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,1,0.1") "%s", plates),
+			     rho + pow(rho, 3) + pow(rho, 5), (struct known_radiance_spp){1024, 0, 0});
 }
 
 /* A lamp on the axis, about 400 times smaller than a pixel: it covers the part `share` of the film with its radiance
  * 1. A sample of the film meets the lamp once in 100,000 times, so points on the lamp must be connected to the lens. */
 static void check_small_lamp(const char *name, const char *lamp, double share)
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	const char *const integrators[] = {"bdpt", "bdpt8", "erpt4", "pssmlt"};
 	const uint64_t spp[] = {64, 256, 256, 512};
-	struct world *w = world_of_text(16, 16, DEPTH("3") SENSOR("0,0,4", "0,0,0") "%s", lamp);
+	struct world *w = world_from_text(16, 16, DEPTH("3") SENSOR("0,0,4", "0,0,0") "%s", lamp);
 	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
-		struct agree_side side = {integrators[i], spp[i], 32, 0, 0};
-		agree_render(w, test, integrators[i], &side, &image);
+		struct agreement_options side = {integrators[i], spp[i], 32, 0, 0};
+		agreement_render(w, test, integrators[i], &side, &image);
 		for (uint32_t g = 0; g < image.groups; g++)
-			for (int c = 0; c <= AGREE_CELLS; c++)
-				image.mean[g][c] = image.mean[g][AGREE_CELLS] / (share * sum3(w->grey_xyz));
-		known_round(&image, 1, 1e-4); /* the amount that one sample of the film would add if it met the lamp */
-		agree_expect(test, &image, 1);
+			for (int c = 0; c <= AGREEMENT_CELLS; c++)
+				image.mean[g][c] = image.mean[g][AGREEMENT_CELLS] / (share * sum3(w->grey_xyz));
+		known_radiance_round(&image, 1,
+				     1e-4); /* the amount that one sample of the film would add if it met the lamp */
+		agreement_check_constant(test, &image, 1);
 	}
 	world_free(w);
 }

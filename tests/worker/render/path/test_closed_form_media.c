@@ -2,10 +2,10 @@
 /*
  * Images of media known in closed form: absorption by Beer's law, a sky seen through and in media that absorb
  * nothing, layers that scatter light once, a beam in a layer, and a half-space (Chandrasekhar 1960). Statistics as in
- * tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * tests/support/agreement.h (level 1e-4 over the suite, power printed and bounded).
  */
 #include "tests/support/known_radiance.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/vol.h"
 #include "tests/support/worlds.h"
@@ -31,9 +31,9 @@ static void test_absorbing(void **state)
 		"<sensor type='orthographic'><float name='far_clip' value='100'/><transform name='to_world'><lookat "
 		"origin='0.2,0.1,40' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>"
 		"</film></sensor>";
-	known_constant(
+	known_radiance_check(
 		"absorbing slabs",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			"%s<integrator type='volpath'><integer name='max_depth' value='16'/><integer name='rr_depth' "
 			"value='16'/></integrator>" SKY
@@ -45,7 +45,7 @@ static void test_absorbing(void **state)
 				     "<spectrum name='sigma_s' value='0'/></medium><ref name='exterior' id='haze'/>")
 					SLAB("0.1", ""),
 			view),
-		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct known_effort){512, 512, 0});
+		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct known_radiance_spp){512, 512, 0});
 }
 
 /* A camera in a medium, whose near plane lies 3 before a face beyond which there is no medium; the medium in front of
@@ -53,9 +53,9 @@ static void test_absorbing(void **state)
 static void test_camera_in_medium(void **state)
 {
 	(void)state;
-	known_constant(
+	known_radiance_check(
 		"camera in a medium",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			SKY
 			"<sensor type='orthographic'><float name='near_clip' value='36'/><transform name='to_world'>"
@@ -64,7 +64,7 @@ static void test_camera_in_medium(void **state)
 			"value='0.2'/></medium></sensor><shape type='rectangle'><transform name='to_world'>"
 			"<scale value='9'/><translate z='1'/></transform><bsdf type='null'/><ref name='exterior' "
 			"id='haze'/></shape>"),
-		0.7 * exp(-0.2 * 3), (struct known_effort){64, 64, 0});
+		0.7 * exp(-0.2 * 3), (struct known_radiance_spp){64, 64, 0});
 }
 
 #define FROM_ABOVE(near_clip, medium)                                                                               \
@@ -94,9 +94,9 @@ static void test_white_media(void **state)
 	static const char *const names[] = {"white fog", "milk in glass", "white flakes in glass"};
 	static const char *const phases[] = {FORWARDS, FORWARDS, FLAKES};
 	for (int i = 0; i < 3; i++)
-		known_constant(
+		known_radiance_check(
 			names[i],
-			world_of_text(
+			world_from_text(
 				16, 16,
 				WITHOUT_ROULETTE("128") SKY
 				"<sensor type='perspective'><float name='fov' value='25'/><transform name='to_world'><lookat "
@@ -104,7 +104,7 @@ static void test_white_media(void **state)
 				"</film></sensor><shape type='sphere'>%s<medium type='homogeneous' name='interior'>"
 				"<float name='sigma_s' value='2'/>%s</medium></shape>",
 				boundary[i > 0], phases[i]),
-			0.7, i ? (struct known_effort){320, 0, 0} : (struct known_effort){3072, 0, 0});
+			0.7, i ? (struct known_radiance_spp){320, 0, 0} : (struct known_radiance_spp){3072, 0, 0});
 }
 
 /* Faces of `null` are no vertices, so paths of one edge pass through them: the image shows the sky through the layer,
@@ -112,9 +112,10 @@ static void test_white_media(void **state)
 static void test_seen_through_layer(void **state)
 {
 	(void)state;
-	known_constant("seen through a layer",
-		       world_of_text(16, 16, WITHOUT_ROULETTE("1") SKY FROM_ABOVE("0.01", "") LAYER("0.5", "0.5", "")),
-		       0.7 * exp(-1), (struct known_effort){1024, 1024, 0});
+	known_radiance_check(
+		"seen through a layer",
+		world_from_text(16, 16, WITHOUT_ROULETTE("1") SKY FROM_ABOVE("0.01", "") LAYER("0.5", "0.5", "")),
+		0.7 * exp(-1), (struct known_radiance_spp){1024, 1024, 0});
 }
 
 /* Returns E_2(x) / 2, the share of light that reaches the depth x below a plane lit from all directions of one
@@ -131,7 +132,7 @@ static double half_exponential_integral(double x)
 /* Light of the sky that a layer of optical depth 2 scatters once, seen from above, or from a near plane in the layer
  * at the depth `begin`: the integral over the depth x of exp(begin - x) times the albedo times the light that reaches
  * x from both sides. The faces of the layer are no vertices, so the paths have two edges. */
-static void check_scattered_once(const char *name, double begin, const char *sensor, struct known_effort e)
+static void check_scattered_once(const char *name, double begin, const char *sensor, struct known_radiance_spp e)
 {
 	enum { STEPS = 1000 };
 	double depth = 2, sum = 0, step = (depth - begin) / STEPS;
@@ -139,16 +140,18 @@ static void check_scattered_once(const char *name, double begin, const char *sen
 		double x = begin + (i + 0.5) * step;
 		sum += exp(begin - x) * (half_exponential_integral(x) + half_exponential_integral(depth - x)) * step;
 	}
-	known_depths(name, world_of_text(16, 16, WITHOUT_ROULETTE("2") SKY "%s" LAYER("1", "0.6", ""), sensor), 2,
-		     0.7 * 0.6 * sum, e);
+	known_radiance_check_edges(
+		name, world_from_text(16, 16, WITHOUT_ROULETTE("2") SKY "%s" LAYER("1", "0.6", ""), sensor), 2,
+		0.7 * 0.6 * sum, e);
 }
 
 static void test_scattered_once(void **state)
 {
 	(void)state;
-	check_scattered_once("scattered once", 0, FROM_ABOVE("0.01", ""), (struct known_effort){14336, 0, 0});
+	check_scattered_once("scattered once", 0, FROM_ABOVE("0.01", ""), (struct known_radiance_spp){14336, 0, 0});
 	check_scattered_once("scattered once, seen from inside", 0.5,
-			     FROM_ABOVE("90.5", "<ref name='medium' id='layer'/>"), (struct known_effort){8192, 0, 0});
+			     FROM_ABOVE("90.5", "<ref name='medium' id='layer'/>"),
+			     (struct known_radiance_spp){8192, 0, 0});
 }
 
 /* Chandrasekhar 1960, sec. 36 and 58: under a sky of radiance 1, a half-space that scatters isotropically reflects 1
@@ -178,9 +181,10 @@ static void test_half_space(void **state)
 {
 	(void)state;
 	double albedo = 0.5;
-	known_constant("half-space",
-		       world_of_text(16, 16, WITHOUT_ROULETTE("128") SKY FROM_ABOVE("0.01", "") LAYER("8", "0.5", "")),
-		       0.7 * (1 - chandrasekhar_h(albedo, 1) * sqrt(1 - albedo)), (struct known_effort){3072, 0, 0});
+	known_radiance_check(
+		"half-space",
+		world_from_text(16, 16, WITHOUT_ROULETTE("128") SKY FROM_ABOVE("0.01", "") LAYER("8", "0.5", "")),
+		0.7 * (1 - chandrasekhar_h(albedo, 1) * sqrt(1 - albedo)), (struct known_radiance_spp){3072, 0, 0});
 }
 
 /* The mean is 1 from z = 0 to -2, so that the optical depth is that of LAYER. */
@@ -232,8 +236,8 @@ static void test_beam_in_layer(void **state)
 		const struct memory_file files[] = {{"beam.xml", scenes[i], strlen(scenes[i])},
 						    {"strata.vol", grid.bytes, grid.size},
 						    {NULL, NULL, 0}};
-		known_depths(names[i], world_of_files(16, 16, files), 2, 5 * share[i],
-			     (struct known_effort){512, 512, 0});
+		known_radiance_check_edges(names[i], world_from_files(16, 16, files), 2, 5 * share[i],
+					   (struct known_radiance_spp){512, 512, 0});
 	}
 }
 
@@ -246,5 +250,5 @@ int main(void)
 	};
 	const struct CMUnitTest longer[] = {cmocka_unit_test(test_half_space)}; /* half a minute */
 	int failed = cmocka_run_group_tests(tests, NULL, NULL);
-	return test_full() ? failed + cmocka_run_group_tests(longer, NULL, NULL) : failed;
+	return test_is_full() ? failed + cmocka_run_group_tests(longer, NULL, NULL) : failed;
 }

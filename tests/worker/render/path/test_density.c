@@ -46,7 +46,7 @@ static void test_diffuse_and_rough(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	density_check("diffuse and rough", world_of_text(32, 24,
+	density_check("diffuse and rough", world_from_text(32, 24,
 		SENSOR("0,0,2.9", "0,0,0")
 		BOX LAMPS
 		BALL("0", "0", "0",
@@ -63,7 +63,7 @@ static void test_specular(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct density_tally t = density_check("specular", world_of_text(32, 24,
+	struct density_tally t = density_check("specular", world_from_text(32, 24,
 		SENSOR("0,0,2.9", "0,0,0")
 		BOX LAMPS
 		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
@@ -91,7 +91,7 @@ static void test_infinity(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct density_tally t = density_check("infinity", world_of_text(32, 24,
+	struct density_tally t = density_check("infinity", world_from_text(32, 24,
 		SENSOR("0,1,4.9", "0,0,0")
 		LAMPS
 		"<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
@@ -111,7 +111,7 @@ static void test_infinity(void **state)
 			"<bsdf type='phong'/>"
 		"</shape>"), 20000);
 	/* clang-format on */
-	assert_true(t.infinite > t.routes / 10);
+	assert_true(t.from_infinity > t.routes / 10);
 }
 
 /* clang-format off */
@@ -153,13 +153,13 @@ static void test_passed(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct density_tally t = density_check("panes in a box", world_of_text(32, 24,
+	struct density_tally t = density_check("panes in a box", world_from_text(32, 24,
 		SENSOR("0,0,2.9", "0,0,0")
 		BOX LAMPS PANES "%s",
 		BALL("0", "-.3", "0", "<bsdf type='roughconductor'><float name='alpha' value='.3'/></bsdf>")
 		BALL("1.4", "-1", "0", "<bsdf type='dielectric'/>")), 3000);
-	assert_true(t.passed > t.routes / 5);
-	t = density_check("panes under the sky", world_of_text(32, 24,
+	assert_true(t.with_passed_vertices > t.routes / 5);
+	t = density_check("panes under the sky", world_from_text(32, 24,
 		SENSOR("0,0,2.9", "0,0,0")
 		PANES DELTA_LIGHTS "%s",
 		BALL("0", "-.3", "0", "<bsdf type='diffuse'/>")
@@ -170,7 +170,7 @@ static void test_passed(void **state)
 			"<emitter type='area'><float name='radiance' value='5'/></emitter>"
 		"</shape>"), 8000);
 	/* clang-format on */
-	assert_true(t.passed > t.routes / 5 && t.infinite > t.routes / 10);
+	assert_true(t.with_passed_vertices > t.routes / 5 && t.from_infinity > t.routes / 10);
 }
 
 /* Lights that no path can hit, beside some that can be hit. */
@@ -178,7 +178,7 @@ static void test_delta_lights(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(32, 24,
+	struct world *w = world_from_text(32, 24,
 		SENSOR("0,1,4.9", "0,0,0")
 		DELTA_LIGHTS
 		"%s"
@@ -210,7 +210,7 @@ static void test_delta_lights(void **state)
 	assert_true(t.with_delta > t.routes / 100);
 	/* Only lights that no path can hit. */
 	/* clang-format off */
-	t = density_check("delta lights in a box", world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
+	t = density_check("delta lights in a box", world_from_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
 		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
 		BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")), 6000);
 	/* clang-format on */
@@ -244,7 +244,7 @@ static void check_fog(const char *name, const char *medium, const struct vol *gr
 	const struct memory_file files[] = {{"fog.xml", xml, strlen(xml)},
 					    {"fog.vol", grid ? grid->bytes : NULL, grid ? grid->size : 0},
 					    {NULL, NULL, 0}};
-	struct world *w = world_of_files(32, 24, files);
+	struct world *w = world_from_files(32, 24, files);
 	assert_true(w->effects.scattering && w->media_count == 1);
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		assert_int_equal(w->emitter_medium[i], 1);
@@ -356,7 +356,7 @@ static void test_lens(void **state)
 			"<float name='focus_distance' value='1.5'/>"
 			"<transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/></transform>"
 		"</sensor>";
-	struct world *w = world_of_text(32, 24, "%s%s", lens,
+	struct world *w = world_from_text(32, 24, "%s%s", lens,
 		BOX LAMPS
 		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
 		BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
@@ -408,8 +408,8 @@ static void test_bent_normals(void **state)
 				   "f 1//1 5//5 2//2\nf 2//2 5//5 3//3\nf 3//3 5//5 4//4\nf 4//4 5//5 1//1\n";
 	const struct memory_file files[] = {
 		{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent, sizeof bent - 1}, {NULL, NULL, 0}};
-	density_check("bent normals", world_of_files(32, 24, files), 20000);
-	density_check("turned normals", room_of("turned normals"), 12000);
+	density_check("bent normals", world_from_files(32, 24, files), 20000);
+	density_check("turned normals", room_build_named("turned normals"), 12000);
 }
 
 int main(void)

@@ -2,9 +2,9 @@
 /*
  * Paths through dispersive glass: bidirectional against plain path tracing, for smooth and rough glass; and glass
  * whose index hardly varies, where paths carry one wavelength, against plain glass, where they carry four. Level and
- * power: tests/support/agree.h.
+ * power: tests/support/agreement.h.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
@@ -21,7 +21,7 @@
 static struct world *sky_over(const char *bsdf)
 {
 	/* clang-format off */
-	return world_of_text(32, 32,
+	return world_from_text(32, 32,
 		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 		SENSOR("0,1,5", "0,-0.2,0")
 		"<shape type='rectangle'>"
@@ -50,10 +50,10 @@ static struct world *sky_over(const char *bsdf)
 #define NOTHING PLAIN "<float name='int_cauchy_b' value='0'/>"
 
 static void render(struct world *w, const char *test, const char *side, const char *integrator, uint64_t spp,
-		   struct agree_image *out)
+		   struct agreement_image *out)
 {
-	struct agree_side how = {integrator, spp, 32, 0, 0};
-	agree_render(w, test, side, &how, out);
+	struct agreement_options how = {integrator, spp, 32, 0, 0};
+	agreement_render(w, test, side, &how, out);
 }
 
 static const struct effect_line *effect_named(const struct world *w, const char *name)
@@ -67,13 +67,13 @@ static const struct effect_line *effect_named(const struct world *w, const char 
 
 static void check_both_ways(const char *name, const char *bsdf, uint64_t spp)
 {
-	static struct agree_image path, bdpt;
+	static struct agreement_image path, bdpt;
 	struct world *w = sky_over(bsdf);
-	assert_true(w->effects.dispersion && w->effects.colour && effect_named(w, "dispersion")->on);
-	assert_non_null(strstr(effect_named(w, "dispersion")->why, "varies with wavelength"));
+	assert_true(w->effects.dispersion && w->effects.colour && effect_named(w, "dispersion")->is_on);
+	assert_non_null(strstr(effect_named(w, "dispersion")->reason, "varies with wavelength"));
 	render(w, name, "path", "path", spp, &path);
 	render(w, name, "bdpt", "bdpt", spp, &bdpt);
-	agree_check(name, &bdpt, &path);
+	agreement_check(name, &bdpt, &path);
 	world_free(w);
 }
 
@@ -91,16 +91,16 @@ static void test_rough_glass(void **state)
 
 static void check_one_against_four(const char *name, const char *hardly, const char *plain, uint64_t spp)
 {
-	static struct agree_image one, four;
+	static struct agreement_image one, four;
 	struct world *w = sky_over(hardly);
 	assert_true(w->effects.dispersion);
 	render(w, name, "one", "path", spp, &one);
 	world_free(w);
 	w = sky_over(plain);
-	assert_true(!w->effects.dispersion && !effect_named(w, "dispersion")->on);
+	assert_true(!w->effects.dispersion && !effect_named(w, "dispersion")->is_on);
 	render(w, name, "four", "path", spp, &four);
 	world_free(w);
-	agree_check(name, &one, &four);
+	agreement_check(name, &one, &four);
 }
 
 static void test_one_wavelength_stands_for_four(void **state)
@@ -113,7 +113,7 @@ static void test_one_wavelength_stands_for_four(void **state)
 static void test_no_coefficient_is_the_plain_scene(void **state)
 {
 	(void)state;
-	static struct agree_image zero, plain;
+	static struct agreement_image zero, plain;
 	struct world *w = sky_over(ROUGH(NOTHING));
 	render(w, "nothing", "path", "path", 32, &zero);
 	world_free(w);
@@ -127,10 +127,10 @@ static void test_no_coefficient_is_the_plain_scene(void **state)
 static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
 {
 	for (unsigned i = 1; i < s; i++)
-		if (c->light[i].bsdf->dispersive)
+		if (c->light[i].bsdf->is_dispersive)
 			return true;
 	for (unsigned i = 1; i < t; i++)
-		if (c->camera[i].bsdf && c->camera[i].bsdf->dispersive && !(s == 0 && i + 1 == t))
+		if (c->camera[i].bsdf && c->camera[i].bsdf->is_dispersive && !(s == 0 && i + 1 == t))
 			return true;
 	return false;
 }
@@ -154,7 +154,8 @@ static void test_every_technique_collapses(void **state)
 		unsigned light = path_walk_light(&c, &random.base, DEPTH);
 		for (unsigned t = 1; t <= camera; t++)
 			for (unsigned s = t == 1 ? 2 : 0; s <= light && s + t - 1 <= DEPTH; s++) {
-				spectrum l = s + t < 2 ? spectrum_of(0) : path_connect(&c, s, t, PATH_MAX_EDGES, film);
+				spectrum l =
+					s + t < 2 ? spectrum_constant(0) : path_connect(&c, s, t, PATH_EDGES_MAX, film);
 				if (!(l.v[0] > 0))
 					continue;
 				bool alone = l.v[1] == 0 && l.v[2] == 0 && l.v[3] == 0;
@@ -175,7 +176,7 @@ static void test_collapse(void **state)
 {
 	(void)state;
 	const spectrum l = {{1, 2, 3, 4}};
-	spectrum one = path_collapse(l, true), four = path_collapse(l, false);
+	spectrum one = path_collapse_to_hero(l, true), four = path_collapse_to_hero(l, false);
 	assert_true(one.v[0] == 4 && one.v[1] == 0 && one.v[2] == 0 && one.v[3] == 0);
 	assert_memory_equal(&four, &l, sizeof l);
 }

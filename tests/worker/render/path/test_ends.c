@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The ends of paths: a camera with an aperture, and emitters that cannot be hit. Integrators are compared with each
- * other and with closed forms. Statistics as in tests/support/agree.h: level 1e-4 over the suite; biases of 2 % of a
- * quarter of the image and 0.5 % of its mean are found with 95 % probability, and the exact power is printed.
+ * other and with closed forms. Statistics as in tests/support/agreement.h: level 1e-4 over the suite; biases of 2 % of
+ * a quarter of the image and 0.5 % of its mean are found with 95 % probability, and the exact power is printed.
  */
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -29,19 +29,19 @@ struct effort {
 /* The first integrator that runs is the reference for the others. Takes ownership of the world. */
 static void check_convergence(const char *name, struct world *w, struct effort e)
 {
-	static struct agree_image image[2];
-	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0},
-					   {"bdpt", e.bdpt, 32, 0, 0},
-					   {"pssmlt", test_full() ? e.pssmlt : 0, 32, 0, 0}};
-	const struct agree_image *reference = NULL;
+	static struct agreement_image image[2];
+	const struct agreement_options sides[] = {{"path", e.path, 32, 0, 0},
+						  {"bdpt", e.bdpt, 32, 0, 0},
+						  {"pssmlt", test_is_full() ? e.pssmlt : 0, 32, 0, 0}};
+	const struct agreement_image *reference = NULL;
 	for (size_t i = 0; i < 3; i++) {
 		char test[64];
 		if (!sides[i].spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
-		agree_render(w, test, sides[i].integrator, &sides[i], &image[reference != NULL]);
+		agreement_render(w, test, sides[i].integrator, &sides[i], &image[reference != NULL]);
 		if (reference)
-			agree_check(test, &image[1], reference);
+			agreement_check(test, &image[1], reference);
 		reference = &image[0];
 	}
 	world_free(w);
@@ -54,7 +54,7 @@ static void check_convergence(const char *name, struct world *w, struct effort e
 static void test_defocus(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("ends", "defocus.xml", 16, 16);
+	struct world *w = world_from_own_scene("ends", "defocus.xml", 16, 16);
 	check_convergence("defocus", w, (struct effort){3072, 2048, 65536});
 }
 
@@ -75,12 +75,12 @@ static void test_blurred_rectangle(void **state)
 	enum { RADII = 64, TURNS = 64 };
 	const double focus = 2, z = 5, radius = 0.5, half = tan(20 * M_PI / 180);
 	const struct span x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
-	static struct agree_image image;
-	struct world *w = world_of_own_scene("ends", "blurred-rectangle.xml", 16, 16);
-	const struct agree_side side = {"path", 12288, 32, 0, 0};
-	agree_render(w, __func__, "path", &side, &image);
-	double expected[AGREE_CELLS + 1] = {0};
-	for (int c = 0; c < AGREE_CELLS; c++) {
+	static struct agreement_image image;
+	struct world *w = world_from_own_scene("ends", "blurred-rectangle.xml", 16, 16);
+	const struct agreement_options side = {"path", 12288, 32, 0, 0};
+	agreement_render(w, __func__, "path", &side, &image);
+	double expected[AGREEMENT_CELLS + 1] = {0};
+	for (int c = 0; c < AGREEMENT_CELLS; c++) {
 		/* Film y runs downwards. */
 		struct span bx = {half * (c % 2 - 1), half * (c % 2)}, by = {half * (0 - c / 2), half * (1 - c / 2)};
 		for (int i = 0; i < RADII * TURNS; i++) {
@@ -90,13 +90,13 @@ static void test_blurred_rectangle(void **state)
 				       overlap((struct span){y.low + my, y.high + my}, by) /
 				       (half * half * RADII * TURNS);
 		}
-		expected[AGREE_CELLS] += expected[c] / AGREE_CELLS;
+		expected[AGREEMENT_CELLS] += expected[c] / AGREEMENT_CELLS;
 	}
 	double sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
 	for (uint32_t g = 0; g < image.groups; g++)
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			image.mean[g][c] /= expected[c] * sum;
-	agree_expect("blurred rectangle", &image, 1);
+	agreement_check_constant("blurred rectangle", &image, 1);
 	/* A pinhole gives a very different image, so the comparison can tell the two cameras apart. */
 	double sharp = overlap(x, (struct span){-half, 0}) * overlap(y, (struct span){0, half}) / (half * half);
 	assert_true(fabs(expected[0] / sharp - 1) > 0.1);
@@ -134,17 +134,17 @@ static double irradiance(const struct lamps *l, double x, double z)
 static void check_floor(const char *name, const struct lamps *l, struct effort e)
 {
 	enum { N = 480 }; /* the midpoint rule errs by 1e-6; with 48 by 7e-5, which the samples would reveal */
-	static struct agree_image image;
-	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0},
-					   {"bdpt", e.bdpt, 32, 0, 0},
-					   {"pssmlt", test_full() ? e.pssmlt : 0, 32, 0, 0}};
+	static struct agreement_image image;
+	const struct agreement_options sides[] = {{"path", e.path, 32, 0, 0},
+						  {"bdpt", e.bdpt, 32, 0, 0},
+						  {"pssmlt", test_is_full() ? e.pssmlt : 0, 32, 0, 0}};
 	/* clang-format off */
 	static const char mirror[] =
 		"<shape type='rectangle'>"
 			AT("<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>")
 			"<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
 		"</shape>";
-	struct world *w = world_of_text(16, 16,
+	struct world *w = world_from_text(16, 16,
 		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>"
 		"<sensor type='perspective'>"
 			"<float name='fov' value='40'/>"
@@ -177,24 +177,24 @@ static void check_floor(const char *name, const struct lamps *l, struct effort e
 	/* clang-format on */
 	assert_true(!w->effects.colour && (w->environment >= 0) == (l->sky > 0));
 	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2],
-	       expected[AGREE_CELLS + 1] = {0};
-	for (int c = 0; c < AGREE_CELLS; c++) {
+	       expected[AGREEMENT_CELLS + 1] = {0};
+	for (int c = 0; c < AGREEMENT_CELLS; c++) {
 		for (int i = 0; i < N * N; i++) {
 			double x = half * (c % 2 - 1 + (i % N + 0.5) / N), z = half * (c / 2 - 1 + (i / N + 0.5) / N);
 			expected[c] += 0.5 * sum * irradiance(l, x, z) / (N * N);
 		}
-		expected[AGREE_CELLS] += expected[c] / AGREE_CELLS;
+		expected[AGREEMENT_CELLS] += expected[c] / AGREEMENT_CELLS;
 	}
 	for (size_t i = 0; i < 3; i++) {
 		char test[64];
 		if (!sides[i].spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
-		agree_render(w, test, sides[i].integrator, &sides[i], &image);
+		agreement_render(w, test, sides[i].integrator, &sides[i], &image);
 		for (uint32_t g = 0; g < image.groups; g++)
-			for (int c = 0; c <= AGREE_CELLS; c++)
+			for (int c = 0; c <= AGREEMENT_CELLS; c++)
 				image.mean[g][c] /= expected[c];
-		agree_expect(test, &image, 1);
+		agreement_check_constant(test, &image, 1);
 	}
 	world_free(w);
 }
@@ -235,7 +235,7 @@ static void test_lit_by_a_mirror(void **state)
 static void test_rough_in_delta_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_own_scene("ends", "rough-bodies.xml", 16, 16);
+	struct world *w = world_from_own_scene("ends", "rough-bodies.xml", 16, 16);
 	check_convergence("rough bodies in delta light", w, (struct effort){8192, 8192, 0});
 }
 
@@ -257,7 +257,7 @@ static void test_roulette(void **state)
 		    {"<integer name='rr_depth' value='64'/>", EDGES}};
 	for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
 		/* clang-format off */
-		struct world *w = world_of_text(8, 8, "<integrator type='path'>%s</integrator>%s",
+		struct world *w = world_from_text(8, 8, "<integrator type='path'>%s</integrator>%s",
 			rows[k].asks,
 			SENSOR("0,0.2,0.9", "0.1,-0.1,-1")
 			"<shape type='cube'>"
@@ -271,7 +271,7 @@ static void test_roulette(void **state)
 					  .window = {0, 0, 8, 8},
 					  .min_depth = 1,
 					  .max_depth = EDGES,
-					  .roulette = PATH_ROULETTE,
+					  .max_survival = PATH_SURVIVAL_MAX,
 					  .counters = counters};
 		for (uint64_t i = 0; i < PATHS; i++) {
 			struct sampler_random random;

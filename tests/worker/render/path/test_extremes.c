@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scenes at the limits of the number format, and scenes without light, by every integrator: every value is finite
- * (agree_render() asserts it), and black scenes stay black.
+ * (agreement_render() asserts it), and black scenes stay black.
  */
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/leases.h"
 #include "tests/support/worlds.h"
 
@@ -25,15 +25,15 @@ enum { INTEGRATORS_MOST = 8 };
 /* Runs every integrator briefly and stores the mean of each image in `mean`. */
 static void run_all(const char *name, struct world *w, double mean[INTEGRATORS_MOST])
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	for (size_t i = 0; render_integrator_at(i); i++) {
-		const struct render_integrator *r = render_integrator_at(i);
-		struct agree_side side = {r->name, 32, 16, 0, 0};
+		const struct integrator_properties *r = render_integrator_at(i);
+		struct agreement_options side = {r->name, 32, 16, 0, 0};
 		assert_true(i < INTEGRATORS_MOST);
-		agree_render(w, name, r->name, &side, &image);
+		agreement_render(w, name, r->name, &side, &image);
 		mean[i] = 0;
 		for (uint32_t g = 0; g < image.groups; g++)
-			mean[i] += image.mean[g][AGREE_CELLS] / image.groups;
+			mean[i] += image.mean[g][AGREEMENT_CELLS] / image.groups;
 		assert_true(isfinite(mean[i]) && mean[i] >= 0);
 	}
 	world_free(w);
@@ -53,7 +53,7 @@ static void test_hard(void **state)
 	double mean[INTEGRATORS_MOST];
 	/* A sun: half a degree, radiance 1e9, 100 units away. */
 	run_all("sun",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
 			"<shape type='sphere'><point name='center' x='60' y='80' z='0'/><float name='radius' value='.5'/>"
@@ -62,7 +62,7 @@ static void test_hard(void **state)
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* A light 1e-6 times as large as the scene. */
 	run_all("tiny light",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
 			"<shape type='sphere'><point name='center' x='0' y='1' z='0'/><float name='radius' value='2e-6'/>"
@@ -71,7 +71,7 @@ static void test_hard(void **state)
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* Grazing view: the camera lies almost in the floor's plane. */
 	run_all("grazing",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("6") SENSOR("0,1e-6,1.9", "0,0,-3") FLOOR SKY
 			"<shape type='sphere'><point name='center' x='0' y='.3' z='0'/><float name='radius' value='.3'/>"
@@ -80,7 +80,7 @@ static void test_hard(void **state)
 	assert_true(mean[0] > 0);
 	/* Two lights so different that the fainter one is never chosen. */
 	run_all("faint light",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
 			"<shape type='sphere'><point name='center' x='0' y='.5' z='0'/><float name='radius' value='.5'/>"
@@ -90,7 +90,7 @@ static void test_hard(void **state)
 		mean);
 	/* A sliver of a mirror and a sliver of a lamp. */
 	run_all("slivers",
-		world_of_text(
+		world_from_text(
 			16, 16,
 			DEPTH("6") SENSOR("0,2,4", "0,0,0") FLOOR
 			"<shape type='rectangle'><transform name='to_world'><scale x='1' y='1e-6' z='1'/><rotate x='1' angle='90'/>"
@@ -104,9 +104,9 @@ static void test_hard(void **state)
 /* No light at all: leases return black, the bootstrap finds no seeds, and chains without a seed stay black. */
 static void expect_black(const char *text)
 {
-	struct world *w = world_of_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
+	struct world *w = world_from_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
 	for (size_t i = 0; render_integrator_at(i); i++) {
-		const struct render_integrator *r = render_integrator_at(i);
+		const struct integrator_properties *r = render_integrator_at(i);
 		struct plan p = {.kind = r->kind,
 				 .width = 16,
 				 .height = 16,
@@ -124,13 +124,13 @@ static void expect_black(const char *text)
 		struct error e = {""};
 		snprintf(p.integrator, sizeof p.integrator, "%s", r->name);
 		world_summary(w, &summary);
-		if (r->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+		if (r->has_mutations && render_canonical_mutations(NULL, &summary, p.mutations, &e))
 			fail_msg("%s", e.text);
 		for (int boot = 0; boot < 2; boot++) {
 			const uint64_t seeds[] = {UINT64_MAX, UINT64_MAX};
 			struct lease_key k = {1, boot ? LEASE_BOOTSTRAP : LEASE_RENDER, 1, 0, 0};
 			struct lease_input in = {.chain_count = 2, .seeds = seeds};
-			struct batch b = lease_done(w, &p, k, boot || r->kind == PLAN_SAMPLES ? NULL : &in);
+			struct batch b = leases_run(w, &p, k, boot || r->kind == PLAN_SAMPLES ? NULL : &in);
 			assert_true(b.independent_sum == 0 && b.tile_count == 0);
 			batch_fini(&b);
 		}

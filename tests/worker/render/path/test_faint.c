@@ -21,7 +21,7 @@ enum { SAMPLES = 150, PLACES = 512 };
 struct placed {
 	struct sampler base;
 	struct sampler_random random;
-	double place, value[SAMPLER_BLOCK];
+	double place, value[SAMPLER_BLOCK_SIZE];
 };
 
 static const double *placed_block(struct sampler *base, enum sampler_side side, unsigned vertex)
@@ -50,12 +50,12 @@ static double by_every_connection(struct path_context *c, uint64_t index)
 	struct placed p = placed_at(index, 0);
 	unsigned camera = path_walk_camera(c, &p.base, c->max_depth + 1, film);
 	unsigned light = path_walk_light(c, &p.base, c->max_depth);
-	spectrum sum = spectrum_of(0);
+	spectrum sum = spectrum_constant(0);
 	for (unsigned t = 2; t <= camera; t++)
 		for (unsigned s = 0; s <= (light > 1 ? light : 1) && s + t - 1 <= c->max_depth; s++)
-			sum = spectrum_add(sum, path_connect(c, s, t, PATH_MAX_EDGES, film));
+			sum = spectrum_add(sum, path_connect(c, s, t, PATH_EDGES_MAX, film));
 	for (unsigned s = 2; s <= light && s <= c->max_depth; s++)
-		path_connect(c, s, 1, PATH_MAX_EDGES, film);
+		path_connect(c, s, 1, PATH_EDGES_MAX, film);
 	spectrum_to_xyz(sum, &c->wl, xyz);
 	return xyz[0] + xyz[1] + xyz[2];
 }
@@ -65,14 +65,14 @@ static double by_chance(struct path_context *c, uint64_t index, double place)
 {
 	static struct path_sample out;
 	struct placed p = placed_at(index, place);
-	path_trace_both_ways(c, &p.base, &out);
+	path_trace_bidirectional(c, &p.base, &out);
 	const struct splat *s = out.splats;
-	return out.count > 0 ? s->xyz[0] + s->xyz[1] + s->xyz[2] : 0;
+	return out.splat_count > 0 ? s->xyz[0] + s->xyz[1] + s->xyz[2] : 0;
 }
 
 static struct world *make_room(void)
 {
-	return world_of_text(
+	return world_from_text(
 		16, 16,
 		"<integrator type='path'><integer name='max_depth' value='12'/></integrator>" SENSOR(
 			"0,0.2,1.9",
@@ -91,7 +91,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 				     .window = {0, 0, 16, 16},
 				     .min_depth = 1,
 				     .max_depth = 12,
-				     .unclassed = true,
+				     .skips_classes = true,
 				     .counters = counters};
 }
 
@@ -101,7 +101,7 @@ static void test_mean(void **state)
 	static uint64_t counters[BATCH_COUNTERS];
 	struct world *w = make_room();
 	struct path_context c = context_of(w, counters);
-	c.roulette = PATH_ROULETTE;
+	c.max_survival = PATH_SURVIVAL_MAX;
 	double all = 0, mean = 0;
 	uint64_t rays_all = 0, rays = 0, differ = 0;
 	for (uint64_t i = 0; i < SAMPLES; i++) {

@@ -35,8 +35,8 @@ enum { EDGES = 8 };
 /* Returns X + Y + Z of `l` and stores the shares of X, Y and Z. */
 static double intensity_of(struct path_context *c, spectrum l, double share[3])
 {
-	struct path_sample s = {.count = 0, .intensity = 0};
-	path_splat(c, &s, 0, 0, l);
+	struct path_sample s = {.splat_count = 0, .intensity = 0};
+	path_add_splat(c, &s, 0, 0, l);
 	for (int k = 0; k < 3 && s.intensity > 0; k++)
 		share[k] = s.splats[0].xyz[k] / s.intensity;
 	return s.intensity;
@@ -45,8 +45,8 @@ static double intensity_of(struct path_context *c, spectrum l, double share[3])
 /* The balance heuristic over all techniques turns the estimate f / p_s into f / sum p. */
 static double f_over_p(struct path_context *c, struct full_path *x)
 {
-	double log_pdf[FULL_PATH_MAX_VERTICES], log_f = full_path_log_f(c, x), sum = 0;
-	full_path_log_techniques(c, x, log_pdf);
+	double log_pdf[FULL_PATH_VERTICES_MAX], log_f = full_path_log_f(c, x), sum = 0;
+	full_path_log_technique_pdfs(c, x, log_pdf);
 	for (unsigned s = 0; s <= x->edges; s++)
 		sum += exp(log_pdf[s] - log_f);
 	return 1 / sum;
@@ -61,7 +61,7 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 {
 	static struct full_path x;
 	double film[2], share[3], colour[3];
-	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film), share);
+	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_EDGES_MAX, film), share);
 	bool there = full_path_from_subpaths(c, s, c->passed_count, edges + c->passed_count, &x);
 	if (!there || want == 0) {
 		/* rounding may move a film point drawn on the border to the other side of it */
@@ -77,7 +77,7 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 	for (int k = 0; k < 3; k++)
 		off = fmax(off, fabs(colour[k] - share[k]));
 	t->compared++;
-	t->refracted += s == 1 && path_is_refracted(&x.v[1]);
+	t->refracted += s == 1 && path_vertex_is_refracting(&x.v[1]);
 	if (off > t->worst)
 		t->worst = off;
 }
@@ -123,21 +123,21 @@ static void test_surfaces(void **state)
 {
 	(void)state;
 	check("rough glass",
-	      world_of_text(32, 32,
-			    ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
+	      world_from_text(32, 32,
+			      ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
 	      1500);
 	check("glass with holes",
-	      world_of_text(32, 32,
-			    ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>"
-					   "<bsdf type='dielectric'/></bsdf>")),
+	      world_from_text(32, 32,
+			      ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>"
+					     "<bsdf type='dielectric'/></bsdf>")),
 	      3000);
 	check("gold",
-	      world_of_text(32, 32,
-			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
+	      world_from_text(32, 32,
+			      ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
 	      1500);
-	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
+	check("mirror", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
 	/* clang-format off */
-	check("turned normals", world_of_text(32, 32,
+	check("turned normals", world_from_text(32, 32,
 		ROOM LAMP
 		BALL(
 			"<bsdf type='normalmap'>"
@@ -148,12 +148,12 @@ static void test_surfaces(void **state)
 				"<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
 			"</bsdf>")), 1500);
 	/* clang-format on */
-	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
+	check("phong", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 	/* The probability of going straight on through a hair differs between paths from the lamp and paths from the
 	 * camera. */
-	check("hair", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
+	check("hair", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
 	/* Curves do not scatter at their backs. */
-	check("hairs", world_of_own_scene("integrators", "hair.xml", 32, 32), 3000);
+	check("hairs", world_from_own_scene("integrators", "hair.xml", 32, 32), 3000);
 }
 
 /* Coloured glass around a stone that states no medium and around a bubble that states its exterior medium; water up
@@ -173,7 +173,7 @@ static void test_media(void **state)
 		"<float name='radius' value='" radius "'/>" \
 		inner \
 	"</shape>"
-	struct world *w = world_of_text(32, 32,
+	struct world *w = world_from_text(32, 32,
 		ROOM LAMP
 		BALL(
 			"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>"
@@ -190,7 +190,7 @@ static void test_media(void **state)
 	assert_true(w->effects.absorption && w->media_count == 2);
 	check("coloured glass", w, 4000);
 	/* clang-format off */
-	check("from haze", world_of_text(32, 32,
+	check("from haze", world_from_text(32, 32,
 		"<sensor type='perspective'>"
 			"<float name='fov' value='40'/>"
 			"<float name='near_clip' value='0.5'/>"
@@ -200,7 +200,7 @@ static void test_media(void **state)
 		"<shape type='cube'>" AT("<scale value='2'/>") "</shape>"
 		LAMP
 		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")), 1500);
-	check("a layer of water", world_of_text(32, 32,
+	check("a layer of water", world_from_text(32, 32,
 		ROOM LAMP
 		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
 		"<shape type='cube'>"
@@ -217,7 +217,7 @@ static void test_round_lamp(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	check("round lamp, gold", world_of_text(32, 32,
+	check("round lamp, gold", world_from_text(32, 32,
 		ROOM
 		"<shape type='sphere'>"
 			"<point name='center' value='0.8,1,-0.5'/>"
@@ -232,7 +232,7 @@ static void test_environment(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	check("environment", world_of_text(32, 32,
+	check("environment", world_from_text(32, 32,
 		SENSOR("0,1,5", "0,0,0")
 		"<shape type='rectangle'>"
 			AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
@@ -269,12 +269,12 @@ static void test_ends(void **state)
 			AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>")
 		"</shape>"
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-2'/>") "</shape>";
-	check("lens and lamps, rough", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor,
+	check("lens and lamps, rough", world_from_text(32, 32, "%s%s%s%s", lens, lights, floor,
 		BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
 		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
 	/* clang-format on */
 	check("lens and lamps, glass",
-	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
+	      world_from_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
 /* Connections through panes, through holes, and through a block that absorbs light between faces that let it straight
@@ -283,7 +283,7 @@ static void test_passed(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(32, 32,
+	struct world *w = world_from_text(32, 32,
 		ROOM LAMP
 		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
 		"<emitter type='point'>"
@@ -315,7 +315,7 @@ static void test_refracted(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	assert_true(check("lamps behind glass", world_of_text(32, 32, "%s",
+	assert_true(check("lamps behind glass", world_from_text(32, 32, "%s",
 		ROOM
 		BALL("<bsdf type='dielectric'/>")
 		"<shape type='sphere'>"
@@ -329,7 +329,7 @@ static void test_refracted(void **state)
 			"<emitter type='area'><float name='radiance' value='90'/></emitter>"
 		"</shape>"
 		"<emitter type='point'><point name='position' x='-.5' y='-1' z='-1.9'/></emitter>"), 3000) > 300);
-	assert_true(check("a prism and the sun", world_of_text(32, 32, "%s",
+	assert_true(check("a prism and the sun", world_from_text(32, 32, "%s",
 		SENSOR("0,-1,2.8", "0,-1.4,0")
 		"<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1.5'/>")
 			"<bsdf type='phong'/></shape>"
@@ -351,7 +351,7 @@ static void test_passed_lengths(void **state)
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	unsigned joined = 0, lengthened = 0;
 	/* clang-format off */
-	struct world *w = world_of_text(32, 32, "%s",
+	struct world *w = world_from_text(32, 32, "%s",
 		ROOM LAMP
 		BALL("<bsdf type='diffuse'/>")
 		"<shape type='rectangle'>"
@@ -374,7 +374,7 @@ static void test_passed_lengths(void **state)
 		for (unsigned t = 1; t <= camera; t++)
 			for (unsigned k = t > 1 ? 0 : 2; k <= (light > 1 ? light : 1); k++) {
 				if (!path_may_connect(&c, k, t) ||
-				    spectrum_is_zero(path_connect(&c, k, t, PATH_MAX_EDGES, film)))
+				    spectrum_is_zero(path_connect(&c, k, t, PATH_EDGES_MAX, film)))
 					continue;
 				unsigned edges = k + t - 1 + c.passed_count;
 				assert_in_range(edges, LEAST, MOST);
@@ -395,7 +395,7 @@ static void test_passed_most(void **state)
 	(void)state;
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	for (unsigned panes = PATH_PASSED_MOST; panes <= PATH_PASSED_MOST + 4; panes++) {
+	for (unsigned panes = PATH_PASSED_MAX; panes <= PATH_PASSED_MAX + 4; panes++) {
 		char xml[16384];
 		size_t used = 0;
 		unsigned hits = 0;
@@ -404,7 +404,7 @@ static void test_passed_most(void **state)
 				xml + used, sizeof xml - used,
 				"<shape type='rectangle'>" AT("<translate z='%g'/>") "<bsdf type='null'/></shape>",
 				0.1 * i);
-		struct world *w = world_of_text(
+		struct world *w = world_from_text(
 			32, 32, "%s%s",
 			SENSOR("0,0,4", "0,0,0") "<shape type='sphere'><point name='center' value='0,0,-1'/>"
 						 "<float name='radius' value='.02'/><emitter type='area'/></shape>",
@@ -414,7 +414,7 @@ static void test_passed_most(void **state)
 					  .min_depth = 1,
 					  .max_depth = 40,
 					  .counters = counters,
-					  .joins_lens = true,
+					  .joins_emitters_to_lens = true,
 					  .light_every = 1};
 		for (uint64_t i = 0; i < 8000; i++) {
 			struct sampler_random s;
@@ -424,10 +424,10 @@ static void test_passed_most(void **state)
 			const struct path_vertex *z = &c.camera[camera - 1];
 			if (camera < panes + 2 || z->emitter < 0)
 				continue;
-			spectrum l = path_connect(&c, 0, camera, PATH_MAX_EDGES, film),
-				 whole = spectrum_mul(z->beta, path_emitted(&c, z, z->to_prev, &c.wl));
+			spectrum l = path_connect(&c, 0, camera, PATH_EDGES_MAX, film),
+				 whole = spectrum_mul(z->beta, path_emitted_radiance(&c, z, z->to_prev, &c.wl));
 			double weight = l.v[0] / whole.v[0];
-			assert_true(panes > PATH_PASSED_MOST ? fabs(weight - 1) < 1e-12 : weight < 0.1);
+			assert_true(panes > PATH_PASSED_MAX ? fabs(weight - 1) < 1e-12 : weight < 0.1);
 			hits++;
 		}
 		assert_true(hits > 10);
@@ -451,7 +451,7 @@ static void test_clipped(void **state)
 	static const char walls[] =
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='4'/>") "</shape>"
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-3'/>") "</shape>";
-	check("clipped", world_of_text(32, 32, "%s%s%s", sensor, walls,
+	check("clipped", world_from_text(32, 32, "%s%s%s", sensor, walls,
 		BALL("<bsdf type='diffuse'/>")
 		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
 	/* clang-format on */

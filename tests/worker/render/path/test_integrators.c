@@ -2,13 +2,13 @@
 /*
  * Every integrator of the registry against the path tracer, on small scenes (tests/scenes/integrators) that each
  * exercise one feature: diffuse light and textures, glossy metal, smooth glass, rough glass, shading normals, light
- * from infinity. Statistics as in tests/support/agree.h. Chains take minutes where light passes through glass and
+ * from infinity. Statistics as in tests/support/agreement.h. Chains take minutes where light passes through glass and
  * need FULL=1 there.
  */
 #include "worker/render/path/integrator.h"
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -29,7 +29,7 @@ struct lengths {
 	uint64_t single; /* chains over single paths, in which a mutation yields less information */
 };
 
-static uint64_t samples_of(const struct lengths *n, const struct render_integrator *r)
+static uint64_t samples_of(const struct lengths *n, const struct integrator_properties *r)
 {
 	const struct integrator *of = integrator_find(r->name);
 	bool rare = of->light_every > 1;
@@ -40,19 +40,19 @@ static uint64_t samples_of(const struct lengths *n, const struct render_integrat
 
 static void check_all(const char *name, const char *file, const struct lengths *n)
 {
-	struct world *w = world_of_own_scene("integrators", file, 32, 32);
-	static struct agree_image reference, other;
-	struct agree_side path = {"path", n->path, 32, 0, 0};
-	agree_render(w, name, "path", &path, &reference);
+	struct world *w = world_from_own_scene("integrators", file, 32, 32);
+	static struct agreement_image reference, other;
+	struct agreement_options path = {"path", n->path, 32, 0, 0};
+	agreement_render(w, name, "path", &path, &reference);
 	for (size_t i = 0; render_integrator_at(i); i++) {
-		const struct render_integrator *r = render_integrator_at(i);
-		struct agree_side side = {r->name, samples_of(n, r), 32, 0, 0};
+		const struct integrator_properties *r = render_integrator_at(i);
+		struct agreement_options side = {r->name, samples_of(n, r), 32, 0, 0};
 		char test[64];
 		if (strcmp(r->name, "path") == 0 || !samples_of(n, r))
 			continue;
 		snprintf(test, sizeof test, "%s %s", name, r->name);
-		agree_render(w, test, r->name, &side, &other);
-		agree_check(test, &other, &reference);
+		agreement_render(w, test, r->name, &side, &other);
+		agreement_check(test, &other, &reference);
 	}
 	world_free(w);
 }
@@ -60,7 +60,7 @@ static void check_all(const char *name, const char *file, const struct lengths *
 /* Returns spp with FULL=1, else 0. */
 static uint64_t at_length(uint64_t spp)
 {
-	return test_full() ? spp : 0;
+	return test_is_full() ? spp : 0;
 }
 
 static void test_diffuse(void **state)

@@ -23,13 +23,13 @@ static struct path_context context_of(struct world *w, uint64_t *counters, uint3
 				     .window = {0, 0, SIZE, SIZE},
 				     .min_depth = 1,
 				     .max_depth = max_depth,
-				     .unclassed = true,
+				     .skips_classes = true,
 				     .counters = counters};
 }
 
 static struct world *make_room(const char *bsdf)
 {
-	return world_of_text(
+	return world_from_text(
 		SIZE, SIZE,
 		SENSOR("0,0,0", "0,0,1") "<shape type='sphere'><boolean name='flip_normals' value='true'/>%s"
 					 "<emitter type='area'><spectrum name='radiance' value='1'/>"
@@ -47,8 +47,8 @@ static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, 
 	double sum = 0, square = 0;
 	c = context_of(w, counters, after);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
-		double x = longer_paths(&c, 3, i, longest, &sample);
-		assert_true(c.max_depth == after && c.roulette == 0);
+		double x = longer_paths_sample_energy(&c, 3, i, longest, &sample);
+		assert_true(c.max_depth == after && c.max_survival == 0);
 		sum += x / SAMPLES;
 		square += x * x / SAMPLES;
 	}
@@ -87,7 +87,7 @@ static void expect(struct world *w, uint32_t after, uint32_t longest, double wan
 /* r^after + ... + r^(longest - 1) */
 static double geometric_series(double r, uint32_t after, uint32_t longest)
 {
-	return (pow(r, after) - (longest == LONGER_EDGES ? 0 : pow(r, longest))) / (1 - r);
+	return (pow(r, after) - (longest == LONGER_EDGES_MAX ? 0 : pow(r, longest))) / (1 - r);
 }
 
 static void test_a_shining_sphere(void **state)
@@ -96,10 +96,10 @@ static void test_a_shining_sphere(void **state)
 	struct world *w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
 	expect(w, 32, 64, geometric_series(0.99, 32, 64), 0.02);
 	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03); /* across the border of two segments */
-	expect(w, 128, LONGER_EDGES, geometric_series(0.99, 128, LONGER_EDGES), 0.05);
+	expect(w, 128, LONGER_EDGES_MAX, geometric_series(0.99, 128, LONGER_EDGES_MAX), 0.05);
 	world_free(w);
 	w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
-	expect(w, 4, LONGER_EDGES, geometric_series(0.5, 4, LONGER_EDGES), 0.05);
+	expect(w, 4, LONGER_EDGES_MAX, geometric_series(0.5, 4, LONGER_EDGES_MAX), 0.05);
 	world_free(w);
 }
 
@@ -116,7 +116,7 @@ static void test_a_mirror(void **state)
 /* Light travels diagonally between two plates, with hits one unit apart, to a lamp behind 300 hits. */
 static struct world *make_corridor(const char *bsdf)
 {
-	return world_of_text(
+	return world_from_text(
 		SIZE, SIZE,
 		"<sensor type='perspective'><float name='fov' value='0.001'/><transform name='to_world'>"
 		"<lookat origin='0,0.5,0' target='1,1.5,0' up='0,0,1'/></transform><film type='hdrfilm'>"

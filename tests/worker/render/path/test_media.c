@@ -31,7 +31,7 @@
  * stated exterior in one and a stated interior in the other; so a gap of 0.25 separates them. */
 static struct world *layers(void)
 {
-	return world_of_text(
+	return world_from_text(
 		8, 8,
 		"%s<emitter type='constant'/>" LAYER("0", "1", FOG("interior", "0.2,0.5,1.5", "0.9,0.8,0.7"))
 			LAYER("-2.5", "0.5", FOG("interior", "0.3,0.1,0.2", "0,0,0"))
@@ -73,7 +73,7 @@ static void test_events(void **state)
 	struct path_vertex at = start_at(w, 3), to;
 	double length = 11 * w->scale; /* length of the test ray */
 	unsigned events[PLACES] = {0}, free_ones = 0;
-	spectrum left, carried = spectrum_of(0);
+	spectrum left, carried = spectrum_constant(0);
 	double pdf_free = 0;
 	for (int i = 0; i < NUMBERS; i++) {
 		assert_true(path_extend_in_media(&c, &at, down, 0, INFINITY, (i + 0.5) / NUMBERS, NULL, &to, &left));
@@ -100,7 +100,7 @@ static void test_events(void **state)
 			struct path_edge edge;
 			double z = 3 - 11 * (k + (i + 0.5) / STEPS) / PLACES;
 			struct path_vertex there = start_at(w, z);
-			assert_true(path_see_in_media(&c, &at, &there, &edge, &left));
+			assert_true(path_is_visible_in_media(&c, &at, &there, &edge, &left));
 			if (edge.medium && path_medium(w, edge.medium)->scatters)
 				sum += path_edge_pdf(&c, &edge, edge.medium, &there) * length / PLACES / STEPS;
 		}
@@ -126,7 +126,7 @@ static struct world *as_layers(bool scatters)
 			"z='%g'/></transform><bsdf type='null'/><medium type='homogeneous' name='interior'>"
 			"<rgb name='sigma_t' value='%g,%g,%g'/><float name='albedo' value='%g'/></medium></shape>",
 			i - 3.5, 2 * steps[i], steps[i], steps[i] / 2, scatters ? 0.5 : 0);
-	return world_of_text(8, 8, "%s", xml);
+	return world_from_text(8, 8, "%s", xml);
 }
 
 static struct world *as_grid(bool scatters)
@@ -150,7 +150,7 @@ static struct world *as_grid(bool scatters)
 		"<float name='albedo' value='%g'/></medium></shape></scene>",
 		SENSOR("0,0,5", "0,0,0"), scatters ? 0.5 : 0);
 	const struct memory_file files[] = {{"s", xml, (size_t)n}, {"g", grid.bytes, grid.size}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 /* Where a grid steps from one value to the next, the events and the remaining light are those of homogeneous layers.
@@ -170,7 +170,7 @@ static void test_grid_as_layers(void **state)
 		double pdf[2];
 		for (int i = 0; i < 2; i++) {
 			struct path_context c = context_of(w[i], counters);
-			c.wl = (struct wavelengths){.rgb = true};
+			c.wl = (struct wavelengths){.is_rgb = true};
 			struct path_vertex at = start_at(w[i], 0.5);
 			assert_true(path_extend_in_media(&c, &at, along, 0, INFINITY, (n + 0.5) / NUMBERS, NULL, &to[i],
 							 &left[i]));
@@ -197,7 +197,7 @@ static void test_absorbing_grid(void **state)
 	(void)state;
 	struct world *w = as_grid(false);
 	assert_false(w->effects.scattering);
-	const struct wavelengths rgb = {.rgb = true};
+	const struct wavelengths rgb = {.is_rgb = true};
 	for (double a = -3.9; a < 0; a += 0.37)
 		for (double b = -3.8; b < 0; b += 0.41) {
 			struct path_vertex from = start_at(w, a), to = start_at(w, b);
@@ -228,21 +228,21 @@ static void test_both_ends(void **state)
 	spectrum left, left_back;
 	a.edge.medium = 1;
 	b.edge.medium = 3;
-	assert_true(path_see_in_media(&c, &a, &b, &there, &left));
-	assert_true(path_see_in_media(&c, &b, &a, &back, &left_back));
-	assert_int_equal(there.before, 1);
+	assert_true(path_is_visible_in_media(&c, &a, &b, &there, &left));
+	assert_true(path_is_visible_in_media(&c, &b, &a, &back, &left_back));
+	assert_int_equal(there.previous_medium, 1);
 	assert_int_equal(there.medium, 3);
-	assert_int_equal(back.before, 3);
+	assert_int_equal(back.previous_medium, 3);
 	assert_int_equal(back.medium, 1);
-	assert_true(there.fits && back.fits);
+	assert_true(there.media_match && back.media_match);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		assert_true(fabs(there.free.v[i] / back.free.v[i] - 1) < 1e-12);
+		assert_true(fabs(there.free_flight.v[i] / back.free_flight.v[i] - 1) < 1e-12);
 		assert_true(fabs(left.v[i] / left_back.v[i] - 1) < 1e-12);
-		assert_true(left.v[i] < 0.95 * there.free.v[i]); /* the layer between the points absorbs */
+		assert_true(left.v[i] < 0.95 * there.free_flight.v[i]); /* the layer between the points absorbs */
 	}
 	a.edge.medium = 2; /* differs from the interior that the layer states */
-	assert_true(path_see_in_media(&c, &a, &b, &there, &left));
-	assert_false(there.fits);
+	assert_true(path_is_visible_in_media(&c, &a, &b, &there, &left));
+	assert_false(there.media_match);
 	world_free(w);
 }
 
@@ -252,7 +252,7 @@ static void test_emitters(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *w = world_of_text(8, 8,
+	struct world *w = world_from_text(8, 8,
 		"%s"
 		LAYER("0", "2", FOG("interior", "1,1,1", "0.5,0.5,0.5"))
 		"<shape type='sphere'><float name='radius' value='0.2'/><emitter type='area'/></shape>"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Merging with a photon placed exactly where the camera's sub-path ends: the contribution found by bdpt and `path`
- * must be f divided by the densities of the full path, multiplied out vertex by vertex. And the light of a room by
- * merging, against `path`.
+ * Merging with a photon placed exactly where the camera's sub-path ends: the contribution found by bdpt and
+ * `path_contribution` must be f divided by the densities of the full path, multiplied out vertex by vertex. And the
+ * light of a room by merging, against `path_contribution`.
  */
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -83,11 +83,11 @@ static bool continue_to_light(struct path_context *c, unsigned s, unsigned t)
 		at[-1].pdf_rev = path_pdf(c, y, at, at - 1, TRANSPORT_IMPORTANCE);
 	if (pdf > 0 && EFFECT_IS_ON(c->w, scattering)) {
 		spectrum left;
-		if (!path_see_in_media(c, at, z, &z->edge, &left))
+		if (!path_is_visible_in_media(c, at, z, &z->edge, &left))
 			return false;
-		path_travel(c, z, left);
+		path_apply_edge(c, z, left);
 		if (t >= 2)
-			at[-1].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.before, &at[-1]);
+			at[-1].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.previous_medium, &at[-1]);
 	}
 	return pdf > 0;
 }
@@ -108,7 +108,7 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 	static struct full_path x;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	unsigned long compared = 0;
-	double log_pdf[FULL_PATH_MAX_VERTICES], film[2], worst = 0;
+	double log_pdf[FULL_PATH_VERTICES_MAX], film[2], worst = 0;
 	c = context_of(w, counters);
 	for (unsigned long i = 0; i < samples; i++) {
 		struct sampler_random u;
@@ -122,13 +122,13 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 				/* s + 1 vertices of the light sub-path and t of the camera's are joined */
 				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) || !continue_to_light(&c, s, t))
 					continue;
-				struct photon p = photon_of(&c, s);
-				if (!merged_of(&c, &p, t, &found))
+				struct photon p = photon_from_vertex(&c, s);
+				if (!merging_merge_photon(&c, &p, t, &found))
 					continue;
 				double log_f = full_path_log_f(&c, &x);
-				full_path_log_techniques(&c, &x, log_pdf);
-				expect_near(found.bdpt, f_over(log_pdf, x.edges, log_f), &worst);
-				expect_near(found.path, f_over(log_pdf, 1, log_f), &worst);
+				full_path_log_technique_pdfs(&c, &x, log_pdf);
+				expect_near(found.bdpt_contribution, f_over(log_pdf, x.edges, log_f), &worst);
+				expect_near(found.path_contribution, f_over(log_pdf, 1, log_f), &worst);
 				compared++;
 			}
 	}
@@ -140,38 +140,40 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 static void test_densities(void **state)
 {
 	(void)state;
-	assert_true(check_densities("diffuse", world_of_text(32, 32, ROOM LAMP "%s", ""), 1000) > 1000);
+	assert_true(check_densities("diffuse", world_from_text(32, 32, ROOM LAMP "%s", ""), 1000) > 1000);
 	assert_true(check_densities("glass",
-				    world_of_text(32, 32, ROOM ROUND_LAMP BALL("<bsdf type='dielectric'/>") "%s", ""),
+				    world_from_text(32, 32, ROOM ROUND_LAMP BALL("<bsdf type='dielectric'/>") "%s", ""),
 				    3000) > 3000);
-	/* `path` finds all of the light from the point behind the ball by refracted connections. */
-	assert_true(check_densities("glass and a point",
-				    world_of_text(32, 32,
-						  ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
-						       "<rgb name='intensity' value='1,1,1'/></emitter>" BALL(
-							       "<bsdf type='dielectric'/>") "%s",
-						  ""),
-				    3000) > 3000);
-	assert_true(check_densities("rough glass and a point",
-				    world_of_text(32, 32,
-						  ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
-						       "<rgb name='intensity' value='1,1,1'/></emitter>" BALL(
-							       "<bsdf type='roughdielectric'><float name='alpha' "
-							       "value='0.2'/></bsdf>") "%s",
-						  ""),
-				    1000) > 1000);
+	/* `path_contribution` finds all of the light from the point behind the ball by refracted connections. */
+	assert_true(
+		check_densities("glass and a point",
+				world_from_text(32, 32,
+						ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
+						     "<rgb name='intensity' value='1,1,1'/></emitter>" BALL(
+							     "<bsdf type='dielectric'/>") "%s",
+						""),
+				3000) > 3000);
+	assert_true(
+		check_densities("rough glass and a point",
+				world_from_text(32, 32,
+						ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
+						     "<rgb name='intensity' value='1,1,1'/></emitter>" BALL(
+							     "<bsdf type='roughdielectric'><float name='alpha' "
+							     "value='0.2'/></bsdf>") "%s",
+						""),
+				1000) > 1000);
 	/* Techniques that pass through the panes count as well, and some of them end at the photon. */
 	/* Scattering events are vertices; `null` faces are not. */
 	assert_true(check_densities("fog and a lamp in it",
-				    world_of_text(32, 32,
-						  ROOM LAMP FOGGY "<emitter type='point'><point name='position' "
-								  "value='0.9,-0.4,0.3'/><rgb name='intensity' "
-								  "value='1,1,1'/></emitter>%s",
-						  ""),
+				    world_from_text(32, 32,
+						    ROOM LAMP FOGGY "<emitter type='point'><point name='position' "
+								    "value='0.9,-0.4,0.3'/><rgb name='intensity' "
+								    "value='1,1,1'/></emitter>%s",
+						    ""),
 				    2000) > 1000);
 	assert_true(check_densities(
 			    "behind panes",
-			    world_of_text(
+			    world_from_text(
 				    32, 32,
 				    ROOM ROUND_LAMP BALL("<bsdf type='conductor'/>") PANE("0.4")
 					    PANE("0.1") "<emitter type='point'><point name='position' value='0.5,1,0'/>"
@@ -181,7 +183,7 @@ static void test_densities(void **state)
 	assert_true(
 		check_densities(
 			"under the sky",
-			world_of_text(
+			world_from_text(
 				32, 32,
 				SENSOR("0,0.5,2.5", "0,-0.3,-1") BALL("<bsdf type='dielectric'/>") "<shape type='cube'>" AT(
 					"<translate z='-2'/>") "</shape>"
@@ -194,7 +196,7 @@ static void test_densities(void **state)
 
 static void add(void *user, const struct merged *m)
 {
-	*(double *)user += m->brings;
+	*(double *)user += m->contribution;
 }
 
 /* Light that arrives after at least two scattering events. Merging misses photons in the part of the disk beyond the
@@ -206,7 +208,7 @@ static void test_energy(void **state)
 	enum { PATHS = 1 << 14, GROUPS = 32 };
 	static struct path_context c;
 	static struct path_sample sample;
-	struct world *w = world_of_text(32, 32, ROOM LAMP "%s", "");
+	struct world *w = world_from_text(32, 32, ROOM LAMP "%s", "");
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	c = context_of(w, counters);
 	c.max_depth = 5;
@@ -214,12 +216,12 @@ static void test_energy(void **state)
 	for (unsigned g = 0; g < GROUPS; g++) {
 		struct merging m;
 		by[0][g] = by[1][g] = 0;
-		assert_int_equal(merging_photons(&m, &c, g, 0, PATHS), 0);
-		assert_int_equal(m.paths, PATHS);
+		assert_int_equal(merging_trace_photons(&m, &c, g, 0, PATHS), 0);
+		assert_int_equal(m.path_count, PATHS);
 		for (uint64_t i = 0; i < PATHS; i++) {
-			struct merging_place place;
-			if (merging_walk(&m, &c, g, 1, i, &place))
-				merging_each(&m, &c, &place, add, &by[0][g]);
+			struct merging_point place;
+			if (merging_walk_camera(&m, &c, g, 1, i, &place))
+				merging_for_each(&m, &c, &place, add, &by[0][g]);
 		}
 		merging_fini(&m);
 		c.min_depth = 3;

@@ -2,9 +2,9 @@
 /*
  * Paths with a required number of edges, where surfaces let light straight through: a connection that passes through
  * nothing has too few edges, and must not be counted as one that passes through the surface on which one of its ends
- * lies. Here light sub-paths end on masks, and those of `path` do not. Statistics as in tests/support/agree.h.
+ * lies. Here light sub-paths end on masks, and those of `path` do not. Statistics as in tests/support/agreement.h.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -16,9 +16,9 @@
 static void test_masks(void **state)
 {
 	(void)state;
-	static struct agree_image path, bdpt;
+	static struct agreement_image path, bdpt;
 	/* clang-format off */
-	struct world *w = world_of_text(16, 16, "%s",
+	struct world *w = world_from_text(16, 16, "%s",
 		SENSOR("0,0,5", "0,-.2,0")
 		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' y='1' angle='30'/></transform>"
 			"<bsdf type='mask'><float name='opacity' value='.6'/><bsdf type='twosided'><bsdf type='diffuse'/></bsdf>"
@@ -27,9 +27,9 @@ static void test_masks(void **state)
 		"<emitter type='constant'><float name='radiance' value='3'/></emitter>");
 	/* clang-format on */
 	assert_true(w->effects.transparent_shadows);
-	agree_render(w, "3 edges", "path", &(struct agree_side){"path", 16384, 32, 3, 3}, &path);
-	agree_render(w, "3 edges", "bdpt", &(struct agree_side){"bdpt", 11264, 32, 3, 3}, &bdpt);
-	agree_check("3 edges", &bdpt, &path);
+	agreement_render(w, "3 edges", "path", &(struct agreement_options){"path", 16384, 32, 3, 3}, &path);
+	agreement_render(w, "3 edges", "bdpt", &(struct agreement_options){"bdpt", 11264, 32, 3, 3}, &bdpt);
+	agreement_check("3 edges", &bdpt, &path);
 	world_free(w);
 }
 

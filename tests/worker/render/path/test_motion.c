@@ -4,13 +4,13 @@
  * covers a point, which is known: a ramp, and an integral over angles. And the image over the open shutter is the
  * mean of images at the midpoints of 32 parts of this interval, rendered from static worlds placed by transforms that
  * this test computes itself; the midpoint rule errs by 32^-2 of the change. The integrators are tested one by one,
- * except that bdpt also stands for the samples with which erpt starts. Statistics as in tests/support/agree.h (level
- * 1e-4 over the suite, power printed and bounded). Chains take a minute each and run with FULL=1 only; test_balance.c
- * has a room in which all of this moves. Moving lights over a plane: test_moving_lights.c.
+ * except that bdpt also stands for the samples with which erpt starts. Statistics as in tests/support/agreement.h
+ * (level 1e-4 over the suite, power printed and bounded). Chains take a minute each and run with FULL=1 only;
+ * test_balance.c has a room in which all of this moves. Moving lights over a plane: test_moving_lights.c.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/dice.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -60,8 +60,8 @@ static void check_seen(const char *test, struct world *w, covers_fn *covers)
 	const struct plan p = {
 		.width = CELLS, .height = CELLS, .crop_width = CELLS, .crop_height = CELLS, .max_depth = 1};
 	static double seen[CELLS][CELLS], drawn[CELLS][CELLS], expected[CELLS * CELLS], got[CELLS * CELLS];
-	size_t n = dice_count(200000), cells = 0;
-	path_context_for_samples(&c, w, &p, counters);
+	size_t n = dice_scaled_count(200000), cells = 0;
+	path_context_init_for_samples(&c, w, &p, counters);
 	memset(seen, 0, sizeof seen);
 	memset(drawn, 0, sizeof drawn);
 	for (size_t i = 0; i < n; i++) {
@@ -108,16 +108,16 @@ static void test_seen(void **state)
 {
 	(void)state;
 	check_seen("sliding",
-		   world_of_text(12, 12,
-				 FROM_ABOVE "<shape type='rectangle'>" KEYS(
-					 "<scale x='0.2' y='0.5'/><translate x='-0.6'/>",
-					 "<scale x='0.2' y='0.5'/><translate x='0.4'/>") "</shape>"),
+		   world_from_text(12, 12,
+				   FROM_ABOVE "<shape type='rectangle'>" KEYS(
+					   "<scale x='0.2' y='0.5'/><translate x='-0.6'/>",
+					   "<scale x='0.2' y='0.5'/><translate x='0.4'/>") "</shape>"),
 		   slides);
 	check_seen("turning",
-		   world_of_text(12, 12,
-				 FROM_ABOVE "<shape type='rectangle'>" KEYS(
-					 "<scale x='0.8' y='0.1'/>",
-					 "<scale x='0.8' y='0.1'/><rotate z='1' angle='90'/>") "</shape>"),
+		   world_from_text(12, 12,
+				   FROM_ABOVE "<shape type='rectangle'>" KEYS(
+					   "<scale x='0.8' y='0.1'/>",
+					   "<scale x='0.8' y='0.1'/><rotate z='1' angle='90'/>") "</shape>"),
 		   turns);
 }
 
@@ -295,7 +295,7 @@ __attribute__((format(printf, 1, 2))) static struct world *world_of(const char *
 	va_end(ap);
 	assert_true(n > 0 && (size_t)n < sizeof xml);
 	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"e.pgm", sky, sizeof sky - 1}, {NULL, NULL, 0}};
-	return world_of_files(16, 16, files);
+	return world_from_files(16, 16, files);
 }
 
 /* Returns the static world at time t, or the moving world if t is negative. */
@@ -328,97 +328,97 @@ static struct world *world_at(enum stage s, double t)
 	}
 }
 
-static void mean_of_stills(enum stage s, struct agree_image *out)
+static void mean_of_stills(enum stage s, struct agreement_image *out)
 {
-	static struct agree_image part;
+	static struct agreement_image part;
 	memset(out, 0, sizeof *out);
 	for (int i = 0; i < PARTS; i++) {
 		char side[32];
 		struct world *w = world_at(s, (i + 0.5) / PARTS);
-		const struct agree_side how = {"bdpt", 320, 32, 0, 0};
+		const struct agreement_options how = {"bdpt", 320, 32, 0, 0};
 		snprintf(side, sizeof side, "still %d", i);
-		agree_render(w, stages[s].name, side, &how, &part);
+		agreement_render(w, stages[s].name, side, &how, &part);
 		out->groups = part.groups;
 		for (uint32_t g = 0; g < part.groups; g++)
-			for (int c = 0; c <= AGREE_CELLS; c++)
+			for (int c = 0; c <= AGREEMENT_CELLS; c++)
 				out->mean[g][c] += part.mean[g][c] / PARTS;
 		world_free(w);
 	}
 }
 
-static void check_integrators(enum stage s, const struct agree_side *sides, size_t count)
+static void check_integrators(enum stage s, const struct agreement_options *sides, size_t count)
 {
-	static struct agree_image stills, image;
+	static struct agreement_image stills, image;
 	mean_of_stills(s, &stills);
 	struct world *w = world_at(s, -1);
 	assert_true(w->effects.motion && !w->effects.colour);
 	for (size_t i = 0; i < count; i++) {
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", stages[s].name, sides[i].integrator);
-		agree_render(w, test, "moving", &sides[i], &image);
-		agree_check(test, &image, &stills);
+		agreement_render(w, test, "moving", &sides[i], &image);
+		agreement_check(test, &image, &stills);
 	}
 	world_free(w);
 	/* The image of the static world at the opening of the shutter differs, so the comparison can tell them apart.
 	 */
-	struct agree_difference d;
-	const struct agree_side how = {"bdpt", test_scaled() ? 8192 : 1024, 32, 0, 0};
+	struct agreement_difference d;
+	const struct agreement_options how = {"bdpt", test_is_scaled() ? 8192 : 1024, 32, 0, 0};
 	w = world_at(s, 0);
-	agree_render(w, "motion", "when it opens", &how, &image);
-	agree_measure(&image, &stills, &d);
-	assert_false(d.holds);
+	agreement_render(w, "motion", "when it opens", &how, &image);
+	agreement_measure(&image, &stills, &d);
+	assert_false(d.agrees);
 	world_free(w);
 }
 
 static void test_shapes(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"path", 16384, 32, 0, 0},
-						  {"erpt", 12288, 32, 0, 0},
-						  {"pssmlt", 65536, 32, 0, 0},
-						  {"hslt", 98304, 32, 0, 0}};
-	check_integrators(SHAPES, sides, test_full() ? 4 : 2);
+	static const struct agreement_options sides[] = {{"path", 16384, 32, 0, 0},
+							 {"erpt", 12288, 32, 0, 0},
+							 {"pssmlt", 65536, 32, 0, 0},
+							 {"hslt", 98304, 32, 0, 0}};
+	check_integrators(SHAPES, sides, test_is_full() ? 4 : 2);
 }
 
 static void test_camera(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"path", 8192, 32, 0, 0}, {"hslt", 98304, 32, 0, 0}};
-	check_integrators(CAMERA, sides, test_full() ? 2 : 1);
+	static const struct agreement_options sides[] = {{"path", 8192, 32, 0, 0}, {"hslt", 98304, 32, 0, 0}};
+	check_integrators(CAMERA, sides, test_is_full() ? 2 : 1);
 }
 
 static void test_lights(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {
+	static const struct agreement_options sides[] = {
 		{"path", 1280, 32, 0, 0}, {"bdpt", 1280, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
-	check_integrators(LIGHTS, sides, test_full() ? 3 : 2);
+	check_integrators(LIGHTS, sides, test_is_full() ? 3 : 2);
 }
 
 static void test_lamps(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {
+	static const struct agreement_options sides[] = {
 		{"path", 8704, 32, 0, 0},   {"bdpt", 8192, 32, 0, 0},	{"erpt", 8192, 32, 0, 0},
 		{"bdpt8", 12288, 32, 0, 0}, {"erpt4", 12288, 32, 0, 0}, {"pssmlt", 65536, 32, 0, 0},
 		{"hslt", 458752, 32, 0, 0},
 	};
-	check_integrators(LAMPS, sides, test_full() ? 7 : 2);
+	check_integrators(LAMPS, sides, test_is_full() ? 7 : 2);
 }
 
 static void test_skies(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {
+	static const struct agreement_options sides[] = {
 		{"path", 1664, 32, 0, 0}, {"bdpt", 2688, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
-	check_integrators(SKIES, sides, test_full() ? 3 : 2);
+	check_integrators(SKIES, sides, test_is_full() ? 3 : 2);
 }
 
 static void test_glow(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"bdpt", 11520, 32, 0, 0}, {"path", 16384, 32, 0, 0}};
-	check_integrators(MEDIA, sides, test_full() ? 2 : 1);
+	static const struct agreement_options sides[] = {{"bdpt", 11520, 32, 0, 0}, {"path", 16384, 32, 0, 0}};
+	check_integrators(MEDIA, sides, test_is_full() ? 2 : 1);
 }
 
 /* ---- at rest ---- */
@@ -428,7 +428,7 @@ static void test_glow(void **state)
 static void test_at_rest(void **state)
 {
 	(void)state;
-	static struct agree_image still, image;
+	static struct agreement_image still, image;
 	static const char *const places[] = {
 		TO("<translate x='0.25' z='1.5'/>"),
 		KEYS("<translate x='0.25' z='1.5'/>", "<translate x='0.25' z='1.5'/>"),
@@ -437,9 +437,9 @@ static void test_at_rest(void **state)
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
 		struct world *w = world_of("<scene version='3.0.0'>" DEPTH EYE FLOOR CARD_LAMP "</scene>",
 					   TO("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>"), places[i]);
-		const struct agree_side how = {"bdpt", 16, 16, 0, 0};
+		const struct agreement_options how = {"bdpt", 16, 16, 0, 0};
 		assert_false(w->effects.motion);
-		agree_render(w, "at rest", "a lamp", &how, i ? &image : &still);
+		agreement_render(w, "at rest", "a lamp", &how, i ? &image : &still);
 		assert_true(i == 0 || memcmp(image.mean, still.mean, sizeof still.mean) == 0);
 		world_free(w);
 	}

@@ -2,9 +2,9 @@
 /*
  * The light that a moving lamp sends to a plane is an integral over time: of the irradiance from a ball, which falls
  * with the square of the distance, from a polygon (Lambert 1760), from a beam, and from a projector. Statistics as in
- * tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * tests/support/agreement.h (level 1e-4 over the suite, power printed and bounded).
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -120,31 +120,31 @@ static struct world *world_over_plane(const struct over_plane *o)
 	const char *element = o->irradiance == of_projector ? "emitter" : "shape";
 	put_light(begin, sizeof begin, o, 0);
 	put_light(end, sizeof end, o, 1);
-	return world_of_text(16, 16,
-			     "<integrator type='path'><integer name='max_depth' value='2'/></integrator>"
-			     "<sensor type='perspective'><float name='fov' value='40'/>" SHUTTER TO(
-				     "<lookat origin='0,0,1' target='0,0,0' up='0,1,0'/>") BOX_FILM
-			     "</sensor>"
-			     "<shape type='rectangle'>" TO(
-				     "<scale value='4'/>") "<bsdf type='diffuse'>"
-							   "<float name='reflectance' value='1'/></bsdf></shape>"
-							   "<%s type='%s'>" KEYS("%s", "%s") "%s</%s>",
-			     element, o->type, begin, end, o->inside, element);
+	return world_from_text(16, 16,
+			       "<integrator type='path'><integer name='max_depth' value='2'/></integrator>"
+			       "<sensor type='perspective'><float name='fov' value='40'/>" SHUTTER TO(
+				       "<lookat origin='0,0,1' target='0,0,0' up='0,1,0'/>") BOX_FILM
+			       "</sensor>"
+			       "<shape type='rectangle'>" TO(
+				       "<scale value='4'/>") "<bsdf type='diffuse'>"
+							     "<float name='reflectance' value='1'/></bsdf></shape>"
+							     "<%s type='%s'>" KEYS("%s", "%s") "%s</%s>",
+			       element, o->type, begin, end, o->inside, element);
 }
 
 static void test_over_a_plane(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"path", 1024, 32, 0, 0}, {"bdpt", 1536, 32, 0, 0}};
-	static struct agree_image image;
+	static const struct agreement_options sides[] = {{"path", 1024, 32, 0, 0}, {"bdpt", 1536, 32, 0, 0}};
+	static struct agreement_image image;
 	for (size_t k = 0; k < sizeof over_plane / sizeof *over_plane; k++) {
 		struct world *w = world_over_plane(&over_plane[k]);
 		double xyz = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
 		for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
 			char test[64];
 			snprintf(test, sizeof test, "%s, %s", over_plane[k].name, sides[i].integrator);
-			agree_render(w, test, "moving", &sides[i], &image);
-			agree_expect(test, &image, xyz * mean_radiance(&over_plane[k]));
+			agreement_render(w, test, "moving", &sides[i], &image);
+			agreement_check_constant(test, &image, xyz * mean_radiance(&over_plane[k]));
 		}
 		world_free(w);
 	}

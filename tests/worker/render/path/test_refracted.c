@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Refracted connections change the noise of an image but not its mean, even where several refracted paths join two
- * points and where the walk fails to find one: the caustic of a ball. Statistics as in tests/support/agree.h, but
+ * points and where the walk fails to find one: the caustic of a ball. Statistics as in tests/support/agreement.h, but
  * only a bias of 3 % of the mean is found; if all paths were weighted like those that the walk finds, nearly half of
  * the light would be lost. The lamp's image in a floor that is partly a mirror would lose half if paths that are
  * specular at the floor were weighted as if a connection could make them. Where straight lines are blocked and light
  * refracted at a plane passes, the radiance must be that given by Fresnel's formulas.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -20,7 +20,7 @@ static struct world *caustic_world(const char *effects)
 {
 	worlds_effects = effects;
 	/* clang-format off */
-	struct world *w = world_of_text(16, 16, "%s",
+	struct world *w = world_from_text(16, 16, "%s",
 		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 		"<sensor type='perspective'><float name='fov' value='4'/><transform name='to_world'>"
 			"<lookat origin='2,-.7,0' target='-.08,-1,0' up='0,1,0'/></transform></sensor>"
@@ -41,7 +41,7 @@ static struct world *image_of_lamp(const char *effects)
 {
 	worlds_effects = effects;
 	/* clang-format off */
-	struct world *w = world_of_text(16, 16, "%s",
+	struct world *w = world_from_text(16, 16, "%s",
 		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 		"<sensor type='perspective'><float name='fov' value='4'/><transform name='to_world'>"
 			"<lookat origin='2,0,0' target='1,-1,0' up='0,1,0'/></transform></sensor>"
@@ -61,18 +61,18 @@ static struct world *image_of_lamp(const char *effects)
  * them of twice as many. */
 static void check_both(const char *name, struct world *(*build)(const char *effects), uint64_t spp)
 {
-	static struct agree_image without, with;
-	const struct agree_side sides[] = {{"path", spp, 32, 0, 0}, {"bdpt", spp / 4, 32, 0, 0}};
+	static struct agreement_image without, with;
+	const struct agreement_options sides[] = {{"path", spp, 32, 0, 0}, {"bdpt", spp / 4, 32, 0, 0}};
 	struct world *w = build("-refracted-shadows");
-	agree_render(w, name, "without", &(struct agree_side){"path", 2 * spp, 32, 0, 0}, &without);
+	agreement_render(w, name, "without", &(struct agreement_options){"path", 2 * spp, 32, 0, 0}, &without);
 	world_free(w);
 	w = build(NULL);
 	assert_true(w->effects.refracted_shadows);
 	for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
-		agree_render(w, test, "with", &sides[i], &with);
-		agree_within_errors(test, &with, &without);
+		agreement_render(w, test, "with", &sides[i], &with);
+		agreement_check_any_power(test, &with, &without);
 	}
 	world_free(w);
 }
@@ -95,7 +95,7 @@ static void test_image_of_lamp(void **state)
 static void test_pool(void **state)
 {
 	(void)state;
-	static struct agree_image seen;
+	static struct agreement_image seen;
 	static const char *const integrators[] = {"path", "bdpt"};
 	const double index = 1.33, cosine = 0.342 / hypot(0.94, 0.342),
 		     inside = sqrt(1 - (1 - cosine * cosine) / (index * index));
@@ -103,7 +103,7 @@ static void test_pool(void **state)
 		     p = (inside - index * cosine) / (inside + index * cosine);
 	const double through = 1 - (s * s + p * p) / 2, expected = 0.5 / M_PI * 3 * cosine * through;
 	/* clang-format off */
-	struct world *w = world_of_text(16, 16, "%s",
+	struct world *w = world_from_text(16, 16, "%s",
 		"<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
 		"<sensor type='orthographic'><transform name='to_world'><scale value='.3'/>"
 			"<lookat origin='-1,-.2,0' target='-1,-1,0' up='0,0,1'/></transform></sensor>"
@@ -118,8 +118,9 @@ static void test_pool(void **state)
 	/* clang-format on */
 	const double white = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
 	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
-		agree_render(w, "pool", integrators[i], &(struct agree_side){integrators[i], 64, 32, 0, 0}, &seen);
-		agree_expect(integrators[i], &seen, expected * white);
+		agreement_render(w, "pool", integrators[i], &(struct agreement_options){integrators[i], 64, 32, 0, 0},
+				 &seen);
+		agreement_check_constant(integrators[i], &seen, expected * white);
 	}
 	world_free(w);
 }

@@ -41,7 +41,7 @@ enum { WIDTH = 12, HEIGHT = 8 };
 
 static struct world *world_of(const char *roll, const char *filter)
 {
-	return world_of_text(WIDTH, HEIGHT, SCENE LIT, roll, filter);
+	return world_from_text(WIDTH, HEIGHT, SCENE LIT, roll, filter);
 }
 
 /* Returns the line's position from 0, the first line, to 1, the last. */
@@ -110,7 +110,7 @@ struct timed {
 
 static const double *timed_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
-	static double block[SAMPLER_BLOCK];
+	static double block[SAMPLER_BLOCK_SIZE];
 	struct timed *s = (struct timed *)base;
 	const double *u = s->random.base.block(&s->random.base, side, vertex);
 	if (side != SIDE_LIGHT || vertex != 0)
@@ -129,7 +129,7 @@ static void begin(struct path_context *c, struct world *w)
 			       .crop_width = WIDTH,
 			       .crop_height = HEIGHT,
 			       .max_depth = 4};
-	path_context_for_samples(c, w, &p, counters);
+	path_context_init_for_samples(c, w, &p, counters);
 }
 
 static void check_samples(const struct roll *r, const char *filter)
@@ -138,7 +138,7 @@ static void check_samples(const struct roll *r, const char *filter)
 	static struct path_sample a, b;
 	struct world *w = world_of(r->xml, filter), *open = world_of("", filter);
 	unsigned lit = 0, beyond = 0;
-	assert_true(w->effects.motion && world_rolls(w) == (r->line != none));
+	assert_true(w->effects.motion && world_has_rolling_shutter(w) == (r->line != none));
 	begin(&rolling, w);
 	begin(&still, open);
 	for (uint64_t i = 0; i < 4000; i++) {
@@ -154,8 +154,9 @@ static void check_samples(const struct roll *r, const char *filter)
 		beyond += film[0] < 0 || film[0] > WIDTH || film[1] < 0 || film[1] > HEIGHT;
 		path_trace(&rolling, &s.base, &a);
 		path_trace(&still, &t.base, &b);
-		assert_true(a.count == b.count && memcmp(a.splats, b.splats, a.count * sizeof *a.splats) == 0);
-		lit += a.count > 0;
+		assert_true(a.splat_count == b.splat_count &&
+			    memcmp(a.splats, b.splats, a.splat_count * sizeof *a.splats) == 0);
+		lit += a.splat_count > 0;
 	}
 	assert_true(lit > 500 && (beyond > 0) == (w->settings.border > 0));
 	world_free(w);
@@ -179,8 +180,8 @@ static void check_seen(const struct roll *r)
 	enum { FINE = 32 };
 	static double seen[HEIGHT][WIDTH], drawn[HEIGHT][WIDTH];
 	static struct path_context c;
-	struct world *w = world_of_text(WIDTH, HEIGHT, SCENE, r->xml, BOX_FILTER);
-	size_t n = dice_count(200000), cells = 0;
+	struct world *w = world_from_text(WIDTH, HEIGHT, SCENE, r->xml, BOX_FILTER);
+	size_t n = dice_scaled_count(200000), cells = 0;
 	double chi2 = 0;
 	begin(&c, w);
 	memset(seen, 0, sizeof seen);
@@ -228,7 +229,7 @@ static int lease_of(const struct world *w, const char *integrator, struct error 
 	struct plan_request r = {
 		.width = WIDTH, .height = HEIGHT, .border = w->settings.border, .spp = 4, .max_depth = 4};
 	const struct lease_key key = {.kind = LEASE_RENDER};
-	enum lease_end end;
+	enum lease_outcome end;
 	snprintf(r.integrator, sizeof r.integrator, "%s", integrator);
 	r.kind = render_integrator_find(integrator)->kind;
 	accuracy_settings_print(&w->accuracy, r.accuracy);
@@ -242,7 +243,7 @@ static void test_who_renders_it(void **state)
 	struct world *w = world_of(ROLL("top", "0.5"), BOX_FILTER);
 	struct render_summary summary;
 	world_summary(w, &summary);
-	assert_true(summary.rolls);
+	assert_true(summary.has_rolling_shutter);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const char *name = render_integrator_at(i)->name;
 		struct render_arguments a = {.plan = {.spp = 4}};
@@ -269,7 +270,7 @@ static void test_who_renders_it(void **state)
 	w = world_of(ROLL("top", "0.5"), BOX_FILTER);
 	worlds_effects = NULL;
 	world_summary(w, &summary);
-	assert_false(summary.rolls);
+	assert_false(summary.has_rolling_shutter);
 	world_free(w);
 }
 

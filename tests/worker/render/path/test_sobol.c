@@ -18,14 +18,14 @@
 #define LEVEL 1e-6
 
 static void draw(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sample, enum sampler_side side,
-		 unsigned vertex, double out[SAMPLER_BLOCK])
+		 unsigned vertex, double out[SAMPLER_BLOCK_SIZE])
 {
 	struct sampler_sobol s;
 	sampler_sobol_init(&s, seed, RNG_TEST, index, replicate, sample);
 	const double *u = s.base.block(&s.base, side, vertex);
-	memcpy(out, u, SAMPLER_BLOCK * sizeof *out);
+	memcpy(out, u, SAMPLER_BLOCK_SIZE * sizeof *out);
 	assert_ptr_equal(u, s.base.block(&s.base, side, vertex));
-	assert_memory_equal(u, out, SAMPLER_BLOCK * sizeof *out);
+	assert_memory_equal(u, out, SAMPLER_BLOCK_SIZE * sizeof *out);
 }
 
 /* Counts the points in each box of size 2^-e[0] x .. x 2^-e[3]; each must hold 2^t points. */
@@ -71,7 +71,7 @@ static void test_elementary_intervals(void **state)
 		0, 1 << M, 5 << M, UINT64_C(1) << 31, (UINT64_C(1) << 32) - (1 << M), UINT64_C(3) << 32};
 	for (uint64_t n = 0; n < 12; n++)
 		for (int half = 0; half < 2; half++) {
-			double u[1 << M][4], block[SAMPLER_BLOCK];
+			double u[1 << M][4], block[SAMPLER_BLOCK_SIZE];
 			for (unsigned i = 0; i < 1 << M; i++) {
 				draw(seed, n, n % 3, first[n % 6] + i, n % 2 ? SIDE_LIGHT : SIDE_CAMERA,
 				     (unsigned)n % 5, block);
@@ -91,7 +91,7 @@ static void test_one_of_eight(void **state)
 		for (uint64_t first = 0; first < 128; first += 8) {
 			unsigned count = 0;
 			for (uint64_t i = 0; i < 8; i++) {
-				double u[SAMPLER_BLOCK];
+				double u[SAMPLER_BLOCK_SIZE];
 				draw(seed, n, n % 3, first + i, SIDE_CAMERA, 0, u);
 				count += u[DIM_HAS_LIGHT] * 8 < 1;
 			}
@@ -145,7 +145,7 @@ static void test_directions(void **state)
 	memset(expected, 0, sizeof expected);
 	static uint32_t u[N][4];
 	for (uint32_t i = 0; i < N; i++) {
-		double block[SAMPLER_BLOCK];
+		double block[SAMPLER_BLOCK_SIZE];
 		draw(seed, 1, 2, i, SIDE_CAMERA, 0, block);
 		for (int d = 0; d < 4; d++)
 			u[i][d] = (uint32_t)ldexp(block[d], 32);
@@ -186,18 +186,19 @@ static void test_marginals(void **state)
 {
 	(void)state;
 	uint64_t seed = stats_seed("test_marginals");
-	static uint64_t coarse[SAMPLER_BLOCK][CELLS], fine[SAMPLER_BLOCK][CELLS], low[SAMPLER_BLOCK][CELLS];
+	static uint64_t coarse[SAMPLER_BLOCK_SIZE][CELLS], fine[SAMPLER_BLOCK_SIZE][CELLS],
+		low[SAMPLER_BLOCK_SIZE][CELLS];
 	for (uint64_t n = 0; n < TRIALS; n++) {
-		double u[SAMPLER_BLOCK];
+		double u[SAMPLER_BLOCK_SIZE];
 		draw(seed, n / 16, n % 16, 5, SIDE_LIGHT, 3, u);
-		for (int d = 0; d < SAMPLER_BLOCK; d++) {
+		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++) {
 			assert_true(u[d] >= 0 && u[d] < 1);
 			coarse[d][cell_of(u[d])]++;
 			fine[d][cell_of(ldexp(u[d], 16) - floor(ldexp(u[d], 16)))]++;
 			low[d][cell_of(ldexp(u[d], 40) - floor(ldexp(u[d], 40)))]++;
 		}
 	}
-	for (int d = 0; d < SAMPLER_BLOCK; d++) {
+	for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++) {
 		check_uniform(coarse[d], CELLS, TRIALS, "first bits");
 		check_uniform(fine[d], CELLS, TRIALS, "middle bits");
 		check_uniform(low[d], CELLS, TRIALS, "last bits");
@@ -210,10 +211,10 @@ static void test_long_sequences(void **state)
 	(void)state;
 	uint64_t seed = stats_seed("long sequences"), same = 0;
 	for (uint64_t i = 0; i < 1000; i++) {
-		double u[SAMPLER_BLOCK], v[SAMPLER_BLOCK];
+		double u[SAMPLER_BLOCK_SIZE], v[SAMPLER_BLOCK_SIZE];
 		draw(seed, 1, 2, i, SIDE_CAMERA, 1, u);
 		draw(seed, 1, 2, i + (UINT64_C(1) << 32), SIDE_CAMERA, 1, v);
-		for (int d = 0; d < SAMPLER_BLOCK; d++)
+		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++)
 			same += fabs(u[d] - v[d]) < 0x1p-20;
 	}
 	assert_true(same < 4);
@@ -224,16 +225,16 @@ static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[
 			enum sampler_side side)
 {
 	uint64_t seed = stats_seed(what);
-	static uint64_t count[SAMPLER_BLOCK][CELLS * CELLS];
+	static uint64_t count[SAMPLER_BLOCK_SIZE][CELLS * CELLS];
 	memset(count, 0, sizeof count);
 	for (uint64_t n = 0; n < TRIALS; n++) {
-		double u[SAMPLER_BLOCK], v[SAMPLER_BLOCK];
+		double u[SAMPLER_BLOCK_SIZE], v[SAMPLER_BLOCK_SIZE];
 		draw(seed + n, a[0], a[1], 3, SIDE_CAMERA, 1, u);
 		draw(seed + n, b[0], b[1], 3, side, vertex, v);
-		for (int d = 0; d < SAMPLER_BLOCK; d++)
+		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++)
 			count[d][cell_of(u[d]) * CELLS + cell_of(v[d])]++;
 	}
-	for (int d = 0; d < SAMPLER_BLOCK; d++)
+	for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++)
 		check_uniform(count[d], CELLS * CELLS, TRIALS, what);
 }
 
@@ -248,7 +249,7 @@ static void test_independence(void **state)
 	check_pairs("sides", (const uint64_t[]){7, 0}, (const uint64_t[]){7, 0}, 1, SIDE_LIGHT);
 	uint64_t seed = stats_seed("halves"), count[CELLS * CELLS] = {0};
 	for (uint64_t n = 0; n < TRIALS; n++) {
-		double u[SAMPLER_BLOCK];
+		double u[SAMPLER_BLOCK_SIZE];
 		draw(seed, n, 0, 3, SIDE_CAMERA, 1, u);
 		count[cell_of(u[1]) * CELLS + cell_of(u[5])]++;
 	}
@@ -256,7 +257,7 @@ static void test_independence(void **state)
 }
 
 /* A smooth term, a corner, and a term that joins two halves; the mean is known: 1 + 0.6^2 / 2 + 0. */
-static double integrand(const double u[SAMPLER_BLOCK])
+static double integrand(const double u[SAMPLER_BLOCK_SIZE])
 {
 	double smooth = (0.5 + u[0]) * (0.5 + u[1]) * (0.5 + u[2]) * (0.5 + u[5]), corner = u[4] + u[5] < 0.6;
 	return smooth + corner + (u[0] - 0.5) * (u[4] - 0.5);
@@ -275,7 +276,7 @@ static void test_means(void **state)
 	for (uint64_t r = 0; r < REPLICATES; r++) {
 		double sum = 0;
 		for (uint64_t i = 0; i < SAMPLES; i++) {
-			double u[SAMPLER_BLOCK];
+			double u[SAMPLER_BLOCK_SIZE];
 			draw(seed, 3, r, i, SIDE_CAMERA, 2, u);
 			double f = integrand(u);
 			sum += f / SAMPLES;

@@ -30,8 +30,8 @@ static void connect_to(struct path_context *c, unsigned t, const struct path_ver
 	path_direction(z, y, &distance2);
 	if (!(distance2 > 0))
 		return;
-	bool open = path_visible(c, z, y);
-	bool through = path_see_through(c, t > 1 ? z - 1 : NULL, z, y, &left);
+	bool open = path_is_visible(c, z, y);
+	bool through = path_trace_passed(c, t > 1 ? z - 1 : NULL, z, y, &left);
 	if (open)
 		assert_false(through);
 	*(open ? &sum->open : through ? &sum->passed : &sum->blocked) += 1;
@@ -46,7 +46,7 @@ static void test_far_end(void **state)
 	static struct path_context c;
 	struct tally sum = {0};
 	/* clang-format off */
-	struct world *w = world_of_text(32, 32, "%s",
+	struct world *w = world_from_text(32, 32, "%s",
 		SENSOR("0,1,5", "0,0,0")
 		"<bsdf type='mask' id='half'><float name='opacity' value='.5'/><bsdf type='twosided'><bsdf type='diffuse'/></bsdf>"
 			"</bsdf>"
@@ -64,7 +64,7 @@ static void test_far_end(void **state)
 	/* clang-format on */
 	c = (struct path_context){
 		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = 4, .counters = counters};
-	assert_true(path_sees_through(&c));
+	assert_true(path_allows_see_through(&c));
 	for (uint64_t i = 0; i < 16384; i++) {
 		struct sampler_random s;
 		struct path_vertex y;
@@ -74,7 +74,7 @@ static void test_far_end(void **state)
 		for (unsigned t = 2; t <= camera; t++) {
 			if (c.camera[t - 1].kind != VERTEX_SURFACE || !path_scatters_smoothly(&c.camera[t - 1]))
 				continue;
-			if (path_next_event(&c, &c.camera[t - 1], &y, &pdf))
+			if (path_draw_next_event(&c, &c.camera[t - 1], &y, &pdf))
 				connect_to(&c, t, &y, &sum);
 			for (unsigned k = 2; k <= light; k++)
 				connect_to(&c, t, &c.light[k - 1], &sum);

@@ -2,9 +2,9 @@
 /*
  * Shading normals that relief tilts away from the camera: seen from the camera, the surface must scatter like one
  * whose normal map is mirrored in x and y, and sampling from the light must not use such normals. Checked against
- * worlds with the mirrored map, and by comparing integrators (tests/support/agree.h).
+ * worlds with the mirrored map, and by comparing integrators (tests/support/agreement.h).
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -36,16 +36,16 @@ static struct world *world_of(const char *shape, const char *color, bool flip, c
 		 flip ? "true" : "false", inner);
 	const struct memory_file files[] = {
 		{"s.xml", xml, strlen(xml)}, {"m.obj", mesh, sizeof mesh - 1}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 static struct path_vertex vertex_on(const struct world *w, uint64_t i)
 {
 	double u[4];
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
-	struct path_vertex v = {.kind = VERTEX_SURFACE, .emitter = -1, .bsdf = &w->bsdfs[w->parts[0].bsdf]};
+	struct path_vertex v = {.kind = VERTEX_SURFACE, .emitter = -1, .bsdf = &w->bsdfs[w->shape_bindings[0].bsdf]};
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, direction_of_square(u), &v.x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, sphere_from_square(u), &v.x);
 	else
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, u[0] * (1 - u[1]), u[1] * u[0], &v.x);
 	return v;
@@ -97,13 +97,13 @@ static void check(const char *shape, const char *inner, bool turns)
 	for (uint64_t k = 0; k < POINTS; k++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, k, 0, 0, u);
-		vec3 o = direction_of_square(u), i = direction_of_square(u + 2);
+		vec3 o = sphere_from_square(u), i = sphere_from_square(u + 2);
 		struct path_vertex v = vertex_on(w, k), p = vertex_on(plain, k), q = vertex_on(other, k);
 		bool away = !right_side(&p, o) && right_side(&q, o);
 		struct seen got = scattering_seen(w, &v, o, i), as_it_is = scattering_seen(plain, &p, o, i),
 			    turned = scattering_seen(other, &q, o, i);
 		struct surface_point room;
-		assert_true((path_facing(&v, o, &room) == &room) == (away && turns));
+		assert_true((path_point_facing_camera(&v, o, &room) == &room) == (away && turns));
 		if (!(away && turns)) {
 			assert_true(got.f == as_it_is.f && got.to_light == as_it_is.to_light &&
 				    got.to_camera == as_it_is.to_camera);
@@ -155,8 +155,8 @@ static void test_dialects(void **state)
 		int n = snprintf(xml, sizeof xml, "<scene version='%s'>", cases[k].version);
 		snprintf(xml + n, sizeof xml - (size_t)n, inside, cases[k].param);
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
-		struct world *w = world_of_files(8, 8, files);
-		assert_true(w->shapes[0].relief->turns == cases[k].turns);
+		struct world *w = world_from_files(8, 8, files);
+		assert_true(w->shapes[0].relief->flips_invalid_normals == cases[k].turns);
 		world_free(w);
 	}
 }
@@ -180,11 +180,11 @@ static const char room[] =
 static void test_integrators_agree(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(32, 32, "%s", room);
-	static struct agree_image path, other;
-	agree_render(w, __func__, "path", &(struct agree_side){"path", 2560, 32, 0, 0}, &path);
-	agree_render(w, __func__, "bdpt", &(struct agree_side){"bdpt", 2048, 32, 0, 0}, &other);
-	agree_check(__func__, &other, &path);
+	struct world *w = world_from_text(32, 32, "%s", room);
+	static struct agreement_image path, other;
+	agreement_render(w, __func__, "path", &(struct agreement_options){"path", 2560, 32, 0, 0}, &path);
+	agreement_render(w, __func__, "bdpt", &(struct agreement_options){"bdpt", 2048, 32, 0, 0}, &other);
+	agreement_check(__func__, &other, &path);
 	world_free(w);
 }
 

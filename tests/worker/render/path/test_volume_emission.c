@@ -3,10 +3,10 @@
  * Emitting media. Layers and balls whose radiance is known in closed form; furnaces, in which a medium emits sigma_a
  * L and everything around it emits L, so that the medium is invisible, whatever its coefficients, shape, boundary and
  * grid (Kirchhoff's law); and a ball that scatters, against a random walk written for this test. By all integrators
- * that find such light. Statistics as in tests/support/agree.h.
+ * that find such light. Statistics as in tests/support/agreement.h.
  */
-#include "tests/support/agree.h"
-#include "tests/support/length.h"
+#include "tests/support/agreement.h"
+#include "tests/support/test_length.h"
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/vol.h"
@@ -34,10 +34,10 @@ static double sum3(const double v[3])
 }
 
 /* Cells that have the same value in every sample have no variance to test with. */
-static void forgive_rounding(struct agree_image *image, double expected)
+static void forgive_rounding(struct agreement_image *image, double expected)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			if (fabs(image->mean[g][c] / expected - 1) < 1e-5)
 				image->mean[g][c] = expected;
 }
@@ -56,23 +56,23 @@ static uint64_t spp_of(size_t i, struct effort e)
 	static const uint64_t most[INTEGRATORS] = {UINT64_MAX, LONGER, LONG, LONG, LONG};
 	if (i >= 2 && !e.all)
 		return 0;
-	return e.spp < most[i] ? e.spp : test_full() ? 3 * e.spp / 2 : 0;
+	return e.spp < most[i] ? e.spp : test_is_full() ? 3 * e.spp / 2 : 0;
 }
 
 /* Expects X + Y + Z = `sum` in every block of the image, from paths of at least `least` edges. Takes ownership of the
  * world. */
 static void expect_sum(const char *name, struct world *w, uint32_t least, double sum, struct effort e)
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	for (size_t i = 0; i < INTEGRATORS; i++) {
 		char test[96];
-		const struct agree_side side = {integrators[i], spp_of(i, e), GROUPS, least, 0};
+		const struct agreement_options side = {integrators[i], spp_of(i, e), GROUPS, least, 0};
 		if (!side.spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
-		agree_render(w, test, integrators[i], &side, &image);
+		agreement_render(w, test, integrators[i], &side, &image);
 		forgive_rounding(&image, sum);
-		agree_expect(test, &image, sum);
+		agreement_check_constant(test, &image, sum);
 	}
 	world_free(w);
 }
@@ -110,7 +110,7 @@ static void test_layer(void **state)
 	const struct effort e = {16, false};
 	double left = exp(-0.6 * 2);
 	expect("absorbing layer",
-	       world_of_text(
+	       world_from_text(
 		       SIDE, SIDE,
 		       DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(
 			       "<medium type='homogeneous' name='interior'><float name='sigma_t' value='0.3'/>"
@@ -118,34 +118,34 @@ static void test_layer(void **state)
 				       SHINES("0.4"))),
 	       0.4 / 0.6 * (1 - left) + 0.7 * left, e);
 	expect("clear layer",
-	       world_of_text(SIDE, SIDE,
-			     DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
+	       world_from_text(SIDE, SIDE,
+			       DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
 	       0.4 * 2 + 0.7, e);
 	expect("clear layer and nothing else",
-	       world_of_text(SIDE, SIDE,
-			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
+	       world_from_text(SIDE, SIDE,
+			       DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
 	       0.4 * 2, e);
 	/* The camera's near plane lies in the middle of the layer. */
 	left = exp(-1);
 	expect("inside of a layer",
-	       world_of_text(SIDE, SIDE,
-			     DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
-				     SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
+	       world_from_text(SIDE, SIDE,
+			       DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
+				       SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
 	       0.4 * (1 - left) + 0.7 * left, e);
 	/* One edge: the unscattered part of the light of a layer that scatters. */
 	left = exp(-2 * 1.5);
 	expect("one edge in a layer that scatters",
-	       world_of_text(SIDE, SIDE,
-			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
+	       world_from_text(SIDE, SIDE,
+			       DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
 	       0.4 / 1.5 * (1 - left), (struct effort){1024, true});
 	/* A layer that does not scatter contributes nothing to paths of two edges or more. */
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE, DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4")));
-	static struct agree_image image;
-	const struct agree_side side = {"bdpt", 16, GROUPS, 2, 0};
-	agree_render(w, "no second edge", "bdpt", &side, &image);
+	static struct agreement_image image;
+	const struct agreement_options side = {"bdpt", 16, GROUPS, 2, 0};
+	agreement_render(w, "no second edge", "bdpt", &side, &image);
 	for (uint32_t g = 0; g < GROUPS; g++)
-		assert_true(image.mean[g][AGREE_CELLS] == 0);
+		assert_true(image.mean[g][AGREEMENT_CELLS] == 0);
 	world_free(w);
 }
 
@@ -196,9 +196,9 @@ static void test_furnace(void **state)
 		 {4096, false}},
 	};
 	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
-		expect(balls[i].name, world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL("%s"), balls[i].inner), 0.7,
+		expect(balls[i].name, world_from_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL("%s"), balls[i].inner), 0.7,
 		       balls[i].e);
-	expect("room in fog", world_of_text(SIDE, SIDE, ROOM FOG_BALL SMOKE_CUBE GLASS_BALL), 0.7,
+	expect("room in fog", world_from_text(SIDE, SIDE, ROOM FOG_BALL SMOKE_CUBE GLASS_BALL), 0.7,
 	       (struct effort){5760, false});
 }
 
@@ -207,15 +207,15 @@ static void test_furnace(void **state)
 static void test_chains(void **state)
 {
 	(void)state;
-	static struct agree_image chains, sky;
+	static struct agreement_image chains, sky;
 	struct world *w =
-		world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL(NULL_FACES FOG("2", "0.3") SHINES("0.98")));
-	const struct agree_side side = {"pssmlt", 2048, GROUPS, 0, 0}, alone = {"path", 16, GROUPS, 0, 0};
-	agree_render(w, "fog", "pssmlt", &side, &chains);
+		world_from_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL(NULL_FACES FOG("2", "0.3") SHINES("0.98")));
+	const struct agreement_options side = {"pssmlt", 2048, GROUPS, 0, 0}, alone = {"path", 16, GROUPS, 0, 0};
+	agreement_render(w, "fog", "pssmlt", &side, &chains);
 	world_free(w);
-	w = world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY);
-	agree_render(w, "fog", "sky", &alone, &sky);
-	assert_true(fabs(agree_within_errors("fog, pssmlt", &chains, &sky)) < 0.01);
+	w = world_from_text(SIDE, SIDE, DEPTH("64") VIEW SKY);
+	agreement_render(w, "fog", "sky", &alone, &sky);
+	assert_true(fabs(agreement_check_any_power("fog, pssmlt", &chains, &sky)) < 0.01);
 	world_free(w);
 }
 
@@ -238,7 +238,7 @@ static struct world *in_files(const char *xml, const struct vol *extinction, con
 					    {"t.vol", extinction->bytes, extinction->size},
 					    {"l.vol", light->bytes, light->size},
 					    {NULL, NULL, 0}};
-	return world_of_files(SIDE, SIDE, files);
+	return world_from_files(SIDE, SIDE, files);
 }
 
 /* Makes a grid of extinction, and one of emission that has its values times `factor`. */
@@ -328,18 +328,18 @@ static void test_grid_layer(void **state)
 /* Expects the image of the sky alone. */
 static void expect_unseen(const char *name, struct world *w, struct world *sky, struct effort e)
 {
-	static struct agree_image image, of_sky;
-	const struct agree_side alone = {"path", 4096, GROUPS, 0, 0};
+	static struct agreement_image image, of_sky;
+	const struct agreement_options alone = {"path", 4096, GROUPS, 0, 0};
 	assert_true(w->effects.colour && sky->effects.colour);
-	agree_render(sky, name, "sky", &alone, &of_sky);
+	agreement_render(sky, name, "sky", &alone, &of_sky);
 	for (size_t i = 0; i < INTEGRATORS; i++) {
 		char test[96];
-		const struct agree_side side = {integrators[i], spp_of(i, e), GROUPS, 0, 0};
+		const struct agreement_options side = {integrators[i], spp_of(i, e), GROUPS, 0, 0};
 		if (!side.spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
-		agree_render(w, test, integrators[i], &side, &image);
-		agree_check(test, &image, &of_sky);
+		agreement_render(w, test, integrators[i], &side, &image);
+		agreement_check(test, &image, &of_sky);
 	}
 	world_free(w);
 	world_free(sky);
@@ -366,20 +366,20 @@ static void test_colours(void **state)
 	};
 	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
 		expect_unseen(balls[i].name,
-			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
-			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
+			      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
+			      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
 	/* In dispersive glass: half of sigma_t times the squared index at each wavelength. */
 	char light_in_glass[4096], *to = light_in_glass;
 	for (int nm = 360; nm <= 830; nm += 5) {
 		double sigma_t = nm <= 595 ? 1 + (nm - 360) / 235.0 : 2 + 2 * (nm - 595) / 235.0,
-		       index = 1.5 + 0.02e6 * (1 / ((double)nm * nm) - 1 / (IOR_NM * IOR_NM));
+		       index = 1.5 + 0.02e6 * (1 / ((double)nm * nm) - 1 / (IOR_REFERENCE_NM * IOR_REFERENCE_NM));
 		to += sprintf(to, "%s%d:%.9g", nm == 360 ? "" : ",", nm, 0.5 * sigma_t * index * index);
 	}
 #define PRISM GLASS("dielectric", "<float name='int_cauchy_b' value='0.02'/>")
 	expect_unseen("coloured fog in glass that disperses",
-		      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT,
-				    light_in_glass),
-		      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), (struct effort){16384, false});
+		      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT,
+				      light_in_glass),
+		      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), (struct effort){16384, false});
 	/* R, G and B on a grid. */
 	static struct vol extinction, light;
 	static const char fog[] = "<scene version='3.0.0'>" DEPTH("64") VIEW
@@ -405,7 +405,7 @@ static double random_walk(struct dice *d, double y, double sigma, double albedo)
 	double weight = 1, sum = 0;
 	for (;;) {
 		double along = vec3_dot(at, w), end = -along + sqrt(fmax(along * along - vec3_dot(at, at) + 1, 0)),
-		       free = -log1p(-dice_throw(d)) / sigma;
+		       free = -log1p(-dice_uniform(d)) / sigma;
 		sum += weight * -expm1(-sigma * end) / sigma; /* expected value of the last step, up to the surface */
 		if (free >= end)
 			return sum;
@@ -419,13 +419,13 @@ static void test_ball(void **state)
 {
 	(void)state;
 	enum { WALKS = 1 << 21 };
-	static struct agree_image image;
+	static struct agreement_image image;
 	const double y = 0.4, sigma = 3, albedo = 0.85;
-	struct dice d = dice_of("test_volume_emission, ball");
+	struct dice d = dice_for_test("test_volume_emission, ball");
 	double sums[GROUPS] = {0};
-	static struct agree_image walked;
+	static struct agreement_image walked;
 	walked.groups = GROUPS;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE,
 		DEPTH("128") "<sensor type='orthographic'><float name='far_clip' value='9'/><transform name='to_world'>"
 			     "<scale x='0.0001' y='0.0001'/><lookat origin='0,0.4,4' target='0,0.4,0' up='0,1,0'/></transform>"
@@ -434,14 +434,14 @@ static void test_ball(void **state)
 	for (int i = 0; i < WALKS; i++)
 		sums[i % GROUPS] += random_walk(&d, y, sigma, albedo);
 	for (int g = 0; g < GROUPS; g++)
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			walked.mean[g][c] = sums[g] / (WALKS / GROUPS) * sum3(w->grey_xyz);
 	for (size_t i = 0; i < 2; i++) {
 		char test[64];
-		const struct agree_side side = {integrators[i], 13312, GROUPS, 0, 0};
+		const struct agreement_options side = {integrators[i], 13312, GROUPS, 0, 0};
 		snprintf(test, sizeof test, "ball that scatters, %s", integrators[i]);
-		agree_render(w, test, integrators[i], &side, &image);
-		agree_check(test, &image, &walked);
+		agreement_render(w, test, integrators[i], &side, &image);
+		agreement_check(test, &image, &walked);
 	}
 	world_free(w);
 }
@@ -451,35 +451,36 @@ static void test_ball(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must be inside a shape");
-	world_refused(BALL(SHINES("1")), "\"volumelight\" must be inside a shape with an interior medium");
-	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")),
-		      "a shape with an interior medium");
-	world_refused(BALL(FOG("1", "0") SHINES("1")) BALL("<ref name='interior' id='fog'/>" SHINES("2")),
-		      "a medium may have only one \"volumelight\"");
-	world_refused(BALL(FOG("1", "0") SHINES("-1")), "radiance");
-	world_refused(BALL(FOG("1", "0") "<emitter type='volumelight'><texture name='radiance' type='checkerboard'/>"
-					 "</emitter>"),
-		      "`radiance` may be a volume, but not a texture");
-	world_refused(BALL("<emitter type='area'><volume name='radiance' type='constvolume'/></emitter>"),
-		      "`radiance` may be a texture, but not a volume");
+	world_check_refused("<emitter type='volumelight'/>", "\"volumelight\" must be inside a shape");
+	world_check_refused(BALL(SHINES("1")), "\"volumelight\" must be inside a shape with an interior medium");
+	world_check_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")),
+			    "a shape with an interior medium");
+	world_check_refused(BALL(FOG("1", "0") SHINES("1")) BALL("<ref name='interior' id='fog'/>" SHINES("2")),
+			    "a medium may have only one \"volumelight\"");
+	world_check_refused(BALL(FOG("1", "0") SHINES("-1")), "radiance");
+	world_check_refused(
+		BALL(FOG("1", "0") "<emitter type='volumelight'><texture name='radiance' type='checkerboard'/>"
+				   "</emitter>"),
+		"`radiance` may be a volume, but not a texture");
+	world_check_refused(BALL("<emitter type='area'><volume name='radiance' type='constvolume'/></emitter>"),
+			    "`radiance` may be a texture, but not a volume");
 }
 
 /* Two shapes with one medium refer to the same emitter, and so does the medium around the camera. */
 static void test_shared(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE,
 		VIEW BALL("<medium type='homogeneous' name='interior' id='fog'/><emitter type='volumelight' id='l'>"
 			  "<float name='radiance' value='3'/></emitter>")
 			BALL("<ref name='interior' id='fog'/><ref id='l'/><point name='center' x='5'/>"));
-	assert_true(w->media_count == 1 && w->media[0].shines && w->emitter_count == 0);
+	assert_true(w->media_count == 1 && w->media[0].is_emissive && w->emitter_count == 0);
 	assert_true(w->effects.medium_light && w->effects.scattering && w->effects.max_depth == 128);
 	assert_true(fabs(w->media[0].emission.per_length * w->scale - 1) < 1e-15);
 	struct render_summary summary;
 	world_summary(w, &summary);
-	assert_true(summary.brightest > 0);
+	assert_true(summary.brightness_bound > 0);
 	world_free(w);
 }
 
@@ -487,7 +488,7 @@ static void test_shared(void **state)
 static void test_integrators_that_miss_it(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES SHINES("1")));
+	struct world *w = world_from_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES SHINES("1")));
 	struct render_summary summary;
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++) {
@@ -503,9 +504,9 @@ static void test_integrators_that_miss_it(void **state)
 	}
 	world_free(w);
 	worlds_effects = "-medium-light";
-	w = world_of_text(SIDE, SIDE, VIEW SKY BALL(FOG("1", "0") NULL_FACES SHINES("1")));
+	w = world_from_text(SIDE, SIDE, VIEW SKY BALL(FOG("1", "0") NULL_FACES SHINES("1")));
 	worlds_effects = NULL;
-	assert_true(!w->effects.medium_light && !w->effects.scattering && !w->media[0].shines);
+	assert_true(!w->effects.medium_light && !w->effects.scattering && !w->media[0].is_emissive);
 	world_free(w);
 }
 
@@ -516,15 +517,15 @@ static void test_dispersed(void **state)
 	static struct path_context c;
 	static uint64_t counters[BATCH_COUNTERS];
 	const struct plan p = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE, .max_depth = 8};
-	struct world *w = world_of_text(SIDE, SIDE, VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT, FLAT);
+	struct world *w = world_from_text(SIDE, SIDE, VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT, FLAT);
 	unsigned met = 0;
-	path_context_for_samples(&c, w, &p, counters);
+	path_context_init_for_samples(&c, w, &p, counters);
 	for (uint64_t i = 0; i < 64; i++) {
 		struct sampler_random s;
 		double film[2];
 		sampler_random_init(&s, 5, RNG_TEST, i, 0);
 		path_walk_camera(&c, &s.base, 8, film);
-		bool glass = c.camera[1].kind == VERTEX_SURFACE && path_disperses(&c.camera[1]);
+		bool glass = c.camera[1].kind == VERTEX_SURFACE && path_vertex_disperses(&c.camera[1]);
 		c.emission_edges = 2;
 		c.emission[1] = (spectrum){{1, 2, 3, 4}};
 		c.emission[2] = (spectrum){{5, 6, 7, 8}};

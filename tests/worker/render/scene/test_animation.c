@@ -68,9 +68,9 @@ static void test_animations(void **state)
 	assert_true(m.m[0][3] == 4 && s.note_count == 0);
 	assert_non_null(a);
 	assert_int_equal(a->count, 2);
-	assert_true(a->key[0].time == -0.5 && a->key[1].time == 1 && a->key[1].place.m[0][3] == 5);
-	assert_false(node_same(s.objects[0], s.objects[1]));
-	assert_true(node_same(s.objects[0], s.objects[2]));
+	assert_true(a->key[0].time == -0.5 && a->key[1].time == 1 && a->key[1].transform.m[0][3] == 5);
+	assert_false(node_equals(s.objects[0], s.objects[1]));
+	assert_true(node_equals(s.objects[0], s.objects[2]));
 	scene_fini(&s);
 
 	struct error e;

@@ -401,7 +401,7 @@ static void test_media(void **state)
 	if (scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e))
 		fail_msg("%s", e.text);
 	const struct scene_node *tea = node_ref(s.objects[1], "interior");
-	assert_true(tea && tea->cls == PLUGIN_MEDIUM && node_find(tea, "sigma_a"));
+	assert_true(tea && tea->cls == PLUGIN_MEDIUM && node_find_property(tea, "sigma_a"));
 	assert_string_equal(node_child(tea, PLUGIN_PHASE, 0)->type, "hg");
 	assert_null(node_ref(s.objects[1], "exterior"));
 	assert_ptr_equal(node_child(scene_sensor(&s, 1), PLUGIN_MEDIUM, 0), tea);

@@ -21,7 +21,7 @@ static void test_are_read(void **state)
 {
 	(void)state;
 	static const char *const scenes[] = {"blender-0.5.xml", "blender-3.xml", "rhino.xml", "maya.xml"};
-	struct asset_source assets = asset_folder("tests/scenes/exporters");
+	struct asset_source assets = asset_source_for_folder("tests/scenes/exporters");
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		struct scene s;
 		struct error e;

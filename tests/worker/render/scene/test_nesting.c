@@ -5,8 +5,8 @@
  * limits count while reading, without following a reference twice.
  */
 #include "common/base/mem.h"
-#include "tests/support/append.h"
-#include "tests/support/length.h"
+#include "tests/support/append_format.h"
+#include "tests/support/test_length.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 
@@ -20,7 +20,7 @@
 static char xml[8 << 20];
 static size_t used;
 
-#define put(...) append(xml, sizeof xml, &used, __VA_ARGS__)
+#define put(...) append_format(xml, sizeof xml, &used, __VA_ARGS__)
 
 static int read_files(const struct memory_file *files, struct error *e)
 {
@@ -134,7 +134,7 @@ static void test_chains(void **state)
 		nest_elements(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
 		put("</scene>");
 		expect(sentence);
-		nest_elements(all[i].element, all[i].type, all[i].leaf, test_scaled() ? 10000 : 60000, 1, "");
+		nest_elements(all[i].element, all[i].type, all[i].leaf, test_is_scaled() ? 10000 : 60000, 1, "");
 		put("</scene>");
 		expect(sentence);
 	}

@@ -58,7 +58,7 @@ static void test_same_objects(void **state)
 		struct asset_source assets = memory_assets(pictures);
 		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 			fail_msg("%s", e.text);
-		if (node_same(s.objects[0], s.objects[1]) != all[i].same)
+		if (node_equals(s.objects[0], s.objects[1]) != all[i].same)
 			fail_msg("%s and %s", all[i].a, all[i].b);
 		scene_fini(&s);
 	}

@@ -201,7 +201,7 @@ static const struct scene_node *made_of(struct scene *s, const char *text)
 
 static bool is_rgb(const struct scene_node *n, const char *name, double r, double g, double b)
 {
-	const struct property *p = node_find(n, name);
+	const struct property *p = node_find_property(n, name);
 	const double want[] = {r, g, b};
 	for (int i = 0; p && i < 3; i++)
 		if (!(fabs(p->value.as.rgb[i] - want[i]) < 1e-4))

@@ -57,13 +57,13 @@ static void test_reflectances_are_scaled(void **state)
 	struct scene s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>",
 				  "s.xml:1: <bsdf type=\"diffuse\">: reflectance=2 is above 1: scaled by 0.495, as in "
 				  "Mitsuba");
-	const struct value *v = &node_find(s.objects[0], "reflectance")->value;
+	const struct value *v = &node_find_property(s.objects[0], "reflectance")->value;
 	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
 	scene_fini(&s);
 
 	s = read_old("<bsdf type='phong'><spectrum name='specularReflectance' value='400:0.5, 500:4, 700:1'/></bsdf>",
 		     "specularReflectance=4 is above 1: scaled by 0.2475");
-	v = &node_find(s.objects[0], "specular_reflectance")->value;
+	v = &node_find_property(s.objects[0], "specular_reflectance")->value;
 	assert_int_equal(v->as.spectrum.count, 3);
 	assert_true(near(v->as.spectrum.value[0], 0.12375) && near(v->as.spectrum.value[1], 0.99) &&
 		    near(v->as.spectrum.value[2], 0.2475) && v->as.spectrum.nm[1] == 500);
@@ -72,14 +72,14 @@ static void test_reflectances_are_scaled(void **state)
 	s = read_old("<bsdf type='difftrans'><spectrum name='transmittance' value='3'/></bsdf>", "scaled by 0.33");
 	scene_fini(&s);
 	s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='1 1 1'/></bsdf>", NULL);
-	assert_true(node_find(s.objects[0], "reflectance")->value.as.rgb[0] == 1);
+	assert_true(node_find_property(s.objects[0], "reflectance")->value.as.rgb[0] == 1);
 	scene_fini(&s);
 
 	refuses("3.0.0", "<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>", "outside [0, 1]");
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectance' value='-1 2 0.5'/></bsdf>", "outside [0, 1]");
 	s = read_old("<bsdf type='mask'><rgb name='opacity' value='2 1 0.5'/><bsdf type='diffuse'/></bsdf>",
 		     "opacity=2 is above 1: scaled by 0.495");
-	v = &node_find(s.objects[0], "opacity")->value;
+	v = &node_find_property(s.objects[0], "opacity")->value;
 	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
 	scene_fini(&s);
 	refuses("0.6.0",
@@ -112,8 +112,8 @@ static void test_clipped(void **state)
 			fail_msg("%s: %s", cases[i].bsdf, e.text);
 		assert_int_equal(s.note_count, cases[i].note != NULL);
 		assert_true(!cases[i].note || strstr(s.notes[0], cases[i].note));
-		const struct property *p = node_find(s.objects[0], "weight");
-		const struct value *v = &(p ? p : node_find(s.objects[0], "opacity"))->value;
+		const struct property *p = node_find_property(s.objects[0], "weight");
+		const struct value *v = &(p ? p : node_find_property(s.objects[0], "opacity"))->value;
 		double got = v->type == VALUE_RGB ? v->as.rgb[1] : v->as.number;
 		assert_true(got == cases[i].wanted);
 		scene_fini(&s);
@@ -150,12 +150,12 @@ static void test_newer_names(void **state)
 		snprintf(note, sizeof note, "`%s` is not a parameter of Mitsuba 0.6 and is ignored, as there",
 			 cases[i].written);
 		struct scene s = read_old(cases[i].content, cases[i].kept ? NULL : note);
-		assert_true((node_find(s.objects[0], cases[i].name) != NULL) == cases[i].kept);
+		assert_true((node_find_property(s.objects[0], cases[i].name) != NULL) == cases[i].kept);
 		scene_fini(&s);
 		struct error e;
 		if (read_scene(&s, "3.0.0", cases[i].content, &e))
 			fail_msg("%s: %s", cases[i].content, e.text);
-		assert_true(s.note_count == 0 && node_find(s.objects[0], cases[i].name));
+		assert_true(s.note_count == 0 && node_find_property(s.objects[0], cases[i].name));
 		scene_fini(&s);
 	}
 #undef BENT
@@ -206,11 +206,11 @@ static void test_metals_lose_their_signs(void **state)
 	struct scene s = read_old("<bsdf type='roughconductor'><rgb name='eta' value='-0.0485226, 4.14275, 4.66977'/>"
 				  "</bsdf>",
 				  "eta=-0.0485226 is below 0: its sign is ignored, as in Mitsuba");
-	const double *eta = node_find(s.objects[0], "eta")->value.as.rgb;
+	const double *eta = node_find_property(s.objects[0], "eta")->value.as.rgb;
 	assert_true(eta[0] == 0.0485226 && eta[1] == 4.14275 && eta[2] == 4.66977);
 	scene_fini(&s);
 	s = read_old("<bsdf type='conductor'><float name='k' value='-3'/></bsdf>", "k=-3 is below 0");
-	assert_true(node_find(s.objects[0], "k")->value.as.number == 3);
+	assert_true(node_find_property(s.objects[0], "k")->value.as.number == 3);
 	scene_fini(&s);
 	s = read_old("<bsdf type='conductor'><rgb name='k' value='3 2 0'/></bsdf>", NULL);
 	scene_fini(&s);

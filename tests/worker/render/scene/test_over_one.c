@@ -69,7 +69,7 @@ static void test_values(void **state)
 		snprintf(note, sizeof note, "s.xml:2: <bsdf type=\"diffuse\">: %s is above 1 and counts as 1 (lenient)",
 			 of[i].note);
 		assert_true(scene_has_note(&s, note));
-		const struct property *p = node_find(scene_named(&s, "b"), "reflectance");
+		const struct property *p = node_find_property(scene_find_object(&s, "b"), "reflectance");
 		double room[3];
 		const double *x = value_numbers(&p->value, room, &count);
 		for (uint32_t k = 0; k < count; k++)
@@ -78,7 +78,7 @@ static void test_values(void **state)
 	}
 	struct scene s =
 		read_leniently("3.0.0", "<bsdf type='principled' id='b'><float name='roughness' value='1.2'/></bsdf>");
-	assert_true(node_float(scene_named(&s, "b"), "roughness", 0) == 1);
+	assert_true(node_float(scene_find_object(&s, "b"), "roughness", 0) == 1);
 	scene_fini(&s);
 }
 
@@ -112,13 +112,13 @@ static void test_textures(void **state)
 			&s, "s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1 and counts as 1 (lenient)"));
 		assert_true(scene_has_note(
 			&s, "s.xml:3: <texture type=\"gridtexture\">: color1=3 is above 1 and counts as 1 (lenient)"));
-		const struct scene_node *bump = scene_named(&s, "b"),
+		const struct scene_node *bump = scene_find_object(&s, "b"),
 					*t = node_ref(node_child(bump, PLUGIN_BSDF, 0), "reflectance");
 		assert_true(node_float(t, "color0", 0) == 1);
-		const double *rgb = node_find(node_ref(t, "color1"), "color1")->value.as.rgb;
+		const double *rgb = node_find_property(node_ref(t, "color1"), "color1")->value.as.rgb;
 		assert_true(rgb[0] == 1 && rgb[1] == 0.25 && rgb[2] == 0);
 		assert_true(node_float(node_child(bump, PLUGIN_TEXTURE, 0), "color0", 0) == 2);
-		assert_true(node_float(node_ref(scene_named(&s, "p"), "exponent"), "color0", 0) == 2);
+		assert_true(node_float(node_ref(scene_find_object(&s, "p"), "exponent"), "color0", 0) == 2);
 		struct error e;
 		struct texture made;
 		struct arena a = {0};
@@ -154,9 +154,9 @@ static void test_materials_share_the_copy(void **state)
 		read_leniently("3.0.0", "<texture type='checkerboard' id='t'><float name='color0' value='2'/></texture>"
 					"<bsdf type='diffuse' id='b'><ref name='reflectance' id='t'/></bsdf>"
 					"<bsdf type='plastic' id='p'><ref name='diffuse_reflectance' id='t'/></bsdf>");
-	const struct scene_node *one = node_ref(scene_named(&s, "b"), "reflectance");
+	const struct scene_node *one = node_ref(scene_find_object(&s, "b"), "reflectance");
 	assert_true(node_float(one, "color0", 0) == 1);
-	assert_ptr_equal(one, node_ref(scene_named(&s, "p"), "diffuse_reflectance"));
+	assert_ptr_equal(one, node_ref(scene_find_object(&s, "p"), "diffuse_reflectance"));
 	scene_fini(&s);
 }
 
@@ -165,11 +165,11 @@ static void test_scaled_in_old_files(void **state)
 {
 	(void)state;
 	struct scene s = read_leniently("0.6.0", DIFFUSE("<float name='reflectance' value='2'/>"));
-	assert_true(node_float(scene_named(&s, "b"), "reflectance", 0) == 0.99);
+	assert_true(node_float(scene_find_object(&s, "b"), "reflectance", 0) == 0.99);
 	scene_fini(&s);
 	s = read_leniently("0.6.0", "<bsdf type='diffuse' id='b'><float name='reflectance' value='2'/>"
 				    "<boolean name='ensureEnergyConservation' value='false'/></bsdf>");
-	assert_true(node_float(scene_named(&s, "b"), "reflectance", 0) == 1);
+	assert_true(node_float(scene_find_object(&s, "b"), "reflectance", 0) == 1);
 	scene_fini(&s);
 }
 

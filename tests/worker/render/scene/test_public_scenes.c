@@ -62,14 +62,14 @@ static void check(const char *root, const struct expected *x)
 {
 	char folder[1024];
 	snprintf(folder, sizeof folder, "%s/%s", root, x->folder);
-	struct asset_source assets = asset_folder(folder);
+	struct asset_source assets = asset_source_for_folder(folder);
 	struct scene s;
 	struct error e;
 	if (scene_read(&s, &assets, x->file, render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
 	for (uint32_t i = 0; i < s.note_count; i++)
 		print_message("%s\n", s.notes[i]);
-	assert_int_equal(s.dialect_3, x->dialect_3);
+	assert_int_equal(s.is_dialect_3, x->dialect_3);
 	assert_int_equal(s.asset_count, x->assets);
 	assert_true(s.note_count >= x->notes_least);
 	check_shapes(&s, &assets, x);

@@ -47,7 +47,7 @@ static void test_a_file_is_a_raw_texture(void **state)
 		for (size_t t = 0; t < 3; t++) {
 			struct scene a = read_ok(versions[v], types[t], FILENAME("a/./n.png")),
 				     b = read_ok(versions[v], types[t], TEXTURE("a/n.png"));
-			assert_true(node_same(a.objects[0], b.objects[0]));
+			assert_true(node_equals(a.objects[0], b.objects[0]));
 			assert_non_null(node_child(a.objects[0], PLUGIN_TEXTURE, 0));
 			assert_int_equal(a.asset_count, 1);
 			assert_string_equal(a.assets[0], "a/n.png");

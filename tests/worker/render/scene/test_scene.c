@@ -49,7 +49,7 @@ static struct scene read_bsdf(const char *version, const char *content)
 
 static void assert_rgb(const struct scene *s, double r, double g, double b)
 {
-	const struct property *p = node_find(s->objects[0], "eta");
+	const struct property *p = node_find_property(s->objects[0], "eta");
 	assert_non_null(p);
 	assert_int_equal(p->value.type, VALUE_RGB);
 	const double want[3] = {r, g, b};
@@ -84,7 +84,8 @@ static void test_spectra(void **state)
 	(void)state;
 	struct scene s = read_bsdf("3.0.0", "<spectrum name='eta' value='400:0.5, 500:1.5 ,600:2e0'/>"
 					    "<spectrum name='k' value='0.25'/>");
-	const struct value *eta = &node_find(s.objects[0], "eta")->value, *k = &node_find(s.objects[0], "k")->value;
+	const struct value *eta = &node_find_property(s.objects[0], "eta")->value,
+			   *k = &node_find_property(s.objects[0], "k")->value;
 	assert_int_equal(eta->type, VALUE_SPECTRUM);
 	assert_int_equal(eta->as.spectrum.count, 3);
 	assert_true(eta->as.spectrum.nm[1] == 500 && eta->as.spectrum.value[2] == 2);
@@ -101,7 +102,7 @@ static void test_plain_values(void **state)
 				     "<boolean name='flipNormals' value='true'/>",
 				     "</shape>");
 	const struct scene_node *n = s.objects[0];
-	vec3 c = node_find(n, "center")->value.as.point;
+	vec3 c = node_find_property(n, "center")->value.as.point;
 	assert_true(c.x == 1 && c.y == 0 && c.z == -3);
 	assert_true(node_float(n, "radius", 0) == 2);
 	assert_true(node_bool(n, "flip_normals", false));
@@ -110,11 +111,11 @@ static void test_plain_values(void **state)
 	scene_fini(&s);
 	s = read_inside("3.0.0", "<shape type='sphere'>",
 			"<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>", "</shape>");
-	assert_true(node_find(s.objects[0], "center")->value.as.point.z == 3);
-	assert_int_equal(node_find(s.objects[0], "radius")->value.type, VALUE_FLOAT);
+	assert_true(node_find_property(s.objects[0], "center")->value.as.point.z == 3);
+	assert_int_equal(node_find_property(s.objects[0], "radius")->value.type, VALUE_FLOAT);
 	scene_fini(&s);
 	s = read_inside("3.0.0", "<shape type='sphere'>", "<point name='center' value='0.5'/>", "</shape>");
-	c = node_find(s.objects[0], "center")->value.as.point;
+	c = node_find_property(s.objects[0], "center")->value.as.point;
 	assert_true(c.x == 0.5 && c.y == 0.5 && c.z == 0.5);
 	scene_fini(&s);
 }
@@ -179,11 +180,11 @@ static void test_dialects(void **state)
 {
 	(void)state;
 	struct scene s = read_bsdf("0.5.0", "<float name='extEta' value='1'/>");
-	assert_false(s.dialect_3);
+	assert_false(s.is_dialect_3);
 	assert_true(node_float(s.objects[0], "ext_eta", 0) == 1);
 	scene_fini(&s);
 	s = read_bsdf("2.1.0", "<float name='ext_eta' value='1'/>");
-	assert_true(s.dialect_3);
+	assert_true(s.is_dialect_3);
 	scene_fini(&s);
 	/* 3.x does not know the old names. */
 	struct error e;
@@ -214,7 +215,7 @@ static void test_both_dialects(void **state)
 			 "<bsdf type='roughconductor'><float name='%s' value='3'/></bsdf></scene>",
 			 old ? "3.0.0" : "0.4.0", old ? "ext_eta" : "extEta");
 		struct scene s = read_ok(xml);
-		assert_true(s.dialect_3);
+		assert_true(s.is_dialect_3);
 		assert_int_equal(s.object_count, 3);
 		assert_true(node_float(s.objects[0], "ext_eta", 0) == 2);
 		assert_true(node_float(s.objects[2], "ext_eta", 0) == 3);
@@ -315,7 +316,7 @@ static void test_numbers_given_as_colours(void **state)
 					    "<rgb name='alpha' value='.25'/>", "<spectrum name='alpha' value='.25'/>"};
 	for (int i = 0; i < 3; i++) {
 		struct scene s = read_bsdf("3.0.0", given[i]);
-		assert_int_equal(node_find(s.objects[0], "alpha")->value.type, VALUE_FLOAT);
+		assert_int_equal(node_find_property(s.objects[0], "alpha")->value.type, VALUE_FLOAT);
 		assert_true(node_float(s.objects[0], "alpha", 0) == .25);
 		scene_fini(&s);
 	}
@@ -333,7 +334,7 @@ static void test_lenient_numbers(void **state)
 	assert_int_equal(read_with(&s, xml, NULL, 0, &e), -EINVAL);
 	struct asset_source assets = memory_assets(files);
 	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
-	assert_null(node_find(s.objects[0], "alpha"));
+	assert_null(node_find_property(s.objects[0], "alpha"));
 	assert_true(node_float(s.objects[0], "ext_eta", 0) == 2);
 	assert_int_equal(s.note_count, 1);
 	assert_non_null(
@@ -527,7 +528,7 @@ static void test_second_name(void **state)
 				 "type='checkerboard'/></bsdf><bsdf type='diffuse'>"
 				 "<rgb name='diffuseReflectance' value='0.1 0.2 0.3'/></bsdf></scene>");
 	assert_non_null(node_ref(s.objects[0], "reflectance"));
-	assert_true(node_find(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
+	assert_true(node_find_property(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
 	scene_fini(&s);
 	/* With a value and a texture, the texture counts in 0.6, in either order. */
 	s = read_ok(

@@ -484,17 +484,18 @@ static void test_no_sensor(void **state)
 	struct scene_settings s;
 	struct error e = {""};
 	assert_int_equal(read_scene("<scene version='3.0.0'/>", 0, 0, &s, &e), 0);
-	assert_true(s.unplaced && s.fov == 45 && s.width == 768 && s.height == 576);
+	assert_true(s.is_unplaced && s.fov == 45 && s.width == 768 && s.height == 576);
 	assert_string_equal(s.fov_axis, "x");
-	assert_int_equal(scene_settings_place(&s, "s.xml", (vec3){0, -1, 3}, (vec3){4, 1, 5}, &e), 0);
+	assert_int_equal(scene_settings_place_default_sensor(&s, "s.xml", (vec3){0, -1, 3}, (vec3){4, 1, 5}, &e), 0);
 	double distance = 2 / tan(M_PI / 8); /* the nearest side, 4 units wide, fills the image */
 	assert_true(fabs(s.to_world.m[2][3] - (3 - distance)) < 1e-12);
 	assert_true(s.to_world.m[0][3] == 2 && s.to_world.m[1][3] == 0);
 	assert_true(s.to_world.m[0][0] == 1 && s.to_world.m[1][1] == 1 && s.to_world.m[2][2] == 1);
 	assert_true(s.near_clip < distance && s.far_clip > distance + 2);
-	assert_int_equal(scene_settings_place(&s, "s.xml", (vec3){1, 1, 1}, (vec3){1, 1, 1}, &e), -EINVAL);
+	assert_int_equal(scene_settings_place_default_sensor(&s, "s.xml", (vec3){1, 1, 1}, (vec3){1, 1, 1}, &e),
+			 -EINVAL);
 	assert_non_null(strstr(e.text, "s.xml: has no <sensor>, and no shape to place one in front of; it looks like"));
-	assert_false(read_ok("", "").unplaced);
+	assert_false(read_ok("", "").is_unplaced);
 }
 
 static void test_refused(void **state)

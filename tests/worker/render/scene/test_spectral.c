@@ -31,7 +31,7 @@ static const struct value *eta_of(const char *version, const char *content)
 	struct asset_source assets = memory_assets(files);
 	if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
 		fail_msg("%s", e.text);
-	return &node_find(scene.objects[0], "eta")->value;
+	return &node_find_property(scene.objects[0], "eta")->value;
 }
 
 static double value_at(const struct value *v, double nm)
@@ -55,7 +55,7 @@ static void test_files(void **state)
 	scene_fini(&scene);
 	/* Parameters that name the same file share its values. */
 	v = eta_of("3.0.0", "<spectrum name='eta' filename='a.spd'/><spectrum name='k' filename='a.spd'/>");
-	assert_ptr_equal(v->as.spectrum.value, node_find(scene.objects[0], "k")->value.as.spectrum.value);
+	assert_ptr_equal(v->as.spectrum.value, node_find_property(scene.objects[0], "k")->value.as.spectrum.value);
 	scene_fini(&scene);
 	/* The file is found in the second folder and keeps this canonical name. */
 	v = eta_of("0.6.0", "<spectrum name='eta' filename='b.spd'/>");
@@ -160,7 +160,7 @@ static void test_references(void **state)
 		"<bsdf type='roughconductor'><spectrum name='k' type='uniform' id='k'><float name='value' value='3'/>"
 		"</spectrum><ref name='eta' id='k'/>");
 	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 2.5);
-	assert_true(node_find(scene.objects[1], "eta")->value.as.spectrum.value[0] == 3);
+	assert_true(node_find_property(scene.objects[1], "eta")->value.as.spectrum.value[0] == 3);
 	assert_int_equal(scene.object_count, 2);
 	scene_fini(&scene);
 }

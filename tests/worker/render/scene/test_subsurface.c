@@ -50,7 +50,7 @@ static void test_reflectance(void **state)
 	static const double albedos[] = {0.1, 0.5, 0.9, 0.99, 0.999}, etas[] = {1.1, 1.33, 1.5046};
 	for (size_t k = 0; k < sizeof etas / sizeof *etas; k++) {
 		/* base = r / (1 - inside + r inside) */
-		double inside = (1 - 0.5 / subsurface_base(0.5, etas[k])) / 0.5;
+		double inside = (1 - 0.5 / subsurface_base_reflectance(0.5, etas[k])) / 0.5;
 		assert_true(fabs(inside / diffuse_fresnel(etas[k]) - 1) < 0.05);
 		for (size_t i = 0; i < sizeof albedos / sizeof *albedos; i++) {
 			double there = integrated_dipole(albedos[i], inside),
@@ -66,13 +66,13 @@ static void test_base(void **state)
 {
 	(void)state;
 	for (double r = 0.05; r < 1; r += 0.1) {
-		double base = subsurface_base(r, 1.5), inside = (1 - 0.5 / subsurface_base(0.5, 1.5)) / 0.5,
-		       light = base, out = 0;
+		double base = subsurface_base_reflectance(r, 1.5),
+		       inside = (1 - 0.5 / subsurface_base_reflectance(0.5, 1.5)) / 0.5, light = base, out = 0;
 		for (int i = 0; i < 1000; i++, light *= inside * base)
 			out += (1 - inside) * light;
 		assert_true(fabs(out / r - 1) < 1e-9);
 	}
-	assert_true(subsurface_base(0, 1.5) == 0 && fabs(subsurface_base(1, 1.5) - 1) < 1e-15);
+	assert_true(subsurface_base_reflectance(0, 1.5) == 0 && fabs(subsurface_base_reflectance(1, 1.5) - 1) < 1e-15);
 }
 
 static struct scene read_leniently(const char *xml)
@@ -89,14 +89,14 @@ static struct scene read_leniently(const char *xml)
 /* Returns the colour of the BSDF of the i-th object. */
 static const double *base_colour(const struct scene *s, unsigned i)
 {
-	const struct property *p = node_find(node_child(s->objects[i], PLUGIN_BSDF, 0), "diffuse_reflectance");
+	const struct property *p = node_find_property(node_child(s->objects[i], PLUGIN_BSDF, 0), "diffuse_reflectance");
 	assert_non_null(p);
 	return p->value.as.rgb;
 }
 
 static void is_base(const double *rgb, int k, double albedo, double eta)
 {
-	double want = subsurface_base(subsurface_reflectance(albedo, eta), eta);
+	double want = subsurface_base_reflectance(subsurface_reflectance(albedo, eta), eta);
 	if (!(fabs(rgb[k] / want - 1) < 1e-12))
 		fail_msg("%d: %g, not %g", k, rgb[k], want);
 }
@@ -136,8 +136,8 @@ static void test_scene(void **state)
 	is_base(base_colour(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
 	/* The coefficients are incomplete, or the BSDF has no base: no stand-in. Other shapes that refer to the same
 	 * BSDF keep it unchanged. */
-	assert_null(node_find(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
-	assert_null(node_find(node_child(s.objects[8], PLUGIN_BSDF, 0), "diffuse_reflectance"));
+	assert_null(node_find_property(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
+	assert_null(node_find_property(node_child(s.objects[8], PLUGIN_BSDF, 0), "diffuse_reflectance"));
 	assert_string_equal(node_child(s.objects[6], PLUGIN_BSDF, 0)->type, "diffuse");
 	assert_true(node_float(node_child(s.objects[7], PLUGIN_BSDF, 0), "diffuse_reflectance", 1) == 0);
 	unsigned said = 0;

@@ -42,7 +42,7 @@ static void test_names(void **state)
 		{"quality", "vertex_quality 1"},
 	};
 	for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
-		struct attribute_groups g = attribute_groups_none("vertex_");
+		struct attribute_groups g = attribute_groups_make("vertex_");
 		char words[256], found[256] = "", *save;
 		snprintf(words, sizeof words, "%s", cases[c].properties);
 		for (char *w = strtok_r(words, " ", &save); w; w = strtok_r(NULL, " ", &save)) {
@@ -51,16 +51,16 @@ static void test_names(void **state)
 			assert_true(group < g.count && channel < ATTRIBUTE_CHANNELS_MAX);
 		}
 		for (uint32_t i = 0; i < g.count; i++) {
-			uint32_t n = attribute_group_channels(&g.of[i]);
+			uint32_t n = attribute_group_channel_count(&g.groups[i]);
 			size_t used = strlen(found);
 			if (n)
-				snprintf(found + used, sizeof found - used, "%s%s %u", used ? ", " : "", g.of[i].name,
-					 n);
+				snprintf(found + used, sizeof found - used, "%s%s %u", used ? ", " : "",
+					 g.groups[i].name, n);
 		}
 		if (strcmp(found, cases[c].groups) != 0)
 			fail_msg("%s: %s, not %s", cases[c].properties, found, cases[c].groups);
 	}
-	struct attribute_groups g = attribute_groups_none("face_");
+	struct attribute_groups g = attribute_groups_make("face_");
 	uint32_t group, channel;
 	for (int i = 0; i < ATTRIBUTE_GROUPS_MAX; i++) {
 		char name[32];
@@ -139,7 +139,7 @@ static void test_ply_values(void **state)
 			       *v = find(&b, "vertex_color"), *w = find(&b, "vertex_w");
 	assert_int_equal(b.g.mesh.triangle_count, 3);
 	assert_int_equal(b.g.mesh.attribute_count, 4);
-	assert_true(c->per_face && heat->per_face && !v->per_face && !w->per_face);
+	assert_true(c->is_per_face && heat->is_per_face && !v->is_per_face && !w->is_per_face);
 	assert_true(c->channels == 3 && heat->channels == 1 && v->channels == 3 && w->channels == 1);
 	for (int t = 0; t < 2; t++) {
 		assert_true(near(c->value[3 * t], srgb_to_linear(0.2)));
@@ -151,17 +151,17 @@ static void test_ply_values(void **state)
 	assert_true(v->value[3] == 2 && v->value[4] == -1 && v->value[6] == 0);
 	assert_true(w->value[0] == 1 && near(w->value[2], srgb_to_linear(0.2)));
 	/* A value that is not finite marks its own attribute as damaged, and no other. */
-	assert_true(v->damaged && heat->damaged && !c->damaged && !w->damaged);
-	assert_true(v->encoded && heat->encoded && !c->encoded && !w->encoded);
+	assert_true(v->has_invalid_value && heat->has_invalid_value && !c->has_invalid_value && !w->has_invalid_value);
+	assert_true(v->is_srgb && heat->is_srgb && !c->is_srgb && !w->is_srgb);
 	release(&b);
 
 	b = build("ply", "<boolean name='srgb' value='false'/>", text, sizeof text - 1);
 	assert_true(near(find(&b, "face_color")->value[0], 0.2) && find(&b, "vertex_color")->value[0] == 0.5F);
-	assert_false(find(&b, "vertex_color")->encoded);
+	assert_false(find(&b, "vertex_color")->is_srgb);
 	release(&b);
 	b = build("ply", "<boolean name='srgb' value='true'/>", text, sizeof text - 1);
 	assert_true(near(find(&b, "vertex_color")->value[0], srgb_to_linear(0.5)));
-	assert_false(find(&b, "vertex_color")->encoded);
+	assert_false(find(&b, "vertex_color")->is_srgb);
 	release(&b);
 }
 
@@ -193,14 +193,14 @@ static void test_serialized(void **state)
 	(void)state;
 	static struct mesh_file f;
 	for (int doubles = 0; doubles < 2; doubles++) {
-		mesh_file_serialized(&f, 4, doubles, 8, 1);
+		mesh_file_make_serialized(&f, 4, doubles, 8, 1);
 		struct built b = build("serialized", "", f.bytes, f.size);
 		const struct attribute *c = find(&b, "vertex_color");
-		assert_true(c->channels == 3 && !c->per_face && !c->encoded && !c->damaged);
+		assert_true(c->channels == 3 && !c->is_per_face && !c->is_srgb && !c->has_invalid_value);
 		for (int i = 0; i < 3 * SOLID_VERTICES; i++)
 			assert_true((double)c->value[i] == SOLID_COLOUR(i));
 		release(&b);
-		mesh_file_serialized(&f, 4, doubles, 3, 1);
+		mesh_file_make_serialized(&f, 4, doubles, 3, 1);
 		b = build("serialized", "", f.bytes, f.size);
 		assert_true(b.result == 0 && b.g.mesh.attribute_count == 0);
 		release(&b);
@@ -217,7 +217,7 @@ static void test_obj(void **state)
 		"v 0 0 0 1 0 0 # red\nv 1 0 0 0.2 0.4 0.02\nv 1 1 0 2 \\\n-0.5 1\nv 0 1 0 0 0 1 \n" FACES;
 	struct built b = build("obj", "", text, sizeof text - 1);
 	const struct attribute *c = find(&b, "vertex_color");
-	assert_true(c->channels == 3 && !c->per_face && !c->encoded && !c->damaged);
+	assert_true(c->channels == 3 && !c->is_per_face && !c->is_srgb && !c->has_invalid_value);
 	assert_int_equal(b.g.mesh.vertex_count, 6);
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
 		static const double at[4][3] = {{1, 0, 0}, {0.2, 0.4, 0.02}, {0, 0, 1}, {2, -0.5, 1}};
@@ -234,7 +234,7 @@ static void test_obj(void **state)
 
 	static const char damaged[] = "v 0 0 0 1 0 0\nv 1 0 0 1e300 0 0\nv 1 1 0 0 0 0\nf 1 2 3\n";
 	b = build("obj", "", damaged, sizeof damaged - 1);
-	assert_true(find(&b, "vertex_color")->damaged);
+	assert_true(find(&b, "vertex_color")->has_invalid_value);
 	release(&b);
 	static const char *const without[] = {
 		"v 0 0 0 1\nv 1 0 0 1\nv 1 1 0 1\nv 0 1 0 1\n" FACES,

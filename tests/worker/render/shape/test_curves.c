@@ -27,10 +27,11 @@ static struct built_shape build_curves(const char *type, const char *content, co
 		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
 		 type, content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
-	struct built_shape b = built_shape(files, scene_tables());
+	struct built_shape b = built_shape_make(files, scene_tables());
 	if (!b.result) {
-		assert_int_equal(b.g.kind, SHAPE_CURVE);
-		b.result = shape_curve_mesh(&b.g, b.scene.objects[0], &b.arena, &b.dropped, &b.error);
+		assert_int_equal(b.geometry.kind, SHAPE_CURVE);
+		b.result =
+			shape_curves_to_mesh(&b.geometry, b.scene.objects[0], &b.arena, &b.dropped_triangles, &b.error);
 	}
 	return b;
 }
@@ -52,7 +53,7 @@ static void chain_at(const double (*p)[4], int count, double x, vec3 *c, double 
 {
 	int i = (int)fmin(count - 2, floor(x * (count - 1)));
 	double t = x * (count - 1) - i;
-	*c = vec3_madd(vec3_scale(1 - t, mesh_load(p[i])), t, mesh_load(p[i + 1]));
+	*c = vec3_madd(vec3_scale(1 - t, vec3_load(p[i])), t, vec3_load(p[i + 1]));
 	*r = (1 - t) * p[i][3] + t * p[i + 1][3];
 }
 
@@ -68,7 +69,7 @@ static void spline_at(const double (*p)[4], int count, double x, vec3 *c, double
 			for (int k = 0; k < 4; k++)
 				d[j][k] = (1 - a) * d[j - 1][k] + a * d[j][k];
 		}
-	*c = mesh_load(d[3]);
+	*c = vec3_load(d[3]);
 	*r = d[3][3];
 }
 
@@ -110,9 +111,9 @@ static void check_surface(const char *type, curve_at *at, double inwards, uint32
 	uint32_t outside = 0;
 	print_points(text, sizeof text, 4);
 	struct built_shape b = built_ok(type, "", text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 q = mesh_load(m->position[i]), n = mesh_load(m->normal[i]);
+		vec3 q = vec3_load(m->position[i]), n = vec3_load(m->normal[i]);
 		double d = distance(at, points, POINTS, q);
 		if (d > SCALE - 1 + 2e-3)
 			fail_msg("%s: vertex %u is %g radii outside", type, i, d);
@@ -127,7 +128,7 @@ static void check_surface(const char *type, curve_at *at, double inwards, uint32
 		assert_true(m->uv[i][0] >= 0 && m->uv[i][0] <= 1 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1 + 1e-12);
 	}
 	assert_true(outside >= least);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void test_surfaces(void **state)
@@ -144,34 +145,36 @@ static void test_normals(void **state)
 	(void)state;
 	static const char text[] = "0 0 0 0.1\n1 0 0 0.2\n2 0 0 0.6\n3 1 0 0.7\n3 2 0 0.4\n3 3 1 0.1\n3 4 1 0.1\n";
 	struct built_shape b = built_ok("bsplinecurve", "", text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	uint32_t last = m->vertex_count - (TUBE_SIDES + 1), steep = 0;
 	double(*sum)[3] = calloc(m->vertex_count, sizeof *sum);
 	assert_non_null(sum);
 	for (uint32_t t = 0; t < m->triangle_count; t++)
 		for (int k = 0; k < 3; k++) {
-			vec3 a = built_corner(m, t, k), u = mesh_unit(vec3_sub(built_corner(m, t, (k + 1) % 3), a)),
-			     v = mesh_unit(vec3_sub(built_corner(m, t, (k + 2) % 3), a));
+			vec3 a = built_shape_corner(m, t, k),
+			     u = vec3_unit_or_zero(vec3_sub(built_shape_corner(m, t, (k + 1) % 3), a)),
+			     v = vec3_unit_or_zero(vec3_sub(built_shape_corner(m, t, (k + 2) % 3), a));
 			double *at = sum[m->index[t][k]];
-			mesh_store(at, vec3_madd(mesh_load(at), vec3_angle(u, v), mesh_unit(vec3_cross(u, v))));
+			vec3_store(at, vec3_madd(vec3_load(at), vec3_angle(u, v), vec3_unit_or_zero(vec3_cross(u, v))));
 		}
 	for (uint32_t i = TUBE_SIDES + 1; i < last; i++) {
 		uint32_t ring = i / (TUBE_SIDES + 1) * (TUBE_SIDES + 1);
-		vec3 n = mesh_load(sum[i]);
+		vec3 n = vec3_load(sum[i]);
 		if (i == ring || i == ring + TUBE_SIDES) /* the seam */
-			n = vec3_add(mesh_load(sum[ring]), mesh_load(sum[ring + TUBE_SIDES]));
-		double angle = vec3_angle(n, mesh_load(m->normal[i])) * 180 / pi;
+			n = vec3_add(vec3_load(sum[ring]), vec3_load(sum[ring + TUBE_SIDES]));
+		double angle = vec3_angle(n, vec3_load(m->normal[i])) * 180 / pi;
 		if (angle > 2.5)
 			fail_msg("vertex %u: its normal is off by %g degrees", i, angle);
 		vec3 middle = {0, 0, 0};
 		for (uint32_t k = 0; k < TUBE_SIDES; k++)
-			middle = vec3_madd(middle, 1.0 / TUBE_SIDES, mesh_load(m->position[ring + k]));
-		double lean = vec3_dot(mesh_unit(vec3_sub(mesh_load(m->position[i]), middle)), mesh_load(m->normal[i]));
+			middle = vec3_madd(middle, 1.0 / TUBE_SIDES, vec3_load(m->position[ring + k]));
+		double lean = vec3_dot(vec3_unit_or_zero(vec3_sub(vec3_load(m->position[i]), middle)),
+				       vec3_load(m->normal[i]));
 		steep += lean < 0.98;
 	}
 	assert_true(steep > 50); /* so that normals perpendicular to the axis would be wrong */
 	free(sum);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static bool near(double a, double b, double share)
@@ -184,28 +187,28 @@ static void test_areas_and_volumes(void **state)
 	(void)state;
 	/* A straight tube with open ends has exactly the right area. */
 	struct built_shape b = built_ok("bsplinecurve", "", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n4 0 0 0.5\n");
-	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 2, 1e-12));
-	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++)
-		assert_true(near(b.g.mesh.uv[i][1], (b.g.mesh.position[i][0] - 1) / 2, 1e-12) ||
-			    b.g.mesh.position[i][0] == 1);
-	built_shape_release(&b);
+	assert_true(near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 2, 1e-12));
+	for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++)
+		assert_true(near(b.geometry.mesh.uv[i][1], (b.geometry.mesh.position[i][0] - 1) / 2, 1e-12) ||
+			    b.geometry.mesh.position[i][0] == 1);
+	built_shape_fini(&b);
 	/* With round ends, it is closed and faces outwards. */
 	b = built_ok("linearcurve", "", "0 0 0 0.5\n0 0 3 0.5\n");
-	assert_true(near(built_volume(&b.g.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
-	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
-	built_shape_release(&b);
+	assert_true(near(built_shape_volume(&b.geometry.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
+	assert_true(near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
+	built_shape_fini(&b);
 	/* If one sphere is inside another, or a point is given twice, only the larger sphere remains, whichever comes
 	 * first. */
 	static const char *const spheres[] = {"0 0 0 1\n0.5 0 0 0.25\n", "0.5 0 0 0.25\n0 0 0 1\n",
 					      "0 0 0 1\n0 0 0 1\n", "0 0 0 0.5\n0 0 0 1\n", "0 0 0 1\n0 0 0 0.5\n"};
 	for (size_t i = 0; i < sizeof spheres / sizeof *spheres; i++) {
 		b = built_ok("linearcurve", "", spheres[i]);
-		for (uint32_t k = 0; k < b.g.mesh.vertex_count; k++)
-			assert_true(vec3_length(mesh_load(b.g.mesh.position[k])) <= SCALE * (1 + 1e-12));
-		double volume = built_volume(&b.g.mesh);
+		for (uint32_t k = 0; k < b.geometry.mesh.vertex_count; k++)
+			assert_true(vec3_length(vec3_load(b.geometry.mesh.position[k])) <= SCALE * (1 + 1e-12));
+		double volume = built_shape_volume(&b.geometry.mesh);
 		if (!(volume > 0.9 * 4 * pi / 3 && volume < 1.1 * 4 * pi / 3))
 			fail_msg("spheres %zu: a volume of %g", i, volume);
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 }
 
@@ -219,11 +222,11 @@ static void test_chain_of_spline(void **state)
 	static const char scene[] =
 		"<scene version='3.0.0'><shape type='bsplinecurve'><string name='filename' value='m'/></shape></scene>";
 	const struct memory_file files[] = {{"s.xml", scene, sizeof scene - 1}, {"m", text, strlen(text)}, {0}};
-	struct built_shape b = built_shape(files, scene_tables());
-	struct list chain = {.size = sizeof(struct chain_point)};
+	struct built_shape b = built_shape_make(files, scene_tables());
+	struct list chain = {.item_size = sizeof(struct chain_point)};
 	assert_int_equal(b.result, 0);
-	assert_true(b.g.kind == SHAPE_CURVE && curve_chain(&b.g.curve, 0, &chain) == 0);
-	assert_int_equal(chain.count, b.g.curve.chain_points);
+	assert_true(b.geometry.kind == SHAPE_CURVE && curve_make_chain(&b.geometry.curve, 0, &chain) == 0);
+	assert_int_equal(chain.count, b.geometry.curve.chain_point_count);
 	const struct chain_point *p = chain.items;
 	double worst = 0;
 	for (size_t i = 0; i + 1 < chain.count; i++)
@@ -241,8 +244,8 @@ static void test_chain_of_spline(void **state)
 		}
 	print_message("%zu points for 3 pieces, off by %.4f radii\n", chain.count, worst);
 	assert_true(worst <= 0.05 && worst > 0.01 && chain.count < 40);
-	list_free(&chain);
-	built_shape_release(&b);
+	list_fini(&chain);
+	built_shape_fini(&b);
 }
 
 /* v grows over all pieces of all curves, by the same amount for each piece. */
@@ -254,7 +257,7 @@ static void test_v(void **state)
 		struct built_shape b = built_ok(types[k], "",
 						"0 0 0 1\n9 0 0 1\n18 0 0 1\n27 0 0 1\n36 0 0 1\n\n"
 						"0 9 0 1\n9 9 0 1\n18 9 0 1\n27 9 0 1\n");
-		const struct mesh *m = &b.g.mesh;
+		const struct mesh *m = &b.geometry.mesh;
 		/* Pieces: 4 and 3 from 0 to 36 and to 27; 2 and 1 from 9 to 27 and to 18. */
 		double pieces = k ? 3 : 7, from = k ? 9 : 0;
 		for (uint32_t i = 0; i < m->vertex_count; i++) {
@@ -263,7 +266,7 @@ static void test_v(void **state)
 			if (!end && !(fabs(m->uv[i][1] - (at + (second ? k ? 2 : 4 : 0)) / pieces) < 0.02))
 				fail_msg("%s: v is %g at x = %g of curve %d", types[k], m->uv[i][1], x, second);
 		}
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 }
 
@@ -278,19 +281,19 @@ static void test_placed(void **state)
 						"<translate x='1' y='2' z='3'/></transform>",
 						"0 0 0 0.5\n1 0 0 0.5\n2 1 0 0.25\n3 0 1 0.5\n"),
 				   b = built_ok(types[k], "", "1 2 3 0.5\n5 2 3 0.5\n9 4 3 0.25\n13 2 2 0.5\n");
-		assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
-		assert_memory_equal(a.g.mesh.position, b.g.mesh.position,
-				    b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
-		built_shape_release(&a);
-		built_shape_release(&b);
+		assert_int_equal(a.geometry.mesh.vertex_count, b.geometry.mesh.vertex_count);
+		assert_memory_equal(a.geometry.mesh.position, b.geometry.mesh.position,
+				    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
+		built_shape_fini(&a);
+		built_shape_fini(&b);
 		/* Turned inside out. */
 		a = built_ok(types[k], "<boolean name='flip_normals' value='true'/>",
 			     "0 0 0 0.5\n0 0 1 0.5\n0 0 2 0.5\n0 0 3 0.5\n");
-		for (uint32_t i = 0; i < a.g.mesh.vertex_count; i++)
-			assert_true(a.g.mesh.normal[i][0] * a.g.mesh.position[i][0] +
-					    a.g.mesh.normal[i][1] * a.g.mesh.position[i][1] <
+		for (uint32_t i = 0; i < a.geometry.mesh.vertex_count; i++)
+			assert_true(a.geometry.mesh.normal[i][0] * a.geometry.mesh.position[i][0] +
+					    a.geometry.mesh.normal[i][1] * a.geometry.mesh.position[i][1] <
 				    1e-9);
-		built_shape_release(&a);
+		built_shape_fini(&a);
 	}
 }
 
@@ -329,19 +332,22 @@ static void test_hair(void **state)
 					"<scale x='7' y='7' z='2'/><rotate y='1' angle='30'/></transform>",
 					"0 0 0\n0 1 0\n");
 	/* to_world scales radii like its z axis. A tube of 12 sides has the area of the cylinder, without the ends. */
-	assert_true(near(built_area(&s.g.mesh), 2 * M_PI * 0.1 * 7, 0.03));
+	assert_true(near(built_shape_area(&s.geometry.mesh), 2 * M_PI * 0.1 * 7, 0.03));
 	if (b.result)
 		fail_msg("%s", b.error.text);
-	assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
-	assert_int_equal(a.g.mesh.vertex_count, c.g.mesh.vertex_count);
-	assert_memory_equal(a.g.mesh.position, b.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
-	assert_memory_equal(a.g.mesh.position, c.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
-	assert_true(near(built_area(&d.g.mesh) / built_area(&a.g.mesh), 0.25, 0.1)); /* 0.025 is the default radius */
-	built_shape_release(&a);
-	built_shape_release(&b);
-	built_shape_release(&c);
-	built_shape_release(&d);
-	built_shape_release(&s);
+	assert_int_equal(a.geometry.mesh.vertex_count, b.geometry.mesh.vertex_count);
+	assert_int_equal(a.geometry.mesh.vertex_count, c.geometry.mesh.vertex_count);
+	assert_memory_equal(a.geometry.mesh.position, b.geometry.mesh.position,
+			    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
+	assert_memory_equal(a.geometry.mesh.position, c.geometry.mesh.position,
+			    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
+	assert_true(near(built_shape_area(&d.geometry.mesh) / built_shape_area(&a.geometry.mesh), 0.25,
+			 0.1)); /* 0.025 is the default radius */
+	built_shape_fini(&a);
+	built_shape_fini(&b);
+	built_shape_fini(&c);
+	built_shape_fini(&d);
+	built_shape_fini(&s);
 }
 
 static void test_bad_files(void **state)
@@ -369,7 +375,7 @@ static void test_bad_files(void **state)
 		struct built_shape b = build_curves(cases[i].type, "", cases[i].text, strlen(cases[i].text));
 		if (b.result >= 0 || !strstr(b.error.text, cases[i].error))
 			fail_msg("%d: %s\n not: %s", b.result, b.error.text, cases[i].error);
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 	unsigned char bytes[256];
 	size_t size = binary_hair(bytes);
@@ -377,11 +383,11 @@ static void test_bad_files(void **state)
 		struct built_shape b = build_curves("hair", "", bytes, n);
 		if (b.result >= 0 || !strstr(b.error.text, "m: ends before its last"))
 			fail_msg("%zu of %zu bytes: %d: %s", n, size, b.result, b.error.text);
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 	struct built_shape b = build_curves("hair", "<float name='reduction' value='0.5'/>", bytes, size);
 	assert_true(b.result < 0 && strstr(b.error.text, "\"reduction\" is only supported as 0"));
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 /* Numbers of any size, repeated points and abrupt turns give a mesh of finite numbers, or an error. */
@@ -390,7 +396,7 @@ static void test_extremes(void **state)
 	(void)state;
 	static const char *const numbers[] = {"0",	"1",	"-1",	 "1e60",  "-1e60", "1e-60", "1e-200",
 					      "5e-324", "1e30", "1e-30", "0.001", "2",	   "1e-7"};
-	struct dice d = dice_of("extreme curves");
+	struct dice d = dice_for_test("extreme curves");
 	uint32_t meshes = 0;
 	for (int round = 0; round < 2000; round++) {
 		char text[1024];
@@ -404,12 +410,12 @@ static void test_extremes(void **state)
 		}
 		struct built_shape b = build_curves(round % 4 < 2 ? "linearcurve" : "bsplinecurve", "", text, used);
 		assert_true(b.result <= 0);
-		meshes += b.result == 0 && b.g.mesh.triangle_count > 0;
-		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++) {
-			assert_true(vec3_is_finite(mesh_load(b.g.mesh.position[i])));
-			assert_true(vec3_is_finite(mesh_load(b.g.mesh.normal[i])));
+		meshes += b.result == 0 && b.geometry.mesh.triangle_count > 0;
+		for (uint32_t i = 0; b.result == 0 && i < b.geometry.mesh.vertex_count; i++) {
+			assert_true(vec3_is_finite(vec3_load(b.geometry.mesh.position[i])));
+			assert_true(vec3_is_finite(vec3_load(b.geometry.mesh.normal[i])));
 		}
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 	assert_true(meshes > 1000);
 }
@@ -423,8 +429,8 @@ static void test_memory_runs_out(void **state)
 	for (int k = 0; k < 2; k++) {
 		struct built_shape b = built_ok(types[k], "", text);
 		const struct memory_file files[] = {{"m", text, strlen(text)}, {0}};
-		built_shape_without_memory(&b.scene, files, 3);
-		built_shape_release(&b);
+		built_shape_check_out_of_memory(&b.scene, files, 3);
+		built_shape_fini(&b);
 	}
 }
 

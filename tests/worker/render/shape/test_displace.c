@@ -40,7 +40,7 @@ static struct built build(const char *type, const char *content, const char *obj
 	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error) ||
 	    shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error))
 		fail_msg("%s", b.error.text);
-	b.result = displace(&b.g, d, &b.arena, b.scene.objects[0], &b.error);
+	b.result = displace_geometry(&b.g, d, &b.arena, b.scene.objects[0], &b.error);
 	return b;
 }
 
@@ -128,8 +128,8 @@ static double volume(const struct mesh *m)
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++)
 		sum += vec3_dot(
-			mesh_load(m->position[m->index[i][0]]),
-			vec3_cross(mesh_load(m->position[m->index[i][1]]), mesh_load(m->position[m->index[i][2]])));
+			vec3_load(m->position[m->index[i][0]]),
+			vec3_cross(vec3_load(m->position[m->index[i][1]]), vec3_load(m->position[m->index[i][2]])));
 	return sum / 6;
 }
 
@@ -174,7 +174,7 @@ static void test_no_cracks(void **state)
 			assert_closed(m);
 			assert_true(cases[i].sign * volume(m) > 0);
 			for (uint32_t k = 0; k < m->vertex_count; k++)
-				assert_true(fabs(vec3_length(mesh_load(m->normal[k])) - 1) < 1e-12);
+				assert_true(fabs(vec3_length(vec3_load(m->normal[k])) - 1) < 1e-12);
 			release(&b);
 		}
 }
@@ -206,8 +206,8 @@ static void test_height_zero_is_the_base(void **state)
 		for (uint32_t k = 0; k < m->triangle_count; k++) {
 			vec3 p[3], n[3], g;
 			for (int c = 0; c < 3; c++) {
-				p[c] = mesh_load(m->position[m->index[k][c]]);
-				n[c] = mesh_load(m->normal[m->index[k][c]]);
+				p[c] = vec3_load(m->position[m->index[k][c]]);
+				n[c] = vec3_load(m->normal[m->index[k][c]]);
 			}
 			g = vec3_normalize(vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])));
 			for (int c = 0; c < 3; c++) {
@@ -238,7 +238,7 @@ static void test_constant_on_a_cube(void **state)
 	const struct mesh *m = &b.g.mesh;
 	uint32_t corners = 0, edges = 0, faces = 0;
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 p = mesh_load(m->position[i]), n = mesh_load(m->normal[i]);
+		vec3 p = vec3_load(m->position[i]), n = vec3_load(m->normal[i]);
 		double a[3] = {fabs(p.x), fabs(p.y), fabs(p.z)};
 		int corner = 0, edge = 0, face = 0;
 		for (int k = 0; k < 3; k++) {
@@ -276,8 +276,8 @@ static double derivative_off(const struct mesh *m, const uint32_t t[3], surface 
 	const double *c0 = m->uv[t[0]], *c1 = m->uv[t[1]], *c2 = m->uv[t[2]];
 	double du1 = c1[0] - c0[0], dv1 = c1[1] - c0[1], du2 = c2[0] - c0[0], dv2 = c2[1] - c0[1],
 	       det = du1 * dv2 - dv1 * du2;
-	vec3 n0 = mesh_load(m->normal[t[0]]), d1 = vec3_sub(mesh_load(m->normal[t[1]]), n0),
-	     d2 = vec3_sub(mesh_load(m->normal[t[2]]), n0);
+	vec3 n0 = vec3_load(m->normal[t[0]]), d1 = vec3_sub(vec3_load(m->normal[t[1]]), n0),
+	     d2 = vec3_sub(vec3_load(m->normal[t[2]]), n0);
 	vec3 mean = vec3_madd(vec3_madd(n0, 1.0 / 3, d1), 1.0 / 3, d2);
 	double length = vec3_length(mean), worst = 0;
 	vec3 n = vec3_scale(1 / length, mean);
@@ -309,8 +309,8 @@ static struct misses measure(const struct mesh *m, surface *of, double margin)
 				continue;
 			vec3 p, n;
 			of(u, v, &p, &n);
-			r.position = fmax(r.position, vec3_length(vec3_sub(p, mesh_load(m->position[t]))));
-			r.normal = fmax(r.normal, vec3_length(vec3_sub(n, mesh_load(m->normal[t]))));
+			r.position = fmax(r.position, vec3_length(vec3_sub(p, vec3_load(m->position[t]))));
+			r.normal = fmax(r.normal, vec3_length(vec3_sub(n, vec3_load(m->normal[t]))));
 		}
 		if (!skip)
 			r.derivative = fmax(r.derivative, derivative_off(m, m->index[i], of));
@@ -405,7 +405,7 @@ static void test_poles(void **state)
 	struct built b = build_ok("sphere", "", NULL, &d);
 	uint32_t poles = 0;
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
-		vec3 p = mesh_load(b.g.mesh.position[i]), n = mesh_load(b.g.mesh.normal[i]);
+		vec3 p = vec3_load(b.g.mesh.position[i]), n = vec3_load(b.g.mesh.normal[i]);
 		if (fabs(p.x) > 1e-12 || fabs(p.y) > 1e-12)
 			continue;
 		poles++;
@@ -452,7 +452,7 @@ static void test_memory_runs_out(void **state)
 		struct arena arena = {0};
 		struct error e;
 		mem_fail_after(n);
-		r = displace(&g, &d, &arena, &node, &e);
+		r = displace_geometry(&g, &d, &arena, &node, &e);
 		mem_fail_after(-1);
 		assert_true(r == 0 || r == -ENOMEM);
 		arena_fini(&arena);

@@ -28,7 +28,7 @@ static struct built_shape build(const char *type, const char *content)
 	snprintf(xml, sizeof xml, "<scene version='0.6.0'>\n<shape type='%s'>%s</shape></scene>", type, content);
 	const struct memory_file files[] = {
 		{"s.xml", xml, strlen(xml)}, {"a.hdr", picture, picture_size}, {"m.obj", obj, strlen(obj)}, {0}};
-	return built_shape(files, render_plugins());
+	return built_shape_make(files, render_plugins());
 }
 
 static struct built_shape build_ok(const char *type, const char *content)
@@ -92,7 +92,7 @@ static void test_as_obj(void **state)
 			   mesh = build_ok("obj", "<string name='filename' value='m.obj'/>" PLACE
 						  "<boolean name='faceNormals' value='true'/>"
 						  "<boolean name='flipTexCoords' value='false'/>");
-	const struct mesh *a = &field.g.mesh, *b = &mesh.g.mesh;
+	const struct mesh *a = &field.geometry.mesh, *b = &mesh.geometry.mesh;
 	assert_int_equal(a->triangle_count, 2 * (WIDTH - 1) * (HEIGHT - 1));
 	assert_int_equal(b->triangle_count, a->triangle_count);
 	assert_true(!a->normal && !b->normal && a->uv && b->uv);
@@ -104,8 +104,8 @@ static void test_as_obj(void **state)
 			for (int c = 0; c < 2; c++)
 				assert_true(fabs(a->uv[v][c] - b->uv[w][c]) < 1e-12);
 		}
-	built_shape_release(&field);
-	built_shape_release(&mesh);
+	built_shape_fini(&field);
+	built_shape_fini(&mesh);
 	pictures_fini(&p);
 }
 
@@ -127,18 +127,18 @@ static void test_normals(void **state)
 	struct pictures p = {0};
 	take_picture(&p, WIDTH, HEIGHT, slope);
 	struct built_shape b = build_ok("heightfield", FILENAME "<float name='scale' value='2'/>");
-	assert_non_null(b.g.mesh.normal);
+	assert_non_null(b.geometry.mesh.normal);
 	/* z = 2 (4 (x + 1) / 8 + 2 (y + 1) / 16) = x + y / 4 + ... */
 	double length = sqrt(1 + 1.0 / 16 + 1);
-	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
-		const double *n = b.g.mesh.normal[i];
+	for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++) {
+		const double *n = b.geometry.mesh.normal[i];
 		assert_true(fabs(n[0] + 1 / length) < 1e-6 && fabs(n[1] + 0.25 / length) < 1e-6);
 	}
-	built_shape_release(&b);
+	built_shape_fini(&b);
 	take_picture(&p, 17, 17, bowl);
 	b = build_ok("heightfield", FILENAME "<boolean name='flipNormals' value='true'/>");
-	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
-		const double *q = b.g.mesh.position[i], *n = b.g.mesh.normal[i];
+	for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++) {
+		const double *q = b.geometry.mesh.position[i], *n = b.geometry.mesh.normal[i];
 		if (fabs(q[0]) > 0.9 || fabs(q[1]) > 0.9)
 			continue;
 		/* z = x^2 + y^2 */
@@ -147,7 +147,7 @@ static void test_normals(void **state)
 		if (!(fabs(dx) < 0.25 / 64 && fabs(dy) < 0.25 / 64 && n[2] < 0))
 			fail_msg("at %g %g the normal is off by %g %g", q[0], q[1], dx, dy);
 	}
-	built_shape_release(&b);
+	built_shape_fini(&b);
 	pictures_fini(&p);
 }
 
@@ -173,10 +173,10 @@ static void test_decoding(void **state)
 			rgb[k] = i == 4 ? x * x : i >= 2 ? x : x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
 		}
 		double wanted = i == 3 ? rgb[1] : 0.212671 * rgb[0] + 0.71516 * rgb[1] + 0.072169 * rgb[2];
-		double z = b.g.mesh.position[1 * 4 + 2][2];
+		double z = b.geometry.mesh.position[1 * 4 + 2][2];
 		if (!(fabs(z - wanted) < 1e-6))
 			fail_msg("way %d: a height of %g, not %g", i, z, wanted);
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 	free(png);
 }
@@ -193,12 +193,13 @@ static void test_scaled(void **state)
 			     "<float name='scale' value='3'/><texture type='scale'><float name='scale' value='-0.5'/>"
 			     "<texture type='scale'><float name='scale' value='0.5'/>"
 			     "<texture type='bitmap'>" FILENAME "</texture></texture></texture>");
-	assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
-	for (uint32_t i = 0; i < a.g.mesh.vertex_count; i++)
-		assert_memory_equal(a.g.mesh.position[i], b.g.mesh.position[i], sizeof a.g.mesh.position[i]);
-	assert_true(fabs(a.g.mesh.position[1][2] - -0.75 * height(1, 0)) < 1e-5);
-	built_shape_release(&a);
-	built_shape_release(&b);
+	assert_int_equal(a.geometry.mesh.vertex_count, b.geometry.mesh.vertex_count);
+	for (uint32_t i = 0; i < a.geometry.mesh.vertex_count; i++)
+		assert_memory_equal(a.geometry.mesh.position[i], b.geometry.mesh.position[i],
+				    sizeof a.geometry.mesh.position[i]);
+	assert_true(fabs(a.geometry.mesh.position[1][2] - -0.75 * height(1, 0)) < 1e-5);
+	built_shape_fini(&a);
+	built_shape_fini(&b);
 	pictures_fini(&p);
 }
 
@@ -207,7 +208,7 @@ static void refuses(const char *content, const char *sentence)
 	struct built_shape b = build("heightfield", content);
 	if (b.result >= 0 || !strstr(b.error.text, sentence))
 		fail_msg("%s\n gave %d: %s", content, b.result, b.error.text);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 /* The bitmap may have any name, and be defined elsewhere. */
@@ -227,13 +228,13 @@ static void test_named(void **state)
 	struct built_shape wanted = build_ok("heightfield", FILENAME);
 	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
 		struct built_shape b = build_ok("heightfield", ways[i]);
-		assert_int_equal(b.g.mesh.vertex_count, wanted.g.mesh.vertex_count);
-		for (uint32_t k = 0; k < b.g.mesh.vertex_count; k++)
-			assert_memory_equal(b.g.mesh.position[k], wanted.g.mesh.position[k],
-					    sizeof b.g.mesh.position[k]);
-		built_shape_release(&b);
+		assert_int_equal(b.geometry.mesh.vertex_count, wanted.geometry.mesh.vertex_count);
+		for (uint32_t k = 0; k < b.geometry.mesh.vertex_count; k++)
+			assert_memory_equal(b.geometry.mesh.position[k], wanted.geometry.mesh.position[k],
+					    sizeof b.geometry.mesh.position[k]);
+		built_shape_fini(&b);
 	}
-	built_shape_release(&wanted);
+	built_shape_fini(&wanted);
 	pictures_fini(&p);
 }
 

@@ -23,7 +23,7 @@ static struct built_shape build(const char *type, const char *content, const voi
 		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
 		 type, content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
-	return built_shape(files, scene_tables());
+	return built_shape_make(files, scene_tables());
 }
 
 /* Every vertex is at its position, in the order of the file; values are exact as floats. */
@@ -33,7 +33,7 @@ static void assert_solid(const char *type, const char *content, const struct mes
 	struct built_shape b = build(type, content, f->bytes, f->size);
 	if (b.result)
 		fail_msg("%s", b.error.text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	assert_int_equal(m->vertex_count, SOLID_VERTICES);
 	assert_int_equal(m->triangle_count, SOLID_TRIANGLES);
 	assert_memory_equal(m->index, solid_index, sizeof solid_index);
@@ -48,7 +48,7 @@ static void assert_solid(const char *type, const char *content, const struct mes
 			assert_true(m->uv[i][0] == solid_uv[i][0] &&
 				    m->uv[i][1] == (flip ? 1 - solid_uv[i][1] : solid_uv[i][1]));
 	}
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 /* Makes lines end in a carriage return alone, as Rhino writes them. */
@@ -68,10 +68,10 @@ static void test_ply(void **state)
 	(void)state;
 	static struct mesh_file f;
 	for (enum ply_kind k = 0; k < PLY_KINDS; k++) {
-		mesh_file_ply(&f, k);
+		mesh_file_make_ply(&f, k);
 		return_only(&f);
 		assert_solid("ply", "", &f, 1, true, true, false);
-		mesh_file_ply(&f, k);
+		mesh_file_make_ply(&f, k);
 		assert_solid("ply", "", &f, 1, true, true, false);
 		assert_solid("ply", "<boolean name='flip_tex_coords' value='true'/>", &f, 1, true, true, true);
 		assert_solid("ply", "<boolean name='face_normals' value='true'/>", &f, 1, false, true, false);
@@ -93,11 +93,11 @@ static void test_ply_polygons(void **state)
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	const uint32_t fan[2][3] = {{0, 1, 2}, {0, 2, 3}};
-	assert_int_equal(b.g.mesh.triangle_count, 2);
-	assert_memory_equal(b.g.mesh.index, fan, sizeof fan);
-	assert_true(b.g.mesh.normal && b.g.mesh.normal[0][2] == 1);
-	assert_null(b.g.mesh.uv);
-	built_shape_release(&b);
+	assert_int_equal(b.geometry.mesh.triangle_count, 2);
+	assert_memory_equal(b.geometry.mesh.index, fan, sizeof fan);
+	assert_true(b.geometry.mesh.normal && b.geometry.mesh.normal[0][2] == 1);
+	assert_null(b.geometry.mesh.uv);
+	built_shape_fini(&b);
 }
 
 /* Points and lines written as faces become triangles without area; the other faces keep their colours. */
@@ -113,13 +113,13 @@ static void test_ply_lines(void **state)
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	const uint32_t index[2][3] = {{0, 1, 2}, {2, 1, 0}};
-	assert_int_equal(b.g.mesh.triangle_count, 2);
-	assert_int_equal(b.dropped, 2);
-	assert_memory_equal(b.g.mesh.index, index, sizeof index);
-	assert_int_equal(b.g.mesh.attribute_count, 1);
+	assert_int_equal(b.geometry.mesh.triangle_count, 2);
+	assert_int_equal(b.dropped_triangles, 2);
+	assert_memory_equal(b.geometry.mesh.index, index, sizeof index);
+	assert_int_equal(b.geometry.mesh.attribute_count, 1);
 	const float colours[] = {.25F, .5F, .75F, .75F, .5F, .25F};
-	assert_memory_equal(b.g.mesh.attributes[0].value, colours, sizeof colours);
-	built_shape_release(&b);
+	assert_memory_equal(b.geometry.mesh.attributes[0].value, colours, sizeof colours);
+	built_shape_fini(&b);
 }
 
 /* An arrow head, whose fan around the first corner would contain a reversed triangle. */
@@ -141,19 +141,19 @@ static void test_concave_faces(void **state)
 		struct built_shape b = build(files[i].type, "", files[i].text, strlen(files[i].text));
 		if (b.result)
 			fail_msg("%s", b.error.text);
-		const struct mesh *m = &b.g.mesh;
+		const struct mesh *m = &b.geometry.mesh;
 		uint32_t first = m->triangle_count - 2;
 		double sum = 0;
 		for (uint32_t t = first; t < first + 2; t++) {
 			vec3 p[3];
 			for (int k = 0; k < 3; k++)
-				p[k] = mesh_load(m->position[m->index[t][k]]);
+				p[k] = vec3_load(m->position[m->index[t][k]]);
 			double z = vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])).z;
 			assert_true(z > 0);
 			sum += z / 2;
 		}
 		assert_true(fabs(sum - 0.5) < 1e-6);
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 }
 
@@ -166,7 +166,7 @@ static void test_serialized(void **state)
 			for (uint32_t flags = 0; flags < 16; flags++) {
 				if (flags & 4)
 					continue; /* tangents were never written */
-				mesh_file_serialized(&f, version, doubles, flags, 3);
+				mesh_file_make_serialized(&f, version, doubles, flags, 3);
 				/* Missing normals are computed from the triangles: by symmetry, that of a corner has
 				 * the direction of its position. */
 				assert_solid("serialized", "", &f, 1, true, flags & 2, false);
@@ -174,7 +174,7 @@ static void test_serialized(void **state)
 					     flags & 2, false);
 			}
 	for (int version = 4; version <= 5; version++) {
-		mesh_file_serialized(&f, version, 0, 1 | 16, 1);
+		mesh_file_make_serialized(&f, version, 0, 1 | 16, 1);
 		assert_solid("serialized", "", &f, 1, false, false, false);
 	}
 }
@@ -184,22 +184,22 @@ static void test_serialized_attributes(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
-	mesh_file_serialized(&f, 5, 0, 11, 1);
+	mesh_file_make_serialized(&f, 5, 0, 11, 1);
 	struct built_shape b = build("serialized", "", f.bytes, f.size);
 	if (b.result)
 		fail_msg("%s", b.error.text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	assert_int_equal(m->attribute_count, 2);
 	const struct attribute *colour = &m->attributes[0], *heat = &m->attributes[1];
 	assert_string_equal(colour->name, "vertex_color");
-	assert_true(colour->channels == 3 && !colour->per_face && !colour->encoded && !colour->damaged);
+	assert_true(colour->channels == 3 && !colour->is_per_face && !colour->is_srgb && !colour->has_invalid_value);
 	for (int i = 0; i < 3 * SOLID_VERTICES; i++)
 		assert_true(colour->value[i] == (float)SOLID_COLOUR(i));
 	assert_string_equal(heat->name, "face_heat");
-	assert_true(heat->channels == 1 && heat->per_face);
+	assert_true(heat->channels == 1 && heat->is_per_face);
 	for (int i = 0; i < SOLID_TRIANGLES; i++)
 		assert_true(heat->value[i] == (float)SOLID_COLOUR(i));
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void refuses(const char *type, const char *content, const void *bytes, size_t size, const char *text)
@@ -207,7 +207,7 @@ static void refuses(const char *type, const char *content, const void *bytes, si
 	struct built_shape b = build(type, content, bytes, size);
 	if (b.result >= 0 || !strstr(b.error.text, text))
 		fail_msg("%d: %s\n not: %s", b.result, b.error.text, text);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void test_bad_ply(void **state)
@@ -274,7 +274,7 @@ static void test_bad_ply(void **state)
 		refuses("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
 	/* NaN, in formats that can store it. */
 	static struct mesh_file f;
-	mesh_file_ply(&f, PLY_LITTLE);
+	mesh_file_make_ply(&f, PLY_LITTLE);
 	const char *end = "end_header\n";
 	size_t at = 0;
 	while (memcmp(f.bytes + at, end, strlen(end)) != 0)
@@ -298,17 +298,17 @@ static void test_normals_that_are_none(void **state)
 		struct built_shape b = build(k ? "obj" : "ply", "", k ? obj : ply, strlen(k ? obj : ply));
 		if (b.result)
 			fail_msg("%s", b.error.text);
-		const struct mesh *m = &b.g.mesh;
+		const struct mesh *m = &b.geometry.mesh;
 		assert_int_equal(m->triangle_count, 2);
-		assert_true(m->odd >= 2); /* an OBJ may have a vertex twice */
+		assert_true(m->invalid_normal_count >= 2); /* an OBJ may have a vertex twice */
 		for (uint32_t t = 0; t < 2; t++)
 			for (int c = 0; c < 3; c++) {
 				uint32_t i = m->index[t][c];
 				bool leans = m->position[i][0] == 0 && m->position[i][1] == 2;
 				vec3 want = leans ? (vec3){0, 0.6, 0.8} : (vec3){0, 0, 1};
-				assert_true(vec3_length(vec3_sub(mesh_load(m->normal[i]), want)) < 1e-12);
+				assert_true(vec3_length(vec3_sub(vec3_load(m->normal[i]), want)) < 1e-12);
 			}
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 }
 
@@ -316,12 +316,12 @@ static void test_bad_serialized(void **state)
 {
 	(void)state;
 	static struct mesh_file f, g;
-	mesh_file_serialized(&f, 4, 0, 3, 2);
+	mesh_file_make_serialized(&f, 4, 0, 3, 2);
 	refuses("serialized", "", "", 0, "m: this is not a serialized mesh");
 	refuses("serialized", "", "plyplyply", 9, "this is not a serialized mesh");
 	refuses("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
 		"m: shape_index=2, but the file has 2 meshes, counted from 0");
-	mesh_file_serialized(&g, 4, 0, 3, 1);
+	mesh_file_make_serialized(&g, 4, 0, 3, 1);
 	refuses("serialized", "<integer name='shape_index' value='7'/>", g.bytes, g.size,
 		"m: shape_index=7, but the file has 1 mesh, counted from 0");
 	g = f;
@@ -351,7 +351,7 @@ static void assert_obj_mesh(const char *content, double x, uint32_t triangles)
 	struct built_shape b = build("obj", content, obj_meshes, sizeof obj_meshes - 1);
 	if (b.result)
 		fail_msg("%s: %s", content, b.error.text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	assert_int_equal(m->triangle_count, triangles);
 	for (uint32_t t = 0; t < triangles; t++)
 		for (int k = 0; k < 3; k++) {
@@ -359,7 +359,7 @@ static void assert_obj_mesh(const char *content, double x, uint32_t triangles)
 			assert_true(x < 0 || found == x || found == 9);
 		}
 	assert_true(x < 0 || m->vertex_count <= 4);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void test_obj_meshes(void **state)
@@ -392,9 +392,9 @@ static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 	struct built_shape b = build(type, "", f->bytes, f->size);
 	bool good = b.result == 0;
 	assert_true(b.result <= 0);
-	for (uint32_t k = 0; good && k < 3 * b.g.mesh.triangle_count; k++)
-		assert_true(b.g.mesh.index[k / 3][k % 3] < b.g.mesh.vertex_count);
-	built_shape_release(&b);
+	for (uint32_t k = 0; good && k < 3 * b.geometry.mesh.triangle_count; k++)
+		assert_true(b.geometry.mesh.index[k / 3][k % 3] < b.geometry.mesh.vertex_count);
+	built_shape_fini(&b);
 	return good;
 }
 
@@ -428,25 +428,25 @@ static void test_bad_serialized_5(void **state)
 		{ATTRIBUTES + 21, 0, "m: an attribute with more numbers than the file can contain"},
 	};
 	static struct mesh_file f, good, g;
-	mesh_stream_5(&good, 11, 1);
-	mesh_file_of_stream_5(&f, &good);
+	mesh_file_make_stream_5(&good, 11, 1);
+	mesh_file_from_stream_5(&f, &good);
 	assert_solid("serialized", "", &f, 1, true, true, false);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		g = good;
 		for (int k = 0; k < 4; k++)
 			g.bytes[bad[i].at + (size_t)k] = (unsigned char)(bad[i].value >> 8 * k);
-		mesh_file_of_stream_5(&f, &g);
+		mesh_file_from_stream_5(&f, &g);
 		refuses("serialized", "", f.bytes, f.size, bad[i].text);
 	}
 	/* Any prefix of the uncompressed data, and any of its bytes changed. */
-	struct dice d = dice_of("damaged streams");
+	struct dice d = dice_for_test("damaged streams");
 	for (size_t i = 0; i < 3000; i++) {
 		g = good;
 		if (i < good.size)
 			g.size = i;
 		else
 			g.bytes[dice_below(&d, (uint32_t)g.size)] = (unsigned char)dice_below(&d, 256);
-		mesh_file_of_stream_5(&f, &g);
+		mesh_file_from_stream_5(&f, &g);
 		assert_true(!gives_a_mesh("serialized", &f) || i >= good.size);
 	}
 }
@@ -459,15 +459,15 @@ static void test_damage(void **state)
 	for (int kind = 0; kind < PLY_KINDS + 3; kind++) {
 		const char *type = kind < PLY_KINDS ? "ply" : "serialized";
 		if (kind < PLY_KINDS)
-			mesh_file_ply(&f, (enum ply_kind)kind);
+			mesh_file_make_ply(&f, (enum ply_kind)kind);
 		else
-			mesh_file_serialized(&f, kind - PLY_KINDS + 3, 0, 11, 2);
-		struct dice d = dice_of("damaged meshes");
+			mesh_file_make_serialized(&f, kind - PLY_KINDS + 3, 0, 11, 2);
+		struct dice d = dice_for_test("damaged meshes");
 		size_t meshes = 0;
 		for (size_t size = 0; size < f.size; size += 1 + size / 97) {
 			struct built_shape b = build(type, "", f.bytes, size);
 			assert_true(b.result <= 0);
-			built_shape_release(&b);
+			built_shape_fini(&b);
 		}
 		for (int i = 0; i < 300; i++) {
 			g = f;
@@ -485,13 +485,13 @@ static void test_memory_runs_out(void **state)
 	static struct mesh_file f;
 	for (int kind = 0; kind < 2; kind++) {
 		if (kind)
-			mesh_file_serialized(&f, 4, 0, 0, 1);
+			mesh_file_make_serialized(&f, 4, 0, 0, 1);
 		else
-			mesh_file_ply(&f, PLY_LITTLE);
+			mesh_file_make_ply(&f, PLY_LITTLE);
 		struct built_shape b = build(kind ? "serialized" : "ply", "", f.bytes, f.size);
 		const struct memory_file files[] = {{"m", f.bytes, f.size}, {0}};
-		built_shape_without_memory(&b.scene, files, 1);
-		built_shape_release(&b);
+		built_shape_check_out_of_memory(&b.scene, files, 1);
+		built_shape_fini(&b);
 	}
 }
 

@@ -18,7 +18,7 @@
 
 struct outline {
 	uint32_t n;
-	double x[POLYGON_MOST], y[POLYGON_MOST];
+	double x[POLYGON_CORNERS_MAX], y[POLYGON_CORNERS_MAX];
 };
 
 static bool is_inside(const struct outline *o, double x, double y)
@@ -41,15 +41,15 @@ static double side(const struct outline *o, uint32_t a, uint32_t b, double x, do
 static void check(const char *what, const struct outline *o, vec3 n, int sense)
 {
 	static struct polygon p;
-	static uint32_t t[POLYGON_MOST][3];
+	static uint32_t t[POLYGON_CORNERS_MAX][3];
 	struct frame f = frame_around(vec3_normalize(n));
-	struct dice d = dice_of(what);
-	p.n = o->n;
+	struct dice d = dice_for_test(what);
+	p.corner_count = o->n;
 	for (uint32_t i = 0; i < o->n; i++)
 		p.corner[i] = frame_to_world(&f, (vec3){o->x[i] + 10, o->y[i] - 20, 5});
 	memset(t, 0xff, sizeof t);
-	polygon_cut(&p, t);
-	uint32_t used[POLYGON_MOST] = {0};
+	polygon_triangulate(&p, t);
+	uint32_t used[POLYGON_CORNERS_MAX] = {0};
 	for (uint32_t i = 0; i < o->n - 2; i++)
 		for (int k = 0; k < 3; k++) {
 			assert_true(t[i][k] < o->n);
@@ -60,7 +60,7 @@ static void check(const char *what, const struct outline *o, vec3 n, int sense)
 	assert_true(t[o->n - 2][0] == UINT32_MAX);
 	unsigned hits = 0;
 	for (int k = 0; k < 2000; k++) {
-		double x = 2.4 * dice_throw(&d) - 1.2, y = 2.4 * dice_throw(&d) - 1.2;
+		double x = 2.4 * dice_uniform(&d) - 1.2, y = 2.4 * dice_uniform(&d) - 1.2;
 		unsigned count = 0;
 		for (uint32_t i = 0; i < o->n - 2; i++) {
 			double a = sense * side(o, t[i][0], t[i][1], x, y), b = sense * side(o, t[i][1], t[i][2], x, y),
@@ -93,11 +93,11 @@ static void check_both(const char *what, struct outline *o)
 static void test_random(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("polygon");
+	struct dice d = dice_for_test("polygon");
 	for (uint32_t n = 4; n < 60; n += n < 12 ? 1 : 7) {
 		struct outline o = {.n = n};
 		for (uint32_t i = 0; i < n; i++) {
-			double r = 0.1 + dice_throw(&d), phi = 2 * M_PI * i / n;
+			double r = 0.1 + dice_uniform(&d), phi = 2 * M_PI * i / n;
 			o.x[i] = r * cos(phi);
 			o.y[i] = r * sin(phi);
 		}
@@ -109,7 +109,7 @@ static void test_random(void **state)
 static void test_spiral(void **state)
 {
 	(void)state;
-	for (uint32_t n = 40; n <= POLYGON_MOST; n = n < 500 ? 4 * n : n + 384) {
+	for (uint32_t n = 40; n <= POLYGON_CORNERS_MAX; n = n < 500 ? 4 * n : n + 384) {
 		struct outline o = {.n = n};
 		for (uint32_t i = 0; i < n; i++) {
 			uint32_t k = i < n / 2 ? i : n - 1 - i;
@@ -149,8 +149,8 @@ static void test_fan(void **state)
 					      {3, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
 	for (int i = 0; i < 4; i++) {
 		uint32_t t[3][3] = {{9}};
-		polygon_cut(&fans[i], t);
-		for (uint32_t k = 0; k < fans[i].n - 2; k++)
+		polygon_triangulate(&fans[i], t);
+		for (uint32_t k = 0; k < fans[i].corner_count - 2; k++)
 			assert_true(t[k][0] == 0 && t[k][1] == k + 1 && t[k][2] == k + 2);
 	}
 }
@@ -160,13 +160,13 @@ static void test_crossed(void **state)
 {
 	(void)state;
 	static struct polygon p;
-	static uint32_t t[POLYGON_MOST][3];
-	struct dice d = dice_of("crossed");
-	for (uint32_t n = 3; n <= POLYGON_MOST; n += 1 + n / 3) {
-		for (p.n = 0; p.n < n; p.n++)
-			p.corner[p.n] = (vec3){dice_throw(&d), dice_throw(&d), dice_below(&d, 2)};
+	static uint32_t t[POLYGON_CORNERS_MAX][3];
+	struct dice d = dice_for_test("crossed");
+	for (uint32_t n = 3; n <= POLYGON_CORNERS_MAX; n += 1 + n / 3) {
+		for (p.corner_count = 0; p.corner_count < n; p.corner_count++)
+			p.corner[p.corner_count] = (vec3){dice_uniform(&d), dice_uniform(&d), dice_below(&d, 2)};
 		memset(t, 0xff, sizeof t);
-		polygon_cut(&p, t);
+		polygon_triangulate(&p, t);
 		for (uint32_t i = 0; i < n - 2; i++)
 			assert_true(t[i][0] < n && t[i][1] < n && t[i][2] < n);
 	}

@@ -31,7 +31,7 @@ static struct built_shape build_grid(const char *content, const struct vol *v)
 		 "<scene version='3.0.0'>\n<shape type='sdfgrid'><string name='filename' value='m'/>%s</shape></scene>",
 		 content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", v->bytes, v->size}, {0}};
-	return built_shape(files, scene_tables());
+	return built_shape_make(files, scene_tables());
 }
 
 static double mix(double t, double a, double b)
@@ -102,9 +102,9 @@ static double ring(double x, double y, double z, uint32_t channel)
 static vec3 gradient_of(vol_field *f, vec3 p)
 {
 	const double h = 1e-6;
-	return mesh_unit((vec3){f(p.x + h, p.y, p.z, 0) - f(p.x - h, p.y, p.z, 0),
-				f(p.x, p.y + h, p.z, 0) - f(p.x, p.y - h, p.z, 0),
-				f(p.x, p.y, p.z + h, 0) - f(p.x, p.y, p.z - h, 0)});
+	return vec3_unit_or_zero((vec3){f(p.x + h, p.y, p.z, 0) - f(p.x - h, p.y, p.z, 0),
+					f(p.x, p.y + h, p.z, 0) - f(p.x, p.y - h, p.z, 0),
+					f(p.x, p.y, p.z + h, 0) - f(p.x, p.y, p.z - h, 0)});
 }
 
 static void check_body(const struct vol *v, vol_field *f, double volume, double most_degrees)
@@ -112,29 +112,29 @@ static void check_body(const struct vol *v, vol_field *f, double volume, double 
 	struct built_shape b = build_grid("", v), flat = build_grid("<string name='normals' value='analytic'/>", v);
 	if (b.result || flat.result)
 		fail_msg("%s%s", b.error.text, flat.error.text);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	check_edges(m, true);
-	double sum = built_volume(m);
+	double sum = built_shape_volume(m);
 	for (uint32_t t = 0; t < m->triangle_count; t++) {
-		vec3 a = built_corner(&flat.g.mesh, t, 0),
-		     n = vec3_cross(vec3_sub(built_corner(&flat.g.mesh, t, 1), a),
-				    vec3_sub(built_corner(&flat.g.mesh, t, 2), a));
+		vec3 a = built_shape_corner(&flat.geometry.mesh, t, 0),
+		     n = vec3_cross(vec3_sub(built_shape_corner(&flat.geometry.mesh, t, 1), a),
+				    vec3_sub(built_shape_corner(&flat.geometry.mesh, t, 2), a));
 		assert_true(vec3_dot(n, gradient_of(f, a)) > 0);
 	}
 	if (!(fabs(sum / volume - 1) < 0.03))
 		fail_msg("a volume of %g instead of %g", sum, volume);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		double value = value_at(v, m->position[i]),
-		       angle = vec3_angle(mesh_load(m->normal[i]), gradient_of(f, mesh_load(m->position[i])));
+		       angle = vec3_angle(vec3_load(m->normal[i]), gradient_of(f, vec3_load(m->position[i])));
 		if (!(fabs(value) < 1e-9))
 			fail_msg("vertex %u: the field is %g", i, value);
 		if (!(angle * 180 / pi < most_degrees))
 			fail_msg("vertex %u: its normal is off by %g degrees", i, angle * 180 / pi);
 	}
-	assert_null(flat.g.mesh.normal);
+	assert_null(flat.geometry.mesh.normal);
 	assert_null(m->uv);
-	built_shape_release(&b);
-	built_shape_release(&flat);
+	built_shape_fini(&b);
+	built_shape_fini(&flat);
 }
 
 static void test_bodies(void **state)
@@ -163,15 +163,15 @@ static void test_plane(void **state)
 	fill(&v, 2, 5, 9, slope);
 	struct built_shape b = build_grid("", &v);
 	assert_int_equal(b.result, 0);
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	const vec3 normal = vec3_normalize((vec3){2, 1, -1});
 	check_edges(m, false);
 	/* Its projection onto y, z is the part with 0 <= x = (0.613 - y + z) / 2 <= 1: all but the corner y > z +
 	 * 0.613. */
-	assert_true(fabs(built_area(m) * normal.x - (1 - 0.5 * 0.387 * 0.387)) < 1e-6);
+	assert_true(fabs(built_shape_area(m) * normal.x - (1 - 0.5 * 0.387 * 0.387)) < 1e-6);
 	for (uint32_t i = 0; i < m->vertex_count; i++)
-		assert_true(vec3_length(vec3_sub(mesh_load(m->normal[i]), normal)) < 1e-6);
-	built_shape_release(&b);
+		assert_true(vec3_length(vec3_sub(vec3_load(m->normal[i]), normal)) < 1e-6);
+	built_shape_fini(&b);
 }
 
 /* Any field gives a closed mesh if it is positive at the faces of the cube, with vertices on the surface. Flat, because
@@ -180,7 +180,7 @@ static void test_noise(void **state)
 {
 	(void)state;
 	static struct vol v;
-	struct dice d = dice_of("noise in grids");
+	struct dice d = dice_for_test("noise in grids");
 	for (int round = 0; round < 40; round++) {
 		fill(&v, 3 + (uint32_t)dice_below(&d, 6), 3 + (uint32_t)dice_below(&d, 6),
 		     3 + (uint32_t)dice_below(&d, 6), ball);
@@ -190,7 +190,7 @@ static void test_noise(void **state)
 				for (uint32_t i = 0; i < v.side[0]; i++, at++) {
 					bool face = i == 0 || j == 0 || k == 0 || i == v.side[0] - 1 ||
 						    j == v.side[1] - 1 || k == v.side[2] - 1;
-					double value = 0.01 + dice_throw(&d);
+					double value = 0.01 + dice_uniform(&d);
 					v.value[at] = (float)(face || dice_below(&d, 2) ? value : -value);
 				}
 		vol_write(&v);
@@ -198,11 +198,11 @@ static void test_noise(void **state)
 		if (b.result) {
 			assert_non_null(strstr(b.error.text, "there is no surface"));
 		} else {
-			check_edges(&b.g.mesh, true);
-			for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++)
-				assert_true(fabs(value_at(&v, b.g.mesh.position[i])) < 1e-6);
+			check_edges(&b.geometry.mesh, true);
+			for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++)
+				assert_true(fabs(value_at(&v, b.geometry.mesh.position[i])) < 1e-6);
 		}
-		built_shape_release(&b);
+		built_shape_fini(&b);
 	}
 }
 
@@ -211,7 +211,7 @@ static void refuses(const struct vol *v, const char *text)
 	struct built_shape b = build_grid("", v);
 	if (b.result >= 0 || !strstr(b.error.text, text))
 		fail_msg("%d: %s\n not: %s", b.result, b.error.text, text);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void test_bad_files(void **state)
@@ -231,8 +231,8 @@ static void test_bad_files(void **state)
 		{12, 1025, "m: 1025 values along y"},
 		{16, 0xffffffff, "m: 4294967295 values along z"},
 		{16, 1000, "m: too short for 16000 values"},
-		{VOL_HEAD, 0x7fc00000, "m: value 0 is not finite"},
-		{VOL_HEAD + 4, 0x7f800000, "m: value 1 is not finite"},
+		{VOL_HEADER_BYTES, 0x7fc00000, "m: value 0 is not finite"},
+		{VOL_HEADER_BYTES + 4, 0x7f800000, "m: value 1 is not finite"},
 	};
 	fill(&good, 4, 4, 4, ball);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -243,7 +243,7 @@ static void test_bad_files(void **state)
 	for (size_t size = 0; size < good.size; size++) {
 		v = good;
 		v.size = size;
-		refuses(&v, size < VOL_HEAD ? "this is not a grid" : "too short for 64 values");
+		refuses(&v, size < VOL_HEADER_BYTES ? "this is not a grid" : "too short for 64 values");
 	}
 	v = good;
 	for (size_t i = 0; i < 64; i++)
@@ -252,17 +252,17 @@ static void test_bad_files(void **state)
 	refuses(&v, "m: its values do not change their sign: there is no surface");
 	/* Zeros and numbers of any size give a mesh, or an error. */
 	static const float numbers[] = {0, -0.0f, 1, -1, 3e38f, -3e38f, 1e-45f, -1e-45f, 1e-20f, -1e-20f};
-	struct dice d = dice_of("extreme grids");
+	struct dice d = dice_for_test("extreme grids");
 	for (int round = 0; round < 500; round++) {
 		for (size_t i = 0; i < 64; i++)
 			v.value[i] = numbers[dice_below(&d, sizeof numbers / sizeof *numbers)];
 		vol_write(&v);
 		struct built_shape b = build_grid("", &v);
 		assert_true(b.result <= 0);
-		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++)
+		for (uint32_t i = 0; b.result == 0 && i < b.geometry.mesh.vertex_count; i++)
 			for (int k = 0; k < 3; k++)
-				assert_true(b.g.mesh.position[i][k] >= 0 && b.g.mesh.position[i][k] <= 1);
-		built_shape_release(&b);
+				assert_true(b.geometry.mesh.position[i][k] >= 0 && b.geometry.mesh.position[i][k] <= 1);
+		built_shape_fini(&b);
 	}
 }
 
@@ -273,8 +273,8 @@ static void test_memory_runs_out(void **state)
 	fill(&v, 6, 6, 6, ball);
 	struct built_shape b = build_grid("", &v);
 	const struct memory_file files[] = {{"m", v.bytes, v.size}, {0}};
-	built_shape_without_memory(&b.scene, files, 6);
-	built_shape_release(&b);
+	built_shape_check_out_of_memory(&b.scene, files, 6);
+	built_shape_fini(&b);
 }
 
 int main(void)

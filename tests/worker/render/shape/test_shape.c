@@ -304,7 +304,7 @@ static void test_obj_material(void **state)
 		assert_true(b.g.mesh.uv[v][1] == 0.75);
 	}
 	assert_int_equal(b.g.mesh.vertex_count, 4); /* vertices that the faces share are shared in the mesh */
-	assert_false(b.g.materials);
+	assert_false(b.g.has_materials);
 	release(&b);
 	b = build_ok("obj", "<string name='material' value='red paint'/>", PARTS);
 	assert_true(b.g.mesh.triangle_count == 2 && b.g.mesh.vertex_count == 4 && !b.g.mesh.uv);
@@ -313,7 +313,7 @@ static void test_obj_material(void **state)
 	assert_true(b.g.mesh.triangle_count == 1 && b.g.mesh.vertex_count == 3);
 	release(&b);
 	b = build_ok("obj", "", PARTS);
-	assert_true(b.g.mesh.triangle_count == 5 && b.g.materials);
+	assert_true(b.g.mesh.triangle_count == 5 && b.g.has_materials);
 	release(&b);
 	refuses("<string name='material' value='none'/>", PARTS, "m.obj: has no faces of the material `none`");
 	refuses("<string name='material' value='red'/>", PARTS, "has no faces of the material `red`");
@@ -352,7 +352,7 @@ static void test_obj_is_kept(void **state)
 	struct error e;
 	uint64_t dropped;
 	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
-	assets.parsed = &kept;
+	assets.obj_cache = &kept;
 	static const uint32_t triangles[] = {2, 1, 2, 2};
 	for (int i = 0; i < 4; i++) {
 		if (i == 1)

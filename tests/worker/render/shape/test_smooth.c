@@ -3,7 +3,7 @@
  * max_smooth_angle is compared with the same meshes with explicit normals: the faces that share a normal, weights by
  * angle, the order of faces where three meet, seams of texture coordinates and colours, and angles that are refused.
  */
-#include "tests/support/append.h"
+#include "tests/support/append_format.h"
 #include "tests/support/built_shape.h"
 #include "tests/support/scene_tables.h"
 
@@ -17,7 +17,7 @@
 static char text[1 << 22];
 static size_t used;
 
-#define put(...) append(text, sizeof text, &used, __VA_ARGS__)
+#define put(...) append_format(text, sizeof text, &used, __VA_ARGS__)
 
 /* Builds the mesh in `text`. */
 static struct built_shape build(const char *content)
@@ -27,7 +27,7 @@ static struct built_shape build(const char *content)
 		 "<scene version='0.6.0'>\n<shape type='obj'><string name='filename' value='m.obj'/>%s</shape></scene>",
 		 content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m.obj", text, used}, {0}};
-	return built_shape(files, scene_tables());
+	return built_shape_make(files, scene_tables());
 }
 
 #define ANGLE(x) "<float name='maxSmoothAngle' value='" #x "'/>"
@@ -43,7 +43,7 @@ static struct built_shape build_ok(const char *content)
 /* All corners of all triangles have the same positions and normals; the numbering of vertices may differ. */
 static void expect_same(struct built_shape *a, struct built_shape *b)
 {
-	const struct mesh *x = &a->g.mesh, *y = &b->g.mesh;
+	const struct mesh *x = &a->geometry.mesh, *y = &b->geometry.mesh;
 	assert_int_equal(x->triangle_count, y->triangle_count);
 	assert_true(x->normal && y->normal);
 	for (uint32_t i = 0; i < x->triangle_count; i++)
@@ -55,8 +55,8 @@ static void expect_same(struct built_shape *a, struct built_shape *b)
 					fail_msg("triangle %u, corner %d: component %d of the normal is off by %g", i,
 						 k, c, difference);
 			}
-	built_shape_release(a);
-	built_shape_release(b);
+	built_shape_fini(a);
+	built_shape_fini(b);
 }
 
 /* A prism with `sides` sides around z, from z = 0 to 1, with lids. ROUND: the sides have the normals of a cylinder;
@@ -153,7 +153,7 @@ static void test_first_come(void **state)
 	}
 	put("f 1 3 2\nf 1 4 2\nf 1 5 2\n");
 	struct built_shape b = build_ok(ANGLE(50));
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	for (int i = 0; i < 3; i++) {
 		double wanted = i < 2 ? 0.5 * (third[0] + third[1]) : third[2];
 		const double *n = m->normal[m->index[i][0]];
@@ -162,7 +162,7 @@ static void test_first_come(void **state)
 			fail_msg("face %d: normal %g %g %g", i, n[0], n[1], n[2]);
 	}
 	assert_int_equal(m->vertex_count, 2 + 2 + 3); /* two on the edge for the first two faces, two for the third */
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 /* Edges with different texture coordinates are not smooth, as in Mitsuba. */
@@ -173,11 +173,11 @@ static void test_seams(void **state)
 	put("v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0.2\nvt 0 0\nvt 1 0\nvt 0 1\n");
 	put("f 1/1 3/2 2/3\nf 1/2 2/3 4/1\n");
 	struct built_shape b = build_ok(ANGLE(90));
-	const struct mesh *m = &b.g.mesh;
+	const struct mesh *m = &b.geometry.mesh;
 	assert_true(m->index[0][0] != m->index[1][0]);
 	assert_int_equal(m->index[0][2], m->index[1][1]);
 	assert_true(m->normal[m->index[0][0]][2] == 1);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 /* Nor are edges with different colours; each corner and each triangle keeps its attributes. */
@@ -196,15 +196,15 @@ static void test_attributes(void **state)
 	struct built_shape b = {0};
 	uint64_t dropped;
 	assert_int_equal(scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error), 0);
-	assert_int_equal(shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error), 0);
-	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(shape_build(b.scene.objects[0], &assets, &b.arena, &b.geometry, &dropped, &b.error), 0);
+	const struct mesh *m = &b.geometry.mesh;
 	assert_int_equal(m->vertex_count, 5);
 	assert_int_equal(m->index[0][2], m->index[1][1]); /* one colour at y = 1 */
 	assert_true(m->index[0][0] != m->index[1][0]);	  /* two colours at x = y = 0 */
 	assert_int_equal(m->attribute_count, 2);
 	for (uint32_t i = 0; i < m->attribute_count; i++) {
 		const struct attribute *a = &m->attributes[i];
-		if (a->per_face) {
+		if (a->is_per_face) {
 			assert_true(a->value[0] == 7 && a->value[1] == 9);
 			continue;
 		}
@@ -213,7 +213,7 @@ static void test_attributes(void **state)
 			    *both = a->value + (size_t)m->index[1][1] * a->channels;
 		assert_true(first[0] == 1 && first[1] == 0 && second[1] == 1 && second[2] == 1 && both[0] == 0.5f);
 	}
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void expect_refused(const char *content, const char *sentence)
@@ -221,7 +221,7 @@ static void expect_refused(const char *content, const char *sentence)
 	struct built_shape b = build(content);
 	if (b.result >= 0 || !strstr(b.error.text, sentence))
 		fail_msg("%s gave %d: %s", content, b.result, b.error.text);
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 static void test_bad_input(void **state)
@@ -240,7 +240,7 @@ static void test_bad_input(void **state)
 		put("f 1 %d %d\n", i + 2, i + 3);
 	expect_refused(ANGLE(0), "too many triangles with different directions meet at one point");
 	struct built_shape b = build_ok(ANGLE(30));
-	built_shape_release(&b);
+	built_shape_fini(&b);
 }
 
 int main(void)

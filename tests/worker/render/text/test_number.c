@@ -76,32 +76,32 @@ static void test_lists(void **state)
 {
 	(void)state;
 	double v[3];
-	assert_int_equal(number_list("1, 2, 3", v, 3), 3);
+	assert_int_equal(number_parse_list("1, 2, 3", v, 3), 3);
 	assert_true(v[0] == 1 && v[1] == 2 && v[2] == 3);
-	assert_int_equal(number_list(".8,.8,.8", v, 3), 3);
-	assert_int_equal(number_list(" 1420 1552\n1642 ", v, 3), 3);
-	assert_int_equal(number_list("1f, 2.f 3e0F", v, 3), 3);
+	assert_int_equal(number_parse_list(".8,.8,.8", v, 3), 3);
+	assert_int_equal(number_parse_list(" 1420 1552\n1642 ", v, 3), 3);
+	assert_int_equal(number_parse_list("1f, 2.f 3e0F", v, 3), 3);
 	assert_true(v[0] == 1 && v[1] == 2 && v[2] == 3);
-	assert_int_equal(number_list("1f2", v, 3), -1);
-	assert_int_equal(number_list("", v, 3), 0);
-	assert_int_equal(number_list("1 2 3 4", v, 3), -1);
-	assert_int_equal(number_list("1,,2", v, 3), 2);
-	assert_int_equal(number_list(", 1 ,2, ", v, 3), 2);
-	assert_int_equal(number_list(" , ", v, 3), 0);
-	assert_int_equal(number_list("1;2", v, 3), -1);
-	assert_int_equal(number_list("1-2", v, 3), -1);
-	assert_int_equal(number_weights("0.5; .25,,0.125f ;", v, 3), 3);
+	assert_int_equal(number_parse_list("1f2", v, 3), -1);
+	assert_int_equal(number_parse_list("", v, 3), 0);
+	assert_int_equal(number_parse_list("1 2 3 4", v, 3), -1);
+	assert_int_equal(number_parse_list("1,,2", v, 3), 2);
+	assert_int_equal(number_parse_list(", 1 ,2, ", v, 3), 2);
+	assert_int_equal(number_parse_list(" , ", v, 3), 0);
+	assert_int_equal(number_parse_list("1;2", v, 3), -1);
+	assert_int_equal(number_parse_list("1-2", v, 3), -1);
+	assert_int_equal(number_parse_weights("0.5; .25,,0.125f ;", v, 3), 3);
 	assert_true(v[0] == 0.5 && v[1] == 0.25 && v[2] == 0.125);
-	assert_int_equal(number_weights(" ,", v, 3), 0);
-	assert_int_equal(number_weights("1 2 3 4", v, 3), -1);
-	assert_int_equal(number_weights("1-2", v, 3), -1);
-	assert_int_equal(number_weights("1;x", v, 3), -1);
+	assert_int_equal(number_parse_weights(" ,", v, 3), 0);
+	assert_int_equal(number_parse_weights("1 2 3 4", v, 3), -1);
+	assert_int_equal(number_parse_weights("1-2", v, 3), -1);
+	assert_int_equal(number_parse_weights("1;x", v, 3), -1);
 }
 
 static void check_snake(const char *from, const char *to)
 {
 	char out[128];
-	snake_case(from, out);
+	snake_case_from_camel(from, out);
 	assert_string_equal(out, to);
 }
 

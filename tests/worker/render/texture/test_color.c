@@ -32,7 +32,7 @@ static void rgb_of(spectrum_at f, const void *user, bool under_d65, double rgb[3
 {
 	double xyz[3] = {0};
 	for (int i = 0; i < CIE_COUNT; i += SPECTRUM_LANES) {
-		struct wavelengths w = {.grey = false};
+		struct wavelengths w = {.is_grey = false};
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			w.nm[k] = fmin(CIE_FIRST_NM + i + k, CIE_LAST_NM);
 		spectrum s = f(user, &w);
@@ -114,7 +114,7 @@ static void test_grey_is_constant(void **state)
 		const double rgb[3] = {greys[i], greys[i], greys[i]};
 		struct color c;
 		assert_int_equal(color_from_rgb(rgb, COLOR_REFLECTANCE, &c), 0);
-		assert_int_equal(c.shape, COLOR_SHAPE_CONSTANT);
+		assert_int_equal(c.kind, COLOR_KIND_CONSTANT);
 		for (double u = 0; u < 1; u += 0.01) {
 			struct wavelengths w = wavelengths_sample(u);
 			assert_true(spectrum_max(color_eval(&c, &w)) == greys[i]);
@@ -123,8 +123,8 @@ static void test_grey_is_constant(void **state)
 		assert_true(color_max(&c) == greys[i]);
 		assert_true(fabs(color_mean(&c) - greys[i]) <= 1e-15);
 		assert_int_equal(color_from_rgb(rgb, COLOR_ILLUMINANT, &c), 0);
-		assert_int_equal(c.shape, COLOR_SHAPE_D65);
-		const struct wavelengths grey = {.grey = true};
+		assert_int_equal(c.kind, COLOR_KIND_D65);
+		const struct wavelengths grey = {.is_grey = true};
 		assert_true(spectrum_max(color_eval(&c, &grey)) == greys[i]);
 	}
 }
@@ -160,7 +160,7 @@ struct bounces {
 static spectrum at_bounces(const void *user, const struct wavelengths *w)
 {
 	const struct bounces *b = user;
-	spectrum s = spectrum_of(1);
+	spectrum s = spectrum_constant(1);
 	for (int i = 0; i < b->count; i++)
 		s = spectrum_mul(s, color_eval(&b->color, w));
 	return s;
@@ -246,7 +246,7 @@ static void test_unbounded_keeps_its_rgb(void **state)
 	/* likewise in textures */
 	rgb_of(at_unbounded, k, true, rgb);
 	for (int i = 0; i < 3; i++)
-		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_OVER * 0.005 * k[0]); /* error of the table */
+		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_SCALE * 0.005 * k[0]); /* error of the table */
 	const struct wavelengths w = wavelengths_sample(0.1);
 	const double grey[3] = {7, 7, 7}, black[3] = {0, 0, 0};
 	assert_true(color_eval_rgb_unbounded(grey, &w).v[0] == 7);
@@ -281,8 +281,8 @@ static void test_few_wavelengths(void **state)
 			for (double u = 0; u < 1; u += 0.01) {
 				struct color c;
 				assert_int_equal(color_from_rgb(rgb, (enum color_role)role, &c), 0);
-				struct wavelengths w = wavelengths_sample_few(u, count), each = w;
-				each.few = 0;
+				struct wavelengths w = wavelengths_sample_distinct(u, count), each = w;
+				each.period = 0;
 				spectrum few = color_eval(&c, &w), all = color_eval(&c, &each);
 				assert_memory_equal(&few, &all, sizeof few);
 				assert_true(few.v[0] == few.v[2] && few.v[1] == few.v[3]);
@@ -332,9 +332,9 @@ static void test_tables(void **state)
 	const double even[] = {0.25};
 	v = table_of(NULL, even, 1);
 	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &arena, &c, &e), 0);
-	assert_int_equal(c.shape, COLOR_SHAPE_CONSTANT);
+	assert_int_equal(c.kind, COLOR_KIND_CONSTANT);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
-	assert_int_equal(c.shape, COLOR_SHAPE_CONSTANT);
+	assert_int_equal(c.kind, COLOR_KIND_CONSTANT);
 	arena_fini(&arena);
 }
 
@@ -395,9 +395,9 @@ static void test_two_tables_at_once(void **state)
 				assert_int_equal(color_from_value(&vb, COLOR_UNBOUNDED, &arena, &b, &e), 0);
 				a.scale = 0.5;
 				b.nm = u < 0.5 ? a.nm : b.nm; /* like the tables of metals */
-				struct wavelengths w = wavelengths_sample_few(u, few ? few : SPECTRUM_LANES);
+				struct wavelengths w = wavelengths_sample_distinct(u, few ? few : SPECTRUM_LANES);
 				spectrum out[2], sa = color_eval(&a, &w), sb = color_eval(&b, &w);
-				color_eval_both(&a, &b, &w, out);
+				color_eval_pair(&a, &b, &w, out);
 				for (int i = 0; i < SPECTRUM_LANES; i++) {
 					assert_true(fabs(sa.v[i] - 0.5 * by_search(nm[k], x, 6, w.nm[i])) < 1e-12);
 					assert_true(fabs(sb.v[i] - by_search(nm[k], y, 6, w.nm[i])) < 1e-11);

@@ -31,7 +31,7 @@ static size_t check(const struct image *from, uint32_t index_bytes)
 	assert_true(i.width == from->width && i.height == from->height && i.channels == from->channels);
 	assert_int_equal(i.index8 ? 1 : i.index16 ? 2 : 0, index_bytes);
 	for (size_t k = 0; k < (size_t)i.width * i.height * i.channels; k++) {
-		float x = indexed_image_at(&i, k);
+		float x = indexed_image_value(&i, k);
 		assert_memory_equal(&x, &from->pixels[k], sizeof x);
 	}
 	size_t used = a.used;

@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-static const struct raster_range reflectance = {0, 1, false, IMAGE_ALL}, light = {0, 1e30, false, IMAGE_ALL},
-				 height = {-1e30, 1e30, true, IMAGE_ALL};
+static const struct raster_options reflectance = {0, 1, false, IMAGE_ALL}, light = {0, 1e30, false, IMAGE_ALL},
+				   height = {-1e30, 1e30, true, IMAGE_ALL};
 
 struct counted {
 	struct asset_source inner;
@@ -37,14 +37,14 @@ static void check_maximum(const struct raster *r)
 {
 	double m = 0;
 	for (uint32_t i = 0; i < r->image.width * r->image.height * r->image.channels; i++)
-		m = fmax(m, (double)indexed_image_at(&r->image, i));
+		m = fmax(m, (double)indexed_image_value(&r->image, i));
 	assert_true(raster_max(r) == m && raster_max(r) == m);
 }
 
-static struct indexed_image image_of(const struct asset_source *s, const char *text, const struct raster_range *range,
+static struct indexed_image image_of(const struct asset_source *s, const char *text, const struct raster_options *range,
 				     struct arena *a)
 {
-	struct raster r = {.nearest = false};
+	struct raster r = {.is_nearest = false};
 	struct error e;
 	char plugin[128];
 	snprintf(plugin, sizeof plugin, "bitmap %s", text);
@@ -64,7 +64,8 @@ static void test_shared(void **state)
 	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 0.75, 0.75, 0.5, 0.5});
 	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 4, 0.75, 0.5, 0.5});
 	struct counted c = {.inner = pictures_source(&p)};
-	const struct asset_source s = {.user = &c, .open = open_counted, .close = close_counted, .decoded = &cache};
+	const struct asset_source s = {
+		.user = &c, .open = open_counted, .close = close_counted, .picture_cache = &cache};
 	const uint8_t *first = image_of(&s, "filename=p0", &reflectance, &a).index8;
 	assert_ptr_equal(image_of(&s, "filename=p0 wrap_mode=clamp", &reflectance, &a).index8, first);
 	assert_ptr_equal(image_of(&s, "filename=p0", &light, &a).index8, first);
@@ -77,7 +78,7 @@ static void test_shared(void **state)
 	assert_int_equal(c.opened, 5); /* gamma=1 reads the same numbers as a height */
 	const struct indexed_image bright = image_of(&s, "filename=p1", &light, &a),
 				   cut = image_of(&s, "filename=p1", &reflectance, &a);
-	assert_true(indexed_image_at(&bright, 2) == 4 && indexed_image_at(&cut, 2) == 1);
+	assert_true(indexed_image_value(&bright, 2) == 4 && indexed_image_value(&cut, 2) == 1);
 	assert_ptr_equal(image_of(&s, "filename=p1", &reflectance, &a).index8, cut.index8);
 	assert_ptr_equal(image_of(&s, "filename=p1", &light, &a).index8, bright.index8);
 	assert_int_equal(c.opened, 7);

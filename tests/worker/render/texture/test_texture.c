@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths grey = {.is_grey = true};
 static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
 
 struct fixture {
@@ -86,7 +86,7 @@ static void assert_value(const struct texture *t, double u, double v, double exp
 static void test_orientation_and_pixel_centres(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
 	assert_false(texture_is_constant(&t));
 	assert_true(texture_max(&t) == 1);
 	/* The upper left pixel is at small u and small v. */
@@ -179,7 +179,7 @@ static void test_uv_maps(void **state)
 static void test_colours(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 	const double red[3] = {0.5, 0.125, 0.0625};
 	spectrum s = look_up(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
@@ -191,7 +191,7 @@ static void test_colours(void **state)
 	t = make_texture(*state, "bitmap filename=p2", COLOR_REFLECTANCE);
 	assert_value(&t, 0.5, 0.5, 1);
 	t = make_texture(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_D65);
 	s = look_up(&t, 0.5, 0.5, &colour);
 	assert_true(fabs(s.v[1] - 4 * color_d65(550)) < 1e-12);
 	assert_value(&t, 0.5, 0.5, 4);
@@ -206,12 +206,12 @@ static void test_checkerboard(void **state)
 	assert_value(&t, 0.25, 0.75, 0.2);
 	assert_value(&t, -0.25, -0.25, 0.4);
 	assert_true(texture_max(&t) == 0.4);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
 	t = make_texture(*state, "checkerboard color0=1 color1=0 uscale=4", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25 / 4, 0.25, 1);
 	assert_value(&t, 0.75 / 4, 0.25, 0);
 	t = make_texture(*state, "checkerboard color0=rgb(1,0.5,0.2)", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 }
 
 static void test_gridtexture(void **state)
@@ -242,7 +242,7 @@ static void test_plain_values_and_fallback(void **state)
 	assert_int_equal(texture_from_node(&t, n, "absent", 0.5, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 0, 0, 0.5);
 	assert_int_equal(texture_from_node(&t, n, "absent", 2, COLOR_ILLUMINANT, &f->build, &e), 0);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_D65);
 }
 
 static void test_refusals_say_why(void **state)
@@ -330,7 +330,7 @@ static void test_scale(void **state)
 	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 1.5 / 3, 0.25, 0.5);
 	assert_value(&t, 0.5 / 3, 0.75, 1);
-	assert_true(texture_max(&t) == 1 && texture_shape(&t) == COLOR_SHAPE_CONSTANT);
+	assert_true(texture_max(&t) == 1 && texture_color_kind(&t) == COLOR_KIND_CONSTANT);
 	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=0.5 value=rgb(0.8,0.8,0.8)");
 	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 0.2, 0.7, 0.4);
@@ -378,9 +378,9 @@ static void test_numbers(void **state)
 	};
 	const struct texture_build build = f->build;
 	struct picture_cache cache = {.arena = &f->arena};
-	f->source.decoded = &cache;
+	f->source.picture_cache = &cache;
 	struct texture red = make_texture(f, "bitmap filename=p1 filter_type=nearest", COLOR_REFLECTANCE);
-	f->build.number = true;
+	f->build.is_number = true;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		f->build.dialect_3 = cases[i].dialect_3;
 		struct texture t = make_texture(f, cases[i].text, COLOR_REFLECTANCE);
@@ -390,7 +390,7 @@ static void test_numbers(void **state)
 				fail_msg("row %zu: %.9g is not %.9g", i, x.v[k], cases[i].expected);
 	}
 	f->build = build;
-	f->source.decoded = NULL;
+	f->source.picture_cache = NULL;
 	/* The colour is not affected by the other use of the same file. */
 	spectrum x = look_up(&red, 0.25, 0.25, &colour);
 	assert_true(x.v[2] > 2 * x.v[1]);
@@ -425,9 +425,9 @@ static void test_tint(void **state)
 		assert_true(x.v[i] <= texture_max(&t));
 	}
 	t = tinted_texture(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 	t = tinted_texture(f, "scale scale=rgb(0.5,0.5,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
 	assert_value(&t, 0.5 / 3, 0.75, 0.375);
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=rgb(1,1,0)");
 	struct error e;
@@ -446,7 +446,7 @@ static void test_product(void **state)
 	node_add_ref(&f->arena, n, "scale", node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p1"));
 	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 	struct texture p0 = make_texture(f, "bitmap filename=p0", COLOR_REFLECTANCE),
 		       p1 = make_texture(f, "bitmap filename=p1", COLOR_REFLECTANCE);
 	for (int k = 0; k < 20; k++) {
@@ -463,7 +463,7 @@ static void test_product(void **state)
 static void test_channel_and_threshold(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
-	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
 	assert_value(&t, 0.25, 0.5, 0.125);
 	t = make_texture(*state, "bitmap filename=p1 channel=b", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25, 0.5, 0.0625);

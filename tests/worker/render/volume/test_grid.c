@@ -38,7 +38,7 @@ static void fill(struct trial *t, struct dice *d, bool sparse)
 {
 	size_t count = (size_t)(t->g.channels * t->g.size[0] * t->g.size[1] * t->g.size[2]);
 	for (size_t i = 0; i < count; i++)
-		t->value[i] = !sparse && dice_below(d, 4) ? (float)dice_throw(d) : 0;
+		t->value[i] = !sparse && dice_below(d, 4) ? (float)dice_uniform(d) : 0;
 	/* Also at the borders, which matter on the opposite side if the grid repeats. */
 	for (int n = 0; n < 2; n++) {
 		size_t at = 0;
@@ -55,15 +55,16 @@ static void set_box(struct grid *g)
 {
 	mat4 back;
 	assert_true(mat4_invert(g->to_cells, &back));
-	vec3 middle = mat4_point(&back, (vec3){(g->low[0] + g->high[0]) / 2, (g->low[1] + g->high[1]) / 2,
-					       (g->low[2] + g->high[2]) / 2}),
-	     corner = mat4_point(&back, (vec3){g->low[0], g->low[1], g->low[2]});
+	vec3 middle = mat4_point(&back,
+				 (vec3){(g->cell_min[0] + g->cell_max[0]) / 2, (g->cell_min[1] + g->cell_max[1]) / 2,
+					(g->cell_min[2] + g->cell_max[2]) / 2}),
+	     corner = mat4_point(&back, (vec3){g->cell_min[0], g->cell_min[1], g->cell_min[2]});
 	double size = vec3_length(vec3_sub(corner, middle));
-	g->least = vec3_sub(middle, (vec3){size, size, size});
-	g->most = vec3_add(middle, (vec3){size, size, size});
+	g->world_min = vec3_sub(middle, (vec3){size, size, size});
+	g->world_max = vec3_add(middle, (vec3){size, size, size});
 	for (int i = 0; i < 3; i++) {
-		g->low[i] = -GRID_CELL_MAX;
-		g->high[i] = GRID_CELL_MAX;
+		g->cell_min[i] = -GRID_CELL_MAX;
+		g->cell_max[i] = GRID_CELL_MAX;
 	}
 }
 
@@ -72,25 +73,25 @@ static void make_trial(struct trial *t, struct dice *d, bool upright)
 {
 	struct grid *g = &t->g;
 	*g = (struct grid){.channels = dice_below(d, 2) ? 3 : 1,
-			   .nearest = dice_below(d, 4) == 0,
-			   .outside = (enum grid_outside)dice_below(d, 4),
+			   .is_nearest = dice_below(d, 4) == 0,
+			   .wrap = (enum grid_wrap)dice_below(d, 4),
 			   .value = t->value,
 			   .to_cells = upright ? mat4_identity() : some_place(d)};
 	int most = dice_below(d, 4) ? 6 : SIDE_MAX;
 	for (int i = 0; i < 3; i++) {
-		bool at_points = g->outside == GRID_ZERO && !g->nearest;
+		bool at_points = g->wrap == GRID_ZERO && !g->is_nearest;
 		g->size[i] = 1 + at_points + (int)dice_below(d, (uint32_t)most - 1);
-		g->low[i] = at_points || g->nearest ? 0 : -0.5;
-		g->high[i] = at_points ? g->size[i] - 1 : g->low[i] + g->size[i];
+		g->cell_min[i] = at_points || g->is_nearest ? 0 : -0.5;
+		g->cell_max[i] = at_points ? g->size[i] - 1 : g->cell_min[i] + g->size[i];
 	}
-	g->turned = g->outside == GRID_CLAMP && !upright && dice_below(d, 4);
-	if (g->turned)
+	g->is_world_aligned = g->wrap == GRID_CLAMP && !upright && dice_below(d, 4);
+	if (g->is_world_aligned)
 		set_box(g);
 	fill(t, d, dice_below(d, 2));
 	memset(t->full, 0, sizeof t->full);
-	assert_true(grid_bricks(g) <= BRICKS_MAX);
-	grid_find_full(g, t->full);
-	g->full = t->full;
+	assert_true(grid_brick_count(g) <= BRICKS_MAX);
+	grid_find_occupied_bricks(g, t->full);
+	g->occupied_bricks = t->full;
 }
 
 /* ---- tests ---- */
@@ -99,7 +100,7 @@ static void test_values(void **state)
 {
 	(void)state;
 	static struct trial t;
-	struct dice d = dice_of("values of grids");
+	struct dice d = dice_for_test("values of grids");
 	unsigned inside = 0;
 	for (int round = 0; round < 4000; round++) {
 		make_trial(&t, &d, round % 2 == 0);
@@ -111,13 +112,13 @@ static void test_values(void **state)
 				cells = (vec3){floor(cells.x), floor(cells.y), floor(cells.z)};
 			vec3 p = mat4_point(&back, cells);
 			double x[3], value[3];
-			slow_grid_cells(&t.g, &(struct grid_ray){p, {0, 0, 0}, 0, 0}, 0, x);
-			bool in = grid_at(&t.g, p, value);
+			slow_grid_position(&t.g, &(struct grid_ray){p, {0, 0, 0}, 0, 0}, 0, x);
+			bool in = grid_eval(&t.g, p, value);
 			inside += in;
-			assert_true(in == slow_grid_has(&t.g, p));
+			assert_true(in == slow_grid_contains(&t.g, p));
 			for (int k = 0; k < 3; k++) {
 				double wanted = slow_grid_value(&t.g, x, k < t.g.channels ? k : 0);
-				if (!in && t.g.outside == GRID_ZERO)
+				if (!in && t.g.wrap == GRID_ZERO)
 					wanted = 0;
 				if (fabs(value[k] - wanted) > 1e-11)
 					fail_msg("round %d, channel %d: %.17g, not %.17g", round, k, value[k], wanted);
@@ -134,7 +135,8 @@ static struct grid_ray some_ray(const struct grid *g, struct dice *d, bool whole
 	double from[3], to[3];
 	for (int i = 0; i < 3; i++) {
 		from[i] = dice_between(d, -3, SIDE_MAX + 3);
-		to[i] = dice_between(d, g->turned ? -1 : g->low[i], g->turned ? g->size[i] : g->high[i]);
+		to[i] = dice_between(d, g->is_world_aligned ? -1 : g->cell_min[i],
+				     g->is_world_aligned ? g->size[i] : g->cell_max[i]);
 		if (whole) {
 			to[i] = floor(2 * to[i]) / 2;
 			from[i] = to[i] + (int)dice_below(d, 3) - 1;
@@ -157,27 +159,28 @@ static struct grid_ray some_ray(const struct grid *g, struct dice *d, bool whole
 static bool runs_along_a_jump(const struct grid *g, const struct grid_ray *r)
 {
 	double a[3], b[3];
-	slow_grid_cells(g, r, 0, a);
-	slow_grid_cells(g, r, 1, b);
+	slow_grid_position(g, r, 0, a);
+	slow_grid_position(g, r, 1, b);
 	for (int i = 0; i < 3; i++)
-		if (b[i] == a[i] && (g->nearest ? a[i] == floor(a[i]) : a[i] == g->low[i] || a[i] == g->high[i]))
+		if (b[i] == a[i] &&
+		    (g->is_nearest ? a[i] == floor(a[i]) : a[i] == g->cell_min[i] || a[i] == g->cell_max[i]))
 			return true;
 	return false;
 }
 
 static void check_reach(const struct grid *g, const struct grid_ray *r, const double sum[3], struct dice *d)
 {
-	const double weight[3] = {dice_throw(d), dice_throw(d), dice_throw(d)};
+	const double weight[3] = {dice_uniform(d), dice_uniform(d), dice_uniform(d)};
 	double all = 0, least, up_to[3], passed[3], found = 0;
 	for (int k = 0; k < g->channels; k++)
 		all += weight[k] * sum[k];
 	least = all * dice_between(d, 0, 1);
-	assert_true(grid_reach(g, r, weight, all * (1 + 1e-9) + 1e-9, passed) == INFINITY);
+	assert_true(grid_invert_integral(g, r, weight, all * (1 + 1e-9) + 1e-9, passed) == INFINITY);
 	for (int k = 0; k < 3; k++)
 		assert_true(fabs(passed[k] - sum[k]) < 1e-12);
 	if (!(least > 0))
 		return;
-	double t = grid_reach(g, r, weight, least, passed);
+	double t = grid_invert_integral(g, r, weight, least, passed);
 	assert_true(t >= r->t0 && t <= r->t1);
 	grid_integrate(g, &(struct grid_ray){r->o, r->d, r->t0, t}, up_to);
 	for (int k = 0; k < g->channels; k++)
@@ -192,7 +195,7 @@ static void test_rays(void **state)
 {
 	(void)state;
 	static struct trial t;
-	struct dice d = dice_of("rays through grids");
+	struct dice d = dice_for_test("rays through grids");
 	unsigned met = 0;
 	for (int round = 0; round < 3000; round++) {
 		bool whole = round % 2 == 0;
@@ -222,7 +225,7 @@ static void test_hard_rays(void **state)
 {
 	(void)state;
 	static struct trial t;
-	struct dice d = dice_of("hard rays through grids");
+	struct dice d = dice_for_test("hard rays through grids");
 	const double slopes[] = {0, -0.0, 1e-320, -1e-320, 1e-200, -1e-200, 1e-30, -1e-17};
 	for (int round = 0; round < 2000; round++) {
 		make_trial(&t, &d, true);
@@ -236,7 +239,7 @@ static void test_hard_rays(void **state)
 		feclearexcept(FE_INVALID);
 		grid_integrate(&t.g, &r, sum);
 		grid_integrate(&t.g, &plain, straight);
-		assert_true(grid_reach(&t.g, &r, (const double[3]){1, 1, 1}, 0, straight) >= 0);
+		assert_true(grid_invert_integral(&t.g, &r, (const double[3]){1, 1, 1}, 0, straight) >= 0);
 		grid_integrate(&t.g, &plain, straight);
 		assert_false(fetestexcept(FE_INVALID)); /* renderers trap it */
 		for (int k = 0; k < 3 && !in_plane; k++)
@@ -250,8 +253,8 @@ static void test_hard_rays(void **state)
 			r.o = far[i];
 			grid_integrate(&t.g, &r, sum);
 			assert_true(isfinite(sum[0] + sum[1] + sum[2]));
-			assert_true(grid_reach(&t.g, &r, (const double[3]){1, 1, 1}, 1e-3, sum) >= 0);
-			assert_true(grid_at(&t.g, far[i], sum) == false);
+			assert_true(grid_invert_integral(&t.g, &r, (const double[3]){1, 1, 1}, 1e-3, sum) >= 0);
+			assert_true(grid_eval(&t.g, far[i], sum) == false);
 			assert_true(isfinite(sum[0] + sum[1] + sum[2]));
 		}
 	}

@@ -46,7 +46,7 @@ static const struct memory_file *scene_of(const char *version, const char *type,
 
 static struct world *world_with(const char *version, const char *inner)
 {
-	return world_of_files(8, 8, scene_of(version, "heterogeneous", inner));
+	return world_from_files(8, 8, scene_of(version, "heterogeneous", inner));
 }
 
 #define GRID(name, params) \
@@ -102,7 +102,7 @@ static void check_place(const struct place *t)
 		 *t->version == '0' ? "density" : "sigma_t", t->params);
 	struct world *w = world_with(t->version, inner);
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	struct dice d = dice_of("places of grids");
+	struct dice d = dice_for_test("places of grids");
 	for (int round = 0; round < 300; round++) {
 		double u[3];
 		bool inside = true;
@@ -161,8 +161,8 @@ static void test_turned(void **state)
 			 old ? "density" : "sigma_t", 45 / acos(0));
 		struct world *w = world_with(old ? "0.6.0" : "3.0.0", inner);
 		const struct wavelengths wl = wavelengths_sample(0.3);
-		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
-		struct dice d = dice_of("turned grids");
+		const struct medium_lanes lanes = medium_lanes_along(&w->media[0], along_z, &wl);
+		struct dice d = dice_for_test("turned grids");
 		unsigned beside = 0;
 		for (int round = 0; round < 500; round++) {
 			vec3 p = {dice_between(&d, -0.6, 1), dice_between(&d, -0.1, 1.5), dice_between(&d, -0.1, 1.1)};
@@ -181,7 +181,8 @@ static void test_turned(void **state)
 				fail_msg("%d: %g at %g %g %g, not %g", old, found, p.x, p.y, p.z, wanted);
 			const struct grid_ray r = {here, {0, 0, 1}, 0, 1e-7};
 			if (wanted == 0 || p.z < 0.99)
-				assert_true(fabs(medium_depth(&lanes, &r).v[0] / r.t1 * w->scale - wanted) < 1e-5);
+				assert_true(fabs(medium_optical_depth(&lanes, &r).v[0] / r.t1 * w->scale - wanted) <
+					    1e-5);
 		}
 		assert_true(beside > 100);
 		world_free(w);
@@ -215,7 +216,7 @@ static void test_outside(void **state)
 		snprintf(inner, sizeof inner, GRID("albedo", "%s") "<float name='%s' value='3'/>", cases[i].params,
 			 *cases[i].version == '0' ? "density" : "sigma_t");
 		const char *type = *cases[i].version == '0' ? "heterogeneous" : "homogeneous";
-		struct world *w = world_of_files(8, 8, scene_of(cases[i].version, type, inner));
+		struct world *w = world_from_files(8, 8, scene_of(cases[i].version, type, inner));
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){cases[i].u, 0.5, 0.5}, w->center));
 		double found = medium_scattering(&w->media[0], p, along_z, &wl).v[0] * w->scale / 3;
 		if (fabs(found - cases[i].wanted) > 1e-9)
@@ -234,20 +235,20 @@ static void test_colours(void **state)
 	(void)state;
 	enum { WAVELENGTHS = 4000 };
 	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 3, linear_field);
-	const struct wavelengths rgb = {.rgb = true};
+	const struct wavelengths rgb = {.is_rgb = true};
 	for (int k = 0; k < 4; k++) {
 		for (int i = 0; i < 3; i++)
 			grid.value[i] = k == 3 ? 0.7f : k == i;
 		vol_write(&grid);
 		struct world *w = world_with("3.0.0", GRID("albedo", ""));
 		const struct volume *v = &w->media[0].second;
-		spectrum here = volume_at(v, (vec3){0, 0, 0}, false, &rgb);
+		spectrum here = volume_eval(v, (vec3){0, 0, 0}, false, &rgb);
 		for (int i = 0; i < 3; i++)
 			assert_true(here.v[i] == (double)grid.value[i]);
 		double xyz[3] = {0}, red, green, blue;
 		for (int n = 0; n < WAVELENGTHS; n++) {
 			struct wavelengths wl = wavelengths_sample((n + 0.5) / WAVELENGTHS);
-			spectrum l = volume_at(v, (vec3){0, 0, 0}, false, &wl);
+			spectrum l = volume_eval(v, (vec3){0, 0, 0}, false, &wl);
 			double one[3];
 			for (int i = 0; i < SPECTRUM_LANES; i++) {
 				assert_true(l.v[i] >= 0 && l.v[i] <= 1);
@@ -293,7 +294,7 @@ static void test_cube(void **state)
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w = world_with(cases[i].version, cases[i].inner);
-		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
+		const struct medium_lanes lanes = medium_lanes_along(&w->media[0], along_z, &wl);
 		double middle = cases[i].low + cases[i].size / 2;
 		for (double off = -0.85; off < 1; off += 0.2) {
 			bool in = cases[i].size == 0 || fabs(off) * cases[i].size < cases[i].size / 2;
@@ -301,7 +302,8 @@ static void test_cube(void **state)
 					    vec3_sub((vec3){middle + off * cases[i].size, middle, middle}, w->center));
 			assert_true(fabs(medium_extinction(&w->media[0], p, along_z, &wl).v[2] * w->scale - in) <
 				    1e-12);
-			double depth = medium_depth(&lanes, &(struct grid_ray){p, {0, 0, 1}, 0, 9 * w->scale}).v[1];
+			double depth =
+				medium_optical_depth(&lanes, &(struct grid_ray){p, {0, 0, 1}, 0, 9 * w->scale}).v[1];
 			assert_true(fabs(depth - (cases[i].size == 0 ? 9 : in ? cases[i].size / 2 : 0)) < 1e-12);
 		}
 		world_free(w);
@@ -311,9 +313,9 @@ static void test_cube(void **state)
 static void check_same(const char *version, const char *a, const char *b)
 {
 	struct world *w[2];
-	const struct wavelengths rgb = {.rgb = true};
+	const struct wavelengths rgb = {.is_rgb = true};
 	for (int i = 0; i < 2; i++)
-		w[i] = world_of_files(8, 8, scene_of(version, i ? "homogeneous" : "heterogeneous", i ? b : a));
+		w[i] = world_from_files(8, 8, scene_of(version, i ? "homogeneous" : "heterogeneous", i ? b : a));
 	for (int i = 0; i < 3; i++) {
 		const struct medium *m[2] = {&w[0]->media[0], &w[1]->media[0]};
 		vec3 p = vec3_scale(w[0]->scale, vec3_sub((vec3){0.1, 0.2, 0.3}, w[0]->center));
@@ -349,9 +351,9 @@ static void test_bytes(void **state)
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, linear_field);
 	vol_put32(&grid, 4, 3);
-	grid.bytes[VOL_HEAD] = 51;
-	grid.bytes[VOL_HEAD + 1] = 255;
-	grid.size = VOL_HEAD + 2;
+	grid.bytes[VOL_HEADER_BYTES] = 51;
+	grid.bytes[VOL_HEADER_BYTES + 1] = 255;
+	grid.size = VOL_HEADER_BYTES + 2;
 	struct world *w = world_with("3.0.0", GRID("sigma_t", "<string name='filter_type' value='nearest'/>") EVEN);
 	for (int i = 0; i < 2; i++) {
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){0.25 + 0.5 * i, 0.5, 0.5}, w->center));
@@ -371,7 +373,7 @@ static void test_shared(void **state)
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	struct world *w = world_with("3.0.0", GRID("sigma_t", "") GRID("albedo", TWICE));
 	assert_ptr_equal(w->media[0].first.grid->value, w->media[0].second.grid->value);
-	assert_ptr_equal(w->media[0].first.grid->full, w->media[0].second.grid->full);
+	assert_ptr_equal(w->media[0].first.grid->occupied_bricks, w->media[0].second.grid->occupied_bricks);
 	assert_true(w->media[0].first.grid->to_cells.m[0][0] > 1.5 * w->media[0].second.grid->to_cells.m[0][0]);
 	world_free(w);
 	char inner[512];
@@ -386,21 +388,21 @@ static void test_shared(void **state)
 
 static void refused(const char *version, const char *inner, const char *sentence)
 {
-	world_of_files_refused(scene_of(version, "heterogeneous", inner), sentence);
+	world_check_files_refused(scene_of(version, "heterogeneous", inner), sentence);
 }
 
 static void test_refused(void **state)
 {
 	(void)state;
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
-	world_of_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
-			       "sigma_t must not vary in space in a homogeneous medium");
+	world_check_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
+				  "sigma_t must not vary in space in a homogeneous medium");
 	/* A rotation by 90 degrees as exporters write it. */
 	struct world *upright =
 		world_with("3.0.0", GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform "
 						    "name='to_world'><matrix value='6e-17 0 1 0 0 1 0 0 "
 						    "-1 0 6e-17 0 0 0 0 1'/></transform>"));
-	assert_false(upright->media[0].first.grid->turned);
+	assert_false(upright->media[0].first.grid->is_world_aligned);
 	world_free(upright);
 	refused("3.0.0",
 		GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
@@ -475,11 +477,11 @@ static void test_effects(void **state)
 		worlds_effects = cases[i].effects;
 		struct world *w = world_with("3.0.0", GRID("sigma_t", "") "<float name='albedo' value='0.2'/>");
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){0.4, 0.4, 0.4}, w->center));
-		const struct medium_lanes lanes = medium_at(&w->media[0], along_z, &wl);
+		const struct medium_lanes lanes = medium_lanes_along(&w->media[0], along_z, &wl);
 		const struct grid_ray r = {p, {0, 0, 1}, 0, 0.1 * w->scale};
 		double sigma = medium_extinction(&w->media[0], p, along_z, &wl).v[1];
 		assert_true(fabs(sigma * w->scale - cases[i].share * 0.3) < 1e-7);
-		assert_true(fabs(medium_depth(&lanes, &r).v[1] - sigma * r.t1) < 1e-12);
+		assert_true(fabs(medium_optical_depth(&lanes, &r).v[1] - sigma * r.t1) < 1e-12);
 		world_free(w);
 	}
 	for (int i = 1; i <= 2; i++) {
@@ -492,7 +494,7 @@ static void test_effects(void **state)
 	worlds_effects = NULL;
 	grid.value[0] = 1;
 	vol_write(&grid);
-	struct world *white = world_of_files(8, 8, scene_of("3.0.0", "homogeneous", GRID("albedo", "")));
+	struct world *white = world_from_files(8, 8, scene_of("3.0.0", "homogeneous", GRID("albedo", "")));
 	assert_true(fabs(medium_extinction(&white->media[0], (vec3){0, 0, 0}, along_z, &wl).v[0] * white->scale - 1) <
 		    1e-12);
 	world_free(white);

@@ -44,7 +44,7 @@ static struct world *world_with(uint32_t channels, const char *inner)
 	vol_make(&grid, (const uint32_t[3]){8, 8, 8}, channels, field);
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", inner);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"g.vol", grid.bytes, grid.size}, {0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 /* Returns the value at a point of the world: the box of the grid runs from -2 to 2, and its first and last points are
@@ -57,13 +57,13 @@ static double wanted_at(const struct world *w, vec3 p, uint32_t channel)
 
 static void assert_reflectance(const struct world *w, const struct surface_point *x, uint32_t channels)
 {
-	const struct bsdf *b = &w->bsdfs[w->parts[x->prim.shape].bsdf];
+	const struct bsdf *b = &w->bsdfs[w->shape_bindings[x->prim.shape].bsdf];
 	const struct bsdf_point p = world_bsdf_point(x, &colour, TRANSPORT_RADIANCE);
 	spectrum found = spectrum_scale(M_PI, b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}));
 	double rgb[3];
 	for (uint32_t k = 0; k < 3; k++)
 		rgb[k] = wanted_at(w, x->p, channels > 1 ? k : 0);
-	spectrum wanted = channels > 1 ? color_eval_rgb_reflectance(rgb, &colour) : spectrum_of(rgb[0]);
+	spectrum wanted = channels > 1 ? color_eval_rgb_reflectance(rgb, &colour) : spectrum_constant(rgb[0]);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		if (fabs(found.v[l] - wanted.v[l]) > 1e-5)
 			fail_msg("shape %u, lane %d: %g, not %g", x->prim.shape, l, found.v[l], wanted.v[l]);
@@ -82,8 +82,9 @@ static void test_places(void **state)
 			"</transform></shape><shape type='instance'><ref id='g'/><transform name='to_world'>"
 			"<rotate x='1' angle='70'/><translate y='-0.5'/></transform></shape>");
 		assert_int_equal(w->shape_count, 3);
-		assert_true(w->bsdfs[w->parts[0].bsdf].textured && w->parts[1].bsdf == w->parts[2].bsdf);
-		assert_true((w->bsdfs[w->parts[0].bsdf].shape == COLOR_SHAPE_OTHER) == (channels > 1));
+		assert_true(w->bsdfs[w->shape_bindings[0].bsdf].is_textured &&
+			    w->shape_bindings[1].bsdf == w->shape_bindings[2].bsdf);
+		assert_true((w->bsdfs[w->shape_bindings[0].bsdf].color_kind == COLOR_KIND_OTHER) == (channels > 1));
 		for (uint32_t i = 0; i < 3; i++)
 			for (uint32_t t = 0; t < w->shapes[i].triangle_count; t += 3) {
 				struct surface_point x;
@@ -103,8 +104,8 @@ static void check_lamp(const char *shape, uint32_t channels)
 		 shape);
 	struct world *w = world_with(channels, inner);
 	const struct emitter *em = &w->emitters[0];
-	struct dice d = dice_of("a lamp with a volume");
-	assert_true(em->textured && em->power > 0);
+	struct dice d = dice_for_test("a lamp with a volume");
+	assert_true(em->is_textured && em->power > 0);
 	for (int i = 0; i < 100; i++) {
 		const double u[2] = {dice_between(&d, 0, 1), dice_between(&d, 0, 1)};
 		struct emitter_point drawn;
@@ -113,7 +114,8 @@ static void check_lamp(const char *shape, uint32_t channels)
 		assert_true(em->ops->sample_point(em, u, &drawn, &pdf));
 		for (uint32_t k = 0; k < 3; k++)
 			rgb[k] = wanted_at(w, drawn.p, channels > 1 ? k : 0);
-		assert_true(surface_near(&w->shapes[0], (struct prim_ref){0, drawn.where.prim, 0}, drawn.p, &met));
+		assert_true(surface_nearest(&w->shapes[0], (struct prim_ref){0, drawn.texture_point.prim, 0}, drawn.p,
+					    &met));
 		struct emitter_point as_met = world_emitter_point(&met);
 		spectrum wanted = color_eval_rgb_illuminant(rgb, &colour),
 			 found[2] = {em->ops->radiance(em, &drawn, drawn.n, &colour),
@@ -121,7 +123,7 @@ static void check_lamp(const char *shape, uint32_t channels)
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			for (int k = 0; k < 2; k++)
 				if (fabs(found[k].v[l] - wanted.v[l]) > 1e-4 * wanted.v[l] ||
-				    wanted.v[l] > em->brightest * (1 + 1e-9))
+				    wanted.v[l] > em->brightness_bound * (1 + 1e-9))
 					fail_msg("%s: %g, not %g", shape, found[k].v[l], wanted.v[l]);
 	}
 	world_free(w);
@@ -142,8 +144,8 @@ static void test_roughness(void **state)
 	struct world *w = world_with(
 		1, SKY "<shape type='sphere'><bsdf type='roughconductor'>" VOLUME("alpha") "</bsdf></shape>");
 	const struct bsdf *b = &w->bsdfs[0];
-	if (!(b->alpha >= 0.2 && b->alpha < 0.22))
-		fail_msg("alpha %g", b->alpha);
+	if (!(b->min_alpha >= 0.2 && b->min_alpha < 0.22))
+		fail_msg("alpha %g", b->min_alpha);
 	world_free(w);
 }
 
@@ -164,7 +166,7 @@ static void test_even(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w = world_with(1, cases[i].inner);
 		const struct bsdf *b = &w->bsdfs[0];
-		const struct bsdf_point p = {.w = &colour};
+		const struct bsdf_point p = {.wavelengths = &colour};
 		double found = M_PI * b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}).v[0];
 		assert_true(fabs(found - cases[i].wanted) < 1e-12);
 		world_free(w);
@@ -175,14 +177,14 @@ static void test_refused(void **state)
 {
 	(void)state;
 #define TEXTURE(property) "<texture type='volume' name='" property "'/>"
-	world_refused(SKY
-		      "<shape type='sphere'><bsdf type='bumpmap'>" TEXTURE("a") "<bsdf type='diffuse'/></bsdf></shape>",
-		      "a volume cannot displace a surface or bend its normals");
-	world_refused("<emitter type='projector'>" TEXTURE("irradiance") "</emitter>",
-		      "a volume is a texture for surfaces only");
-	world_refused(SKY "<shape type='sphere'><bsdf type='diffuse'><texture type='volume' name='reflectance'>"
-			  "<float name='volume' value='1.5'/></texture></bsdf></shape>",
-		      "1.5");
+	world_check_refused(
+		SKY "<shape type='sphere'><bsdf type='bumpmap'>" TEXTURE("a") "<bsdf type='diffuse'/></bsdf></shape>",
+		"a volume cannot displace a surface or bend its normals");
+	world_check_refused("<emitter type='projector'>" TEXTURE("irradiance") "</emitter>",
+			    "a volume is a texture for surfaces only");
+	world_check_refused(SKY "<shape type='sphere'><bsdf type='diffuse'><texture type='volume' name='reflectance'>"
+				"<float name='volume' value='1.5'/></texture></bsdf></shape>",
+			    "1.5");
 }
 
 int main(void)

@@ -100,13 +100,13 @@ static struct world *world_of(const char *body)
 		files[f++] = (struct memory_file){names[h], of_heat[h], write_grid(of_heat[h], h, false)};
 	}
 	files[f] = (struct memory_file){NULL, NULL, 0};
-	return world_of_files(16, 16, files);
+	return world_from_files(16, 16, files);
 }
 
 /* Returns the reflectance of a diffuse surface at each wavelength. */
 static spectrum albedo(const struct world *w, const struct surface_point *x)
 {
-	const struct bsdf *b = &w->bsdfs[w->parts[x->prim.shape].bsdf];
+	const struct bsdf *b = &w->bsdfs[w->shape_bindings[x->prim.shape].bsdf];
 	struct bsdf_point p = world_bsdf_point(x, &colour, TRANSPORT_RADIANCE);
 	return spectrum_scale(M_PI, b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}));
 }
@@ -161,8 +161,8 @@ static void test_linear(void **state)
 		assert_linear(w, i, i == 2);
 	assert_int_equal(w->shapes[4].triangle_count, 16 * TRIANGLES);
 	/* one material for each of the two shapes */
-	assert_true(w->parts[0].bsdf != w->parts[1].bsdf && w->bsdfs[0].textured &&
-		    w->bsdfs[0].shape == COLOR_SHAPE_OTHER);
+	assert_true(w->shape_bindings[0].bsdf != w->shape_bindings[1].bsdf && w->bsdfs[0].is_textured &&
+		    w->bsdfs[0].color_kind == COLOR_KIND_OTHER);
 	world_free(w);
 }
 
@@ -174,10 +174,11 @@ static void test_instances(void **state)
 #define INSTANCE(inner) "<shape type='instance'><ref id='g'/><transform name='to_world'>" inner "</transform></shape>"
 	struct world *w = world_of(SKY "<shape type='shapegroup' id='g'>" PLY("linear.ply", LINEAR) "</shape>" INSTANCE(
 		"<translate z='-0.1'/>") INSTANCE("<scale x='-1'/>") INSTANCE("<translate z='0.1'/>"));
-	assert_int_equal(w->sharing_count, 3);
+	assert_int_equal(w->sharing_shape_count, 3);
 	for (uint32_t i = 0; i < 3; i++)
 		assert_linear(w, i, i == 1);
-	assert_true(w->parts[0].bsdf == w->parts[2].bsdf && w->parts[0].bsdf != w->parts[1].bsdf);
+	assert_true(w->shape_bindings[0].bsdf == w->shape_bindings[2].bsdf &&
+		    w->shape_bindings[0].bsdf != w->shape_bindings[1].bsdf);
 	world_free(w);
 }
 
@@ -235,8 +236,8 @@ static void test_faces(void **state)
 	struct world *many = world_of(text),
 		     *one = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "face_heat"))));
 	worlds_accuracy = NULL;
-	assert_true(one->bsdfs[0].shape == COLOR_SHAPE_CONSTANT && !one->effects.colour);
-	const struct render_picture_how how = {.integrator = "path", .test = "faces", .spp = 4, .max_depth = 3};
+	assert_true(one->bsdfs[0].color_kind == COLOR_KIND_CONSTANT && !one->effects.colour);
+	const struct render_picture_options how = {.integrator = "path", .test = "faces", .spp = 4, .max_depth = 3};
 	struct picture a, b;
 	double sum = 0;
 	render_picture_xyz(many, &how, &a);
@@ -262,21 +263,22 @@ static void test_light(void **state)
 	struct world *w =
 		world_of(PLY("linear.ply", "<emitter type='area'>" FIELD("radiance", "vertex_color") "</emitter>"));
 	const struct emitter *em = &w->emitters[0];
-	assert_true(em->textured && em->shape == COLOR_SHAPE_OTHER && em->power > 0);
+	assert_true(em->is_textured && em->color_kind == COLOR_KIND_OTHER && em->power > 0);
 	for (int i = 0; i < 200; i++) {
 		const double u[2] = {(i + 0.5) / 200, (i * 7 % 200 + 0.5) / 200};
 		struct emitter_point drawn;
 		struct surface_point met;
 		double pdf, rgb[3];
 		assert_true(em->ops->sample_point(em, u, &drawn, &pdf));
-		assert_true(surface_near(&w->shapes[0], (struct prim_ref){0, drawn.where.prim, 0}, drawn.p, &met));
+		assert_true(surface_nearest(&w->shapes[0], (struct prim_ref){0, drawn.texture_point.prim, 0}, drawn.p,
+					    &met));
 		struct emitter_point as_met = world_emitter_point(&met);
 		linear_colour(w, drawn.p, rgb);
 		spectrum expected = color_eval_rgb_illuminant(rgb, &colour);
 		assert_close(em->ops->radiance(em, &drawn, drawn.n, &colour), expected, 1e-5);
 		assert_close(em->ops->radiance(em, &as_met, drawn.n, &colour), expected, 1e-5);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
-			assert_true(expected.v[l] <= em->brightest);
+			assert_true(expected.v[l] <= em->brightness_bound);
 	}
 	world_free(w);
 }
@@ -290,9 +292,9 @@ static void test_roughness(void **state)
 		world_of(SKY METAL PLY("h3", "<ref id='m'/>") PLY("h1", "<ref id='m'/>") PLY("h4", "<ref id='m'/>"));
 	const double heat[3] = {0.6, 0.2, 0.8};
 	for (uint32_t i = 0; i < 3; i++) {
-		const struct bsdf *b = &w->bsdfs[w->parts[i].bsdf];
-		if (fabs(b->alpha - heat[i]) > 1e-6)
-			fail_msg("%u: alpha %g", i, b->alpha);
+		const struct bsdf *b = &w->bsdfs[w->shape_bindings[i].bsdf];
+		if (fabs(b->min_alpha - heat[i]) > 1e-6)
+			fail_msg("%u: alpha %g", i, b->min_alpha);
 	}
 	world_free(w);
 	/* The roughness of a colour is the mean of its components; one node has the smallest. */
@@ -303,8 +305,8 @@ static void test_roughness(void **state)
 		const double rgb[3] = {x, y, 0.5 + (x - y) / 2};
 		least = fmin(least, (rgb[0] + rgb[1] + rgb[2]) / 3);
 	}
-	if (fabs(w->bsdfs[0].alpha - least) > 1e-5)
-		fail_msg("alpha %g, not %g", w->bsdfs[0].alpha, least);
+	if (fabs(w->bsdfs[0].min_alpha - least) > 1e-5)
+		fail_msg("alpha %g, not %g", w->bsdfs[0].min_alpha, least);
 	world_free(w);
 }
 
@@ -321,8 +323,8 @@ static void test_colours_as_numbers(void **state)
 			 PLY("linear.ply", "<bsdf type='principled'><float name='roughness' value='%.17g'/></bsdf>"),
 		 FIELD("roughness", "vertex_color"), mean);
 	struct world *w = world_of(text);
-	const struct bsdf *got = &w->bsdfs[w->parts[0].bsdf], *want = &w->bsdfs[w->parts[1].bsdf];
-	assert_true(got->textured && !want->textured && got->shape == want->shape);
+	const struct bsdf *got = &w->bsdfs[w->shape_bindings[0].bsdf], *want = &w->bsdfs[w->shape_bindings[1].bsdf];
+	assert_true(got->is_textured && !want->is_textured && got->color_kind == want->color_kind);
 	struct surface_point at;
 	surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, 0.2, 0.3, &at);
 	struct bsdf_point p = world_bsdf_point(&at, &colour, TRANSPORT_RADIANCE);
@@ -355,9 +357,11 @@ static void test_beyond_one(void **state)
 		char text[4096];
 		snprintf(text, sizeof text, SKY PLY("h3", "%s") PLY("h3", "%s"), of[i][0], of[i][1]);
 		struct world *w = world_of(text);
-		const struct bsdf *got = &w->bsdfs[w->parts[0].bsdf], *want = &w->bsdfs[w->parts[1].bsdf];
-		assert_true(got->shape == want->shape && got->textured);
-		assert_true(fabs(got->alpha - want->alpha) <= 1e-6 * want->alpha || got->alpha == want->alpha);
+		const struct bsdf *got = &w->bsdfs[w->shape_bindings[0].bsdf],
+				  *want = &w->bsdfs[w->shape_bindings[1].bsdf];
+		assert_true(got->color_kind == want->color_kind && got->is_textured);
+		assert_true(fabs(got->min_alpha - want->min_alpha) <= 1e-6 * want->min_alpha ||
+			    got->min_alpha == want->min_alpha);
 		struct surface_point x;
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, 0.2, 0.3, &x);
 		struct bsdf_point p = world_bsdf_point(&x, &colour, TRANSPORT_RADIANCE);
@@ -381,7 +385,7 @@ static void test_beyond_one(void **state)
 	struct world *w = world_of(
 		SKY PLY("linear.ply",
 			"<bsdf type='coating'>" FIELD("sigma_a", "vertex_color") "<bsdf type='diffuse'/></bsdf>"));
-	assert_true(w->bsdfs[0].shape == COLOR_SHAPE_OTHER);
+	assert_true(w->bsdfs[0].color_kind == COLOR_KIND_OTHER);
 	world_free(w);
 }
 
@@ -415,15 +419,15 @@ static void test_shared(void **state)
 	struct arena arena = {0};
 	static struct attribute_pool pool;
 	struct attribute_table t = {.vertex_count = 2, .attributes = of, .count = 3, .pool = &pool};
-	const struct attribute_values *first = attribute_keep(&t, &of[0], false, &arena);
-	assert_true(first && t.asked && first->value != a && memcmp(first->value, a, sizeof a) == 0);
-	assert_true(first->least == 0 && first->most == 1 && !first->grey);
-	assert_ptr_equal(attribute_keep(&t, &of[1], false, &arena), first);
-	assert_ptr_not_equal(attribute_keep(&t, &of[2], false, &arena), first);
-	const struct attribute_values *decoded = attribute_keep(&t, &of[1], true, &arena);
+	const struct attribute_values *first = attribute_values_intern(&t, &of[0], false, &arena);
+	assert_true(first && t.probes_per_triangle && first->value != a && memcmp(first->value, a, sizeof a) == 0);
+	assert_true(first->min == 0 && first->max == 1 && !first->is_grey);
+	assert_ptr_equal(attribute_values_intern(&t, &of[1], false, &arena), first);
+	assert_ptr_not_equal(attribute_values_intern(&t, &of[2], false, &arena), first);
+	const struct attribute_values *decoded = attribute_values_intern(&t, &of[1], true, &arena);
 	assert_true(decoded != first && decoded->value[2] == 1 && decoded->value[1] < 0.25F);
 	of[1].channels = 1; /* same bytes, but two numbers fewer per vertex */
-	assert_ptr_not_equal(attribute_keep(&t, &of[1], false, &arena), first);
+	assert_ptr_not_equal(attribute_values_intern(&t, &of[1], false, &arena), first);
 	arena_fini(&arena);
 }
 

@@ -5,7 +5,7 @@
  * black, or lit where Mitsuba 0.6 has them black; and two integrators that must agree on a room of rectangles, some of
  * which face away from the light.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/leases.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
@@ -30,7 +30,7 @@ static double mean_luminance(const char *accuracy, const char *material, bool ba
 {
 	worlds_accuracy = accuracy;
 	/* clang-format off */
-	struct world *w = world_of_text(SIDE, SIDE,
+	struct world *w = world_from_text(SIDE, SIDE,
 		SKY
 		SENSOR("0,0,1", "0,0,0")
 		"<shape type='rectangle'>"
@@ -40,7 +40,7 @@ static double mean_luminance(const char *accuracy, const char *material, bool ba
 		back ? 180 : 0, material);
 	/* clang-format on */
 	worlds_accuracy = NULL;
-	return lease_brightness(w, SIDE, SPP, 2);
+	return leases_mean_luminance(w, SIDE, SPP, 2);
 }
 
 static void backs_by_material_and_setting(void **state)
@@ -104,7 +104,7 @@ static void one_sided_materials_are_noted(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		worlds_accuracy = cases[i].accuracy;
 		/* clang-format off */
-		struct world *w = world_of_text(32, 32,
+		struct world *w = world_from_text(32, 32,
 			SKY
 			SENSOR("0,0,1", "0,0,0")
 			"<shape type='rectangle'>"
@@ -157,7 +157,7 @@ static void lit_backs_are_noted(void **state)
 		/* clang-format on */
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 		worlds_accuracy = cases[i].accuracy;
-		struct world *w = world_of_files(SIDE, SIDE, files);
+		struct world *w = world_from_files(SIDE, SIDE, files);
 		worlds_accuracy = NULL;
 		if (is_noted(w, "which Mitsuba 0.6 shows black") != cases[i].noted)
 			fail_msg("case %zu: the note is %sthere", i, cases[i].noted ? "not " : "");
@@ -170,13 +170,13 @@ static void lit_backs_are_noted(void **state)
 static void integrators_agree(void **state)
 {
 	(void)state;
-	static struct agree_image a, b;
-	struct agree_side path = {"path", 1024, 32, 0, 0}, bdpt = {"bdpt", 1024, 32, 0, 0};
+	static struct agreement_image a, b;
+	struct agreement_options path = {"path", 1024, 32, 0, 0}, bdpt = {"bdpt", 1024, 32, 0, 0};
 	worlds_accuracy = "backs=black";
-	struct world *w = world_of_own_scene("backs", "room.xml", 32, 32);
-	agree_render(w, "backs", "path", &path, &a);
-	agree_render(w, "backs", "bdpt", &bdpt, &b);
-	agree_check("backs, bdpt and path", &b, &a);
+	struct world *w = world_from_own_scene("backs", "room.xml", 32, 32);
+	agreement_render(w, "backs", "path", &path, &a);
+	agreement_render(w, "backs", "bdpt", &bdpt, &b);
+	agreement_check("backs, bdpt and path", &b, &a);
 	world_free(w);
 	worlds_accuracy = NULL;
 }

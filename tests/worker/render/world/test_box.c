@@ -24,36 +24,36 @@ static void test_points(void **state)
 {
 	(void)state;
 	const double out = 1e-3;
-	struct dice d = dice_of("boxes");
+	struct dice d = dice_for_test("boxes");
 	unsigned met = 0, missed = 0;
 	for (int i = 0; i < 2000; i++) {
 		struct box b = box_empty();
 		for (int k = 0; k < 2; k++)
-			box_grow(&b, (vec3){dice_throw(&d), dice_throw(&d), i % 3 ? dice_throw(&d) : 0.5});
-		vec3 p = {2 * dice_throw(&d) - 0.5, 2 * dice_throw(&d) - 0.5, 2 * dice_throw(&d) - 0.5};
-		vec3 w = vec3_sub((vec3){dice_throw(&d), dice_throw(&d), dice_throw(&d)}, p);
+			box_grow(&b, (vec3){dice_uniform(&d), dice_uniform(&d), i % 3 ? dice_uniform(&d) : 0.5});
+		vec3 p = {2 * dice_uniform(&d) - 0.5, 2 * dice_uniform(&d) - 0.5, 2 * dice_uniform(&d) - 0.5};
+		vec3 w = vec3_sub((vec3){dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)}, p);
 		if (i % 5 == 0)
 			w.y = 0;
 		if (i % 7 == 0)
 			w.z = 0;
-		double length = 2 * dice_throw(&d);
+		double length = 2 * dice_uniform(&d);
 		bool near = false, inside = false;
 		w = vec3_normalize(w);
 		for (double t = 0; t <= length; t += out) {
 			near |= is_inside(&b, vec3_madd(p, t, w), out);
 			inside |= is_inside(&b, vec3_madd(p, t, w), 0);
 		}
-		bool is = box_is_met(&b, p, w, length);
+		bool is = box_is_hit(&b, p, w, length);
 		assert_true(!inside || is);
 		assert_true(near || !is);
 		met += is;
 		missed += !is;
-		assert_true(!is || box_is_met(&b, p, w, INFINITY));
+		assert_true(!is || box_is_hit(&b, p, w, INFINITY));
 	}
 	print_message("%u met, %u missed\n", met, missed);
 	assert_true(met > 100 && missed > 100);
 	const struct box none = box_empty();
-	assert_false(box_is_met(&none, (vec3){0, 0, 0}, (vec3){0, 0, 1}, INFINITY));
+	assert_false(box_is_hit(&none, (vec3){0, 0, 0}, (vec3){0, 0, 1}, INFINITY));
 }
 
 #define PANE(inner, bsdf) \
@@ -62,14 +62,14 @@ static void test_points(void **state)
 static void test_of_a_scene(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		16, 16, "%s",
 		SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>" PANE("<translate x='3' y='1'/>", "thindielectric")
 			PANE("<translate x='-2' z='2'/>", "null") PANE("<translate y='-5'/>", "diffuse"));
 	const double slack = 1e-4;
 	const vec3 low = {-3, -1, 0}, high = {4, 2, 2};
 	for (int side = 0; side < 2; side++) {
-		vec3 p = side ? high : low, q = side ? w->passed.high : w->passed.low;
+		vec3 p = side ? high : low, q = side ? w->see_through_bounds.high : w->see_through_bounds.low;
 		vec3 off = vec3_sub(vec3_add(vec3_scale(1 / w->scale, q), w->center), p);
 		if (!side)
 			off = vec3_neg(off);
@@ -77,8 +77,8 @@ static void test_of_a_scene(void **state)
 		assert_true(fmax(off.x, fmax(off.y, off.z)) < slack / w->scale);
 	}
 	world_free(w);
-	w = world_of_text(16, 16, "%s", SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>" PANE("", "diffuse"));
-	assert_true(w->passed.low.x > w->passed.high.x);
+	w = world_from_text(16, 16, "%s", SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>" PANE("", "diffuse"));
+	assert_true(w->see_through_bounds.low.x > w->see_through_bounds.high.x);
 	world_free(w);
 }
 

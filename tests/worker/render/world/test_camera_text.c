@@ -16,12 +16,12 @@
 #define LOOK "<transform name='to_world'><lookat origin='1,2,5' target='0.5,0,0' up='0,1,0'/></transform>"
 #define BALL "<shape type='sphere'/><emitter type='constant'/>"
 
-static void camera_of(const char *sensor, char text[RENDER_CAMERA_TEXT], mat4 *m)
+static void camera_of(const char *sensor, char text[RENDER_CAMERA_TEXT_MAX], mat4 *m)
 {
-	struct world *w = world_of_text(16, 8, "%s%s", sensor, BALL);
+	struct world *w = world_from_text(16, 8, "%s%s", sensor, BALL);
 	struct render_summary s;
 	world_summary(w, &s);
-	render_camera_text(&s, text, RENDER_CAMERA_TEXT);
+	render_camera_text(&s, text, RENDER_CAMERA_TEXT_MAX);
 	*m = s.settings.to_world;
 	world_free(w);
 }
@@ -35,7 +35,7 @@ static void expect_part(const char *text, const char *part)
 static void test_text(void **state)
 {
 	(void)state;
-	char text[RENDER_CAMERA_TEXT];
+	char text[RENDER_CAMERA_TEXT_MAX];
 	mat4 m;
 	camera_of(
 		"<sensor type='perspective'><float name='fov' value='40'/><string name='fov_axis' value='y'/>" LOOK FILM
@@ -70,7 +70,7 @@ static void test_text(void **state)
 
 static void check_note(const char *scene, bool dark)
 {
-	struct world *w = world_of_text(16, 8, "%s", scene);
+	struct world *w = world_from_text(16, 8, "%s", scene);
 	struct render_summary s;
 	char text[512];
 	world_summary(w, &s);

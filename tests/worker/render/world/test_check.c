@@ -107,7 +107,7 @@ static void test_good_scene(void **state)
 	struct asset_source assets = memory_assets(files);
 	const struct render_options as_it_is = {0};
 	assert_int_equal(render_check(&c.scene, &assets, &as_it_is, &alone, &e), 0);
-	assert_true(c.summary.shapes == 1 && alone.shapes == 1 && c.summary.brightest == alone.brightest);
+	assert_true(c.summary.shapes == 1 && alone.shapes == 1 && c.summary.brightness_bound == alone.brightness_bound);
 	free_checked(&c);
 }
 

@@ -35,7 +35,7 @@
 /* Expects the notes `first` and `second`; NULL: no such note. on: whether rays must look coinciding primitives up. */
 static void expect(const char *text, const char *first, const char *second, bool on)
 {
-	struct world *w = world_of_text(8, 8, "%s", text);
+	struct world *w = world_from_text(8, 8, "%s", text);
 	struct render_summary s;
 	const char *wanted[3] = {first, second, NULL};
 	char note[512];
@@ -48,7 +48,7 @@ static void expect(const char *text, const char *first, const char *second, bool
 		assert_string_equal(note, wanted[i]);
 	}
 	assert_null(wanted[i]);
-	assert_int_equal(render_effect_on(&s, "coincidence"), on);
+	assert_int_equal(render_effect_is_on(&s, "coincidence"), on);
 	world_free(w);
 }
 
@@ -107,10 +107,10 @@ static void test_scales(void **state)
 {
 	(void)state;
 	for (int far = 0; far < 2; far++) {
-		struct world *w = world_of_text(8, 8,
-						VIEW CUBE("block", "0", "0.6", GREY) "<shape type='rectangle'>" AT(
-							"<rotate x='1' angle='-90'/><scale value='%s'/>") "</shape>",
-						far ? "1e13" : "1e12");
+		struct world *w = world_from_text(8, 8,
+						  VIEW CUBE("block", "0", "0.6", GREY) "<shape type='rectangle'>" AT(
+							  "<rotate x='1' angle='-90'/><scale value='%s'/>") "</shape>",
+						  far ? "1e13" : "1e12");
 		struct render_summary s;
 		char note[512];
 		world_summary(w, &s);
@@ -142,14 +142,14 @@ static void test_many(void **state)
 			 "</shape>\n",
 			 0.3 * i);
 	}
-	struct world *w = world_of_text(8, 8, "%s", text);
+	struct world *w = world_from_text(8, 8, "%s", text);
 	struct render_summary s;
 	size_t i = 0;
 	world_summary(w, &s);
 	while (render_scene_note(&s, i, note, sizeof note))
 		i++;
-	assert_int_equal(i, RENDER_COINCIDENT_MAX + 1);
-	assert_true(render_scene_note(&s, RENDER_COINCIDENT_MAX, note, sizeof note));
+	assert_int_equal(i, COINCIDENCE_NOTES_MAX + 1);
+	assert_true(render_scene_note(&s, COINCIDENCE_NOTES_MAX, note, sizeof note));
 	assert_string_equal(note, "2 more pairs of shapes coincide");
 	world_free(w);
 }

@@ -84,8 +84,8 @@ static void render(const char *xml, struct pictures *p, struct picture *out)
 {
 	const struct memory_file files[] = {
 		{"s.xml", xml, strlen(xml)}, {"p0", p->file[0].bytes, p->file[0].size}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(SIDE, SIDE, files);
-	const struct render_picture_how how = {.integrator = "path", .test = "dialects", .spp = 16};
+	struct world *w = world_from_files(SIDE, SIDE, files);
+	const struct render_picture_options how = {.integrator = "path", .test = "dialects", .spp = 16};
 	render_picture_xyz(w, &how, out);
 	world_free(w);
 }
@@ -174,9 +174,9 @@ static void test_boundaries_of_media(void **state)
 		char xml[2048];
 		snprintf(xml, sizeof xml, "<scene version='%s'>%s</scene>", i ? "3.0.0" : "0.6.0", body);
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
-		struct world *w = world_of_files(8, 8, files);
+		struct world *w = world_from_files(8, 8, files);
 		for (uint32_t k = 0; k < 5; k++)
-			assert_string_equal(w->bsdfs[w->parts[k].bsdf].ops->decl.type, types[i][k]);
+			assert_string_equal(w->bsdfs[w->shape_bindings[k].bsdf].ops->decl.type, types[i][k]);
 		world_free(w);
 	}
 }

@@ -2,10 +2,10 @@
 /*
  * Displacement in scenes: which parameters the reader accepts and refuses, the heights of bitmaps, the reported
  * effect, an unchanged image at height zero, and agreement of the integrators on displaced surfaces and displaced
- * lights (tests/support/agree.h).
+ * lights (tests/support/agreement.h).
  */
 #include "worker/render/render.h"
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/leases.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/sample_images.h"
@@ -39,16 +39,16 @@ static const struct effect_line *effect_named(const struct world *w)
 static void test_effect(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(8, 8, RECTANGLE("") "%s", "");
-	assert_false(effect_named(w)->on);
-	assert_string_equal(effect_named(w)->why, "no shape is displaced");
+	struct world *w = world_from_text(8, 8, RECTANGLE("") "%s", "");
+	assert_false(effect_named(w)->is_on);
+	assert_string_equal(effect_named(w)->reason, "no shape is displaced");
 	world_free(w);
-	w = world_of_text(8, 8,
-			  RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1")
-				  LEVEL("3") "</shape>%s",
-			  "");
-	assert_true(effect_named(w)->on);
-	assert_string_equal(effect_named(w)->why,
+	w = world_from_text(8, 8,
+			    RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1")
+				    LEVEL("3") "</shape>%s",
+			    "");
+	assert_true(effect_named(w)->is_on);
+	assert_string_equal(effect_named(w)->reason,
 			    "the rectangle in test.xml:1 and 1 more are displaced: 8704 triangles");
 	assert_false(w->shapes[1].is_sphere);
 	world_free(w);
@@ -68,7 +68,7 @@ static struct world *world_with_picture(const char *inner)
 	unsigned char *png = sample_png(16, 16, SAMPLE_GREY, 8, 0, &size);
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" RECTANGLE("%s") "</scene>", inner);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(8, 8, files);
+	struct world *w = world_from_files(8, 8, files);
 	free(png);
 	return w;
 }
@@ -99,12 +99,12 @@ static void test_heights_of_a_bitmap(void **state)
 static void test_numbers_and_checkers(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		8, 8, RECTANGLE("<float name='displacement' value='-0.5'/>" SCALE("3") LEVEL("0")) "%s", "");
 	for (uint32_t i = 0; i < 4; i++)
 		assert_true(vertex(w, 0, i).z == -1.5);
 	world_free(w);
-	w = world_of_text(8, 8, RECTANGLE(CHECKERS LEVEL("2")) "%s", "");
+	w = world_from_text(8, 8, RECTANGLE(CHECKERS LEVEL("2")) "%s", "");
 	bool low = false, high = false;
 	for (uint32_t i = 0; i < w->shapes[0].vertex_count; i++) {
 		low |= vertex(w, 0, i).z == -1;
@@ -166,7 +166,7 @@ enum { SIDE = 32 };
 
 static struct world *flat_world(const char *displacement)
 {
-	return world_of_text(
+	return world_from_text(
 		SIDE, SIDE,
 		SENSOR("0,3,6", "0,0.5,0") LAMP
 		"<shape type='rectangle'>" GROUND "%s</shape><shape type='cube'>"
@@ -180,8 +180,8 @@ static struct world *flat_world(const char *displacement)
 static void test_height_zero_is_the_same_image(void **state)
 {
 	(void)state;
-	float *plain = lease_image(flat_world(""), SIDE, 16, 4),
-	      *zero = lease_image(flat_world(CHECKERS SCALE("0") LEVEL("4")), SIDE, 16, 4);
+	float *plain = leases_render_image(flat_world(""), SIDE, 16, 4),
+	      *zero = leases_render_image(flat_world(CHECKERS SCALE("0") LEVEL("4")), SIDE, 16, 4);
 	size_t differ = 0;
 	double a = 0, b = 0;
 	for (size_t i = 0; i < (size_t)SIDE * SIDE * 3; i++) {
@@ -242,11 +242,11 @@ static void test_integrators_agree(void **state)
 		"</scene>");
 	/* clang-format on */
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(32, 32, files);
-	static struct agree_image path, bdpt;
-	agree_render(w, __func__, "path", &(struct agree_side){"path", 1280, 32, 0, 0}, &path);
-	agree_render(w, __func__, "bdpt", &(struct agree_side){"bdpt", 1280, 32, 0, 0}, &bdpt);
-	agree_check(__func__, &bdpt, &path);
+	struct world *w = world_from_files(32, 32, files);
+	static struct agreement_image path, bdpt;
+	agreement_render(w, __func__, "path", &(struct agreement_options){"path", 1280, 32, 0, 0}, &path);
+	agreement_render(w, __func__, "bdpt", &(struct agreement_options){"bdpt", 1280, 32, 0, 0}, &bdpt);
+	agreement_check(__func__, &bdpt, &path);
 	world_free(w);
 	free(png);
 }

@@ -40,7 +40,7 @@
 static struct world *world_with_effects(const char *effects, const char *scene)
 {
 	worlds_effects = effects;
-	struct world *w = world_of_text(16, 16, "%s", scene);
+	struct world *w = world_from_text(16, 16, "%s", scene);
 	worlds_effects = NULL;
 	return w;
 }
@@ -58,9 +58,9 @@ static void expect(const char *scene, const char *name, bool on, const char *why
 {
 	struct world *w = world_with_effects(NULL, scene);
 	const struct effect_line *l = line_of(w, name);
-	if (l->on != on || strcmp(l->why, why) != 0)
-		fail_msg("%s: %s, \"%s\"", name, l->on ? "on" : "off", l->why);
-	assert_true(*l->saves && !l->forced && !l->other_scene);
+	if (l->is_on != on || strcmp(l->reason, why) != 0)
+		fail_msg("%s: %s, \"%s\"", name, l->is_on ? "on" : "off", l->reason);
+	assert_true(*l->savings && !l->is_forced && !l->changes_scene);
 	world_free(w);
 }
 
@@ -108,7 +108,7 @@ static void test_what_does_not_enclose(void **state)
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		struct world *w = world_with_effects(NULL, scenes[i]);
 		if (!w->effects.dispersion)
-			fail_msg("scene %zu: %s", i, line_of(w, "dispersion")->why);
+			fail_msg("scene %zu: %s", i, line_of(w, "dispersion")->reason);
 		world_free(w);
 	}
 }
@@ -176,28 +176,28 @@ static void test_forced(void **state)
 {
 	(void)state;
 	struct world *w = world_with_effects("+dispersion", VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"));
-	assert_true(w->effects.dispersion && w->effects.colour && line_of(w, "dispersion")->forced &&
-		    line_of(w, "colour")->forced);
-	assert_non_null(strstr(line_of(w, "colour")->why, "dispersion needs it"));
-	assert_true(w->bsdfs[w->parts[1].bsdf].dispersive);
+	assert_true(w->effects.dispersion && w->effects.colour && line_of(w, "dispersion")->is_forced &&
+		    line_of(w, "colour")->is_forced);
+	assert_non_null(strstr(line_of(w, "colour")->reason, "dispersion needs it"));
+	assert_true(w->bsdfs[w->shape_bindings[1].bsdf].is_dispersive);
 	world_free(w);
 	w = world_with_effects("-dispersion", VIEW LAMP SF11("sf") BALL("1", USES("sf")));
-	assert_true(!w->effects.dispersion && line_of(w, "dispersion")->forced &&
-		    line_of(w, "dispersion")->other_scene);
+	assert_true(!w->effects.dispersion && line_of(w, "dispersion")->is_forced &&
+		    line_of(w, "dispersion")->changes_scene);
 	struct render_summary s;
 	char note[256];
 	world_summary(w, &s);
-	render_effects_note(&s, note, sizeof note);
+	render_other_scene_note(&s, note, sizeof note);
 	assert_string_equal(note, "the image is of another scene: without dispersion");
 	world_free(w);
 	w = world_with_effects("-half-vectors,-area-light", VIEW LAMP BALL("1", "<bsdf type='dielectric'/>"));
 	world_summary(w, &s);
-	render_effects_note(&s, note, sizeof note);
+	render_other_scene_note(&s, note, sizeof note);
 	assert_string_equal(note, "the image is of another scene: without area-light");
 	assert_true(w->emitter_cdf[w->emitter_count] == 0);
 	world_free(w);
 	w = world_with_effects("all", VIEW LAMP BALL("1", ""));
-	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && line_of(w, "half-vectors")->on &&
+	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && line_of(w, "half-vectors")->is_on &&
 		    w->effects.max_depth == 128);
 	world_free(w);
 }
@@ -212,20 +212,21 @@ static void test_scattering(void **state)
 {
 	(void)state;
 	struct world *w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("0")));
-	assert_true(w->effects.absorption && !w->effects.scattering && !w->parts[1].passable);
-	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
+	assert_true(w->effects.absorption && !w->effects.scattering && !w->shape_bindings[1].is_null_face);
+	assert_string_equal(line_of(w, "scattering")->reason, "no medium scatters");
 	world_free(w);
 	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("2")));
-	assert_true(w->effects.absorption && w->effects.scattering && w->parts[1].passable && w->has_passable);
+	assert_true(w->effects.absorption && w->effects.scattering && w->shape_bindings[1].is_null_face &&
+		    w->has_null_faces);
 	assert_true(w->media[0].scatters && w->media[0].absorbs);
-	assert_non_null(strstr(line_of(w, "scattering")->why, "borders on a medium that scatters"));
+	assert_non_null(strstr(line_of(w, "scattering")->reason, "borders on a medium that scatters"));
 	world_free(w);
 	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("2") "<emitter type='area'/>"));
-	assert_true(w->effects.scattering && !w->has_passable); /* the surface of an emitter is a vertex */
+	assert_true(w->effects.scattering && !w->has_null_faces); /* the surface of an emitter is a vertex */
 	world_free(w);
 	w = world_with_effects("-scattering", VIEW LAMP BALL("1", CLOUD("2")));
-	assert_true(!w->effects.scattering && !w->media[0].scatters && w->media[0].absorbs && !w->has_passable);
-	assert_true(line_of(w, "scattering")->other_scene);
+	assert_true(!w->effects.scattering && !w->media[0].scatters && w->media[0].absorbs && !w->has_null_faces);
+	assert_true(line_of(w, "scattering")->changes_scene);
 	world_free(w);
 	w = world_with_effects("-absorption", VIEW LAMP BALL("1", CLOUD("2")));
 	assert_true(w->media[0].scatters && !w->media[0].absorbs);
@@ -235,7 +236,7 @@ static void test_scattering(void **state)
 	world_free(w);
 	char text[PLAN_EFFECTS_MAX];
 	struct error e;
-	assert_int_equal(render_effects("+scattering", text, &e), -EINVAL);
+	assert_int_equal(render_canonical_effects("+scattering", text, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "scattering cannot be forced on"));
 }
 
@@ -245,24 +246,26 @@ static void test_medium_light(void **state)
 	(void)state;
 #define GLOW(radiance) "<emitter type='volumelight'><rgb name='radiance' value='" radiance "'/></emitter>"
 	struct world *w = world_with_effects("", VIEW BALL("1", CLOUD("0") GLOW("2,2,2")));
-	assert_true(w->effects.medium_light && w->effects.scattering && w->parts[0].passable && w->emitter_count == 0);
+	assert_true(w->effects.medium_light && w->effects.scattering && w->shape_bindings[0].is_null_face &&
+		    w->emitter_count == 0);
 	assert_true(!w->effects.colour && w->effects.max_depth == 128 && !w->media[0].scatters);
-	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
-	assert_non_null(strstr(line_of(w, "medium-light")->why, "borders on a medium that shines"));
+	assert_string_equal(line_of(w, "scattering")->reason, "no medium scatters");
+	assert_non_null(strstr(line_of(w, "medium-light")->reason, "borders on a medium that shines"));
 	world_free(w);
 	w = world_with_effects("", VIEW BALL("1", CLOUD("0") GLOW("2,1,2")));
 	assert_true(w->effects.colour);
 	world_free(w);
 	w = world_with_effects("", VIEW LAMP BALL("1", CLOUD("0") GLOW("0,0,0")));
 	assert_true(!w->effects.medium_light && !w->effects.scattering);
-	assert_string_equal(line_of(w, "medium-light")->why, "no medium shines");
+	assert_string_equal(line_of(w, "medium-light")->reason, "no medium shines");
 	world_free(w);
 	w = world_with_effects("-medium-light", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
-	assert_true(!w->effects.medium_light && w->effects.scattering && !w->media[0].shines && w->media[0].scatters);
-	assert_true(line_of(w, "medium-light")->other_scene);
+	assert_true(!w->effects.medium_light && w->effects.scattering && !w->media[0].is_emissive &&
+		    w->media[0].scatters);
+	assert_true(line_of(w, "medium-light")->changes_scene);
 	world_free(w);
 	w = world_with_effects("-scattering", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
-	assert_true(w->effects.medium_light && w->media[0].shines && !w->media[0].scatters && w->media[0].absorbs);
+	assert_true(w->effects.medium_light && w->media[0].is_emissive && !w->media[0].scatters && w->media[0].absorbs);
 	world_free(w);
 }
 
@@ -273,23 +276,23 @@ static void test_transparent_shadows(void **state)
 #define PANE "<shape type='rectangle'><bsdf type='thindielectric' id='pane'/></shape>"
 	struct world *w = world_with_effects("", VIEW LAMP PANE);
 	assert_true(w->effects.transparent_shadows);
-	assert_string_equal(line_of(w, "transparent-shadows")->why, "`pane` lets light straight through");
+	assert_string_equal(line_of(w, "transparent-shadows")->reason, "`pane` lets light straight through");
 	world_free(w);
 	w = world_with_effects("-transparent-shadows", VIEW LAMP PANE);
-	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->other_scene);
+	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->changes_scene);
 	world_free(w);
 	static const char *const without[] = {VIEW LAMP "<shape type='sphere'><bsdf type='dielectric'/></shape>",
 					      VIEW LAMP "<shape type='sphere'><bsdf type='hair'/></shape>"};
 	for (int i = 0; i < 2; i++) {
 		w = world_with_effects("", without[i]);
 		assert_true(!w->effects.transparent_shadows);
-		assert_string_equal(line_of(w, "transparent-shadows")->why,
+		assert_string_equal(line_of(w, "transparent-shadows")->reason,
 				    "no material that light meets lets light straight through");
 		world_free(w);
 	}
 	w = world_with_effects("+transparent-shadows", VIEW LAMP BALL("1", CLOUD("2")) PANE);
-	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->on);
-	assert_non_null(strstr(line_of(w, "transparent-shadows")->why, "`null` alone"));
+	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->is_on);
+	assert_non_null(strstr(line_of(w, "transparent-shadows")->reason, "`null` alone"));
 	world_free(w);
 }
 
@@ -301,12 +304,12 @@ static void test_refracted_shadows(void **state)
 #define POOL "<shape type='rectangle'><bsdf type='dielectric' id='water'/></shape>"
 	struct world *w = world_with_effects("", VIEW LAMP POOL);
 	assert_true(w->effects.refracted_shadows);
-	assert_string_equal(line_of(w, "refracted-shadows")->why, "`water` refracts light exactly");
-	assert_true(w->refracting.low.x < w->refracting.high.x);
+	assert_string_equal(line_of(w, "refracted-shadows")->reason, "`water` refracts light exactly");
+	assert_true(w->refracting_bounds.low.x < w->refracting_bounds.high.x);
 	world_free(w);
 	w = world_with_effects("-refracted-shadows", VIEW LAMP POOL);
-	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->other_scene);
-	assert_true(w->refracting.low.x > w->refracting.high.x);
+	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->changes_scene);
+	assert_true(w->refracting_bounds.low.x > w->refracting_bounds.high.x);
 	world_free(w);
 	static const char *const without[] = {
 		VIEW LAMP PANE, VIEW LAMP "<shape type='sphere'><bsdf type='roughdielectric'/></shape>",
@@ -316,12 +319,12 @@ static void test_refracted_shadows(void **state)
 	for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
 		w = world_with_effects("", without[i]);
 		assert_true(!w->effects.refracted_shadows);
-		assert_string_equal(line_of(w, "refracted-shadows")->why,
+		assert_string_equal(line_of(w, "refracted-shadows")->reason,
 				    "no material that light meets refracts light exactly");
 		world_free(w);
 	}
 	w = world_with_effects("+refracted-shadows", VIEW LAMP BALL("1", CLOUD("2")) POOL);
-	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->on);
+	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->is_on);
 	world_free(w);
 }
 
@@ -350,25 +353,25 @@ static void test_texts(void **state)
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		char once[PLAN_EFFECTS_MAX], twice[PLAN_EFFECTS_MAX];
 		struct error e = {""};
-		int rc = render_effects(texts[i].text, once, &e);
+		int rc = render_canonical_effects(texts[i].text, once, &e);
 		assert_int_equal(rc, texts[i].canonical ? 0 : -EINVAL);
 		if (rc) {
 			assert_true(strlen(e.text) > 10);
 			continue;
 		}
 		assert_string_equal(once, texts[i].canonical);
-		assert_true(plan_text_ok(once, sizeof once));
-		assert_int_equal(render_effects(once, twice, &e), 0);
+		assert_true(plan_text_is_valid(once, sizeof once));
+		assert_int_equal(render_canonical_effects(once, twice, &e), 0);
 		assert_memory_equal(once, twice, sizeof once);
 	}
 	struct error e = {""};
 	char text[PLAN_EFFECTS_MAX];
-	render_effects("+dispersoin", text, &e);
+	render_canonical_effects("+dispersoin", text, &e);
 	assert_non_null(strstr(e.text, "did you mean `dispersion`?"));
 	/* Each effect alone fits the buffer, and so does the longest combination. */
-	struct effects_choice c = {.any_on = false};
+	struct effects_override c = {.forces_any_on = false};
 	for (int i = 0; i < EFFECTS; i++)
-		c.of[i] = (effect_table[i].may & EFFECT_MAY_FORCE_OFF) ? -1 : 0;
+		c.state[i] = (effect_table[i].override_flags & EFFECT_MAY_FORCE_OFF) ? -1 : 0;
 	effects_print(&c, text);
 	assert_true(strlen(text) + 16 < sizeof text);
 	assert_int_equal(effects_parse(text, &c, &e), 0);

@@ -4,7 +4,7 @@
  * frequencies of drawn emitters, and images against those with the choice by power. Level of the statistical tests:
  * 1e-6 each; their power is stated with each.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -43,7 +43,7 @@
 static struct world *world_by(const char *choice, const char *shapes)
 {
 	worlds_accuracy = choice;
-	struct world *w = world_of_text(64, 64, "%s%s", SENSOR("0,5,6", "0,0,0"), shapes);
+	struct world *w = world_from_text(64, 64, "%s%s", SENSOR("0,5,6", "0,0,0"), shapes);
 	worlds_accuracy = NULL;
 	return w;
 }
@@ -77,7 +77,7 @@ static void test_shares_of_point_lights(void **state)
 		}
 		assert_int_equal(points.nodes[i].id, i);
 		for (int e = 0; e < 2; e++)
-			assert_true(fabs((double)points.share[2 * i + (uint32_t)e] -
+			assert_true(fabs((double)points.shares[2 * i + (uint32_t)e] -
 					 brought[e] / (brought[0] + brought[1])) < 1e-5);
 	}
 	arena_fini(&arena);
@@ -93,7 +93,7 @@ static double share_of_second(const char *shapes)
 	find(w, 300, &arena, &points);
 	assert_true(points.count >= 250);
 	for (uint32_t i = 0; i < points.count; i++)
-		sum += (double)points.share[emitter_part_count(w) * i + 1] / points.count;
+		sum += (double)points.shares[emitter_part_count(w) * i + 1] / points.count;
 	arena_fini(&arena);
 	world_free(w);
 	return sum;
@@ -120,8 +120,8 @@ static void test_rooms(void **state)
 	(void)state;
 	worlds_accuracy = NULL;
 	struct world *w =
-		world_of_text(64, 64, "%s%s", SENSOR("0,0,1.5", "0,0,0"),
-			      ROOM("0") ROOM("9") LAMP("0", "1", "0", "0.1", "1") LAMP("9", "1", "0", "0.1", "1000"));
+		world_from_text(64, 64, "%s%s", SENSOR("0,0,1.5", "0,0,0"),
+				ROOM("0") ROOM("9") LAMP("0", "1", "0", "0.1", "1") LAMP("9", "1", "0", "0.1", "1000"));
 	assert_non_null(w->emitter_choice);
 	double u[3] = {0.5, 0.5, 0};
 	unsigned ours = 0;
@@ -177,7 +177,7 @@ static void test_cells(void **state)
 	find(w, MOST, &arena, &points);
 	assert_int_equal(points.count, MOST);
 	for (uint32_t i = 0; i < MOST; i++)
-		chance[i] = emitter_choice_denser(w, points.nodes[i].p, 0, &w->emitters[0], NULL);
+		chance[i] = emitter_choice_density_ratio(w, points.nodes[i].p, 0, &w->emitters[0], NULL);
 	qsort(chance, MOST, sizeof *chance, by_value);
 	for (uint32_t i = 1; i < MOST; i++)
 		cells += chance[i] > chance[i - 1];
@@ -209,22 +209,22 @@ static void test_switched_off(void **state)
 }
 
 /* At positions within the scene and far from it, emitters are drawn as often as their densities say. For an emitter
- * that is not divided, emitter_choice_denser() is its probability; for the environment, its mean over uniformly drawn
- * points is. 100,000 draws find an error of 2 % in a probability. */
+ * that is not divided, emitter_choice_density_ratio() is its probability; for the environment, its mean over uniformly
+ * drawn points is. 100,000 draws find an error of 2 % in a probability. */
 static void test_densities(void **state)
 {
 	(void)state;
 	struct world *w = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") LAMP("-2", "0.6", "1", "0.1", "20")
 						 POINT_LIGHT("0", "3", "-2", "1") SKY);
-	struct dice dice = dice_of("densities of choices");
+	struct dice dice = dice_for_test("densities of choices");
 	const vec3 places[] = {in_world(w, 2, 0, 0.3), in_world(w, -1, 0, 1), in_world(w, 30, 20, -70)};
 	assert_non_null(w->emitter_choice);
 	for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
 		uint64_t seen[4] = {0};
 		double chance[4] = {0};
-		size_t draws = dice_count(100000);
+		size_t draws = dice_scaled_count(100000);
 		for (size_t i = 0; i < draws; i++) {
-			const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+			const double u[3] = {dice_uniform(&dice), dice_uniform(&dice), dice_uniform(&dice)};
 			struct emitter_pick pick;
 			struct emitter_point y;
 			double pdf;
@@ -232,12 +232,12 @@ static void test_densities(void **state)
 			const struct emitter *em = &w->emitters[pick.emitter];
 			seen[pick.emitter]++;
 			assert_true(emitter_sample_toward(em, places[k], pick.u, &y, &pdf));
-			double denser = emitter_choice_denser(w, places[k], pick.emitter, em, &y);
-			assert_true(fabs(denser - pick.denser) < 1e-12);
+			double denser = emitter_choice_density_ratio(w, places[k], pick.emitter, em, &y);
+			assert_true(fabs(denser - pick.density_ratio) < 1e-12);
 			if (pick.emitter != w->environment)
 				chance[pick.emitter] = denser;
 			assert_true(w->emitters[3].ops->sample_point(&w->emitters[3], u, &y, &pdf));
-			chance[3] += emitter_choice_denser(w, places[k], 3, &w->emitters[3], &y) / (double)draws;
+			chance[3] += emitter_choice_density_ratio(w, places[k], 3, &w->emitters[3], &y) / (double)draws;
 		}
 		double sum = 0, expected[4];
 		for (int e = 0; e < 4; e++) {
@@ -268,7 +268,7 @@ static void test_extremes(void **state)
 		FLOOR LAMP("0", "0", "0", "1", "1") LAMP("0", "5", "6", "0.2", "1") LAMP("0", "0", "0", "99", "1"),
 		FOG FLOOR POINT_LIGHT("0", "0", "0", "1") LAMP("1", "1", "0", "0.1", "1e12") SKY,
 	};
-	struct dice dice = dice_of("extreme lights");
+	struct dice dice = dice_for_test("extreme lights");
 	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
 		struct arena arena = {0};
 		struct emitter_points points;
@@ -278,15 +278,15 @@ static void test_extremes(void **state)
 		for (uint32_t i = 0; i < points.count; i++) {
 			double sum = 0;
 			for (uint32_t e = 0; e < emitter_part_count(w); e++)
-				sum += (double)points.share[(size_t)i * emitter_part_count(w) + e];
+				sum += (double)points.shares[(size_t)i * emitter_part_count(w) + e];
 			assert_true(fabs(sum - 1) < 1e-5);
 		}
 		for (int i = 0; i < 2000; i++) {
-			const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+			const double u[3] = {dice_uniform(&dice), dice_uniform(&dice), dice_uniform(&dice)};
 			struct emitter_pick pick;
 			vec3 p = points.count ? points.nodes[(uint32_t)i % points.count].p : (vec3){0, 0, 0};
 			assert_true(emitter_choice_pick(w, p, u, &pick));
-			assert_true(pick.denser > 0 && isfinite(pick.denser));
+			assert_true(pick.density_ratio > 0 && isfinite(pick.density_ratio));
 			assert_true(pick.u[0] >= 0 && pick.u[0] < 1 && pick.u[1] >= 0 && pick.u[1] < 1);
 		}
 		assert_false(fetestexcept(FE_INVALID));
@@ -300,34 +300,34 @@ static void test_the_same_twice(void **state)
 	(void)state;
 	struct world *a = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY),
 		     *b = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY);
-	struct dice dice = dice_of("the same twice");
+	struct dice dice = dice_for_test("the same twice");
 	for (int i = 0; i < 1000; i++) {
-		const double u[3] = {dice_throw(&dice), dice_throw(&dice), dice_throw(&dice)};
+		const double u[3] = {dice_uniform(&dice), dice_uniform(&dice), dice_uniform(&dice)};
 		vec3 p = {dice_between(&dice, -1, 1), dice_between(&dice, -1, 1), dice_between(&dice, -1, 1)};
 		struct emitter_pick of_a, of_b;
 		assert_true(emitter_choice_pick(a, p, u, &of_a) && emitter_choice_pick(b, p, u, &of_b));
-		assert_true(of_a.emitter == of_b.emitter && of_a.denser == of_b.denser && of_a.u[0] == of_b.u[0] &&
-			    of_a.u[1] == of_b.u[1]);
+		assert_true(of_a.emitter == of_b.emitter && of_a.density_ratio == of_b.density_ratio &&
+			    of_a.u[0] == of_b.u[0] && of_a.u[1] == of_b.u[1]);
 	}
 	world_free(a);
 	world_free(b);
 }
 
-/* The image does not depend on the choice of emitters; level and power as in tests/support/agree.h. */
+/* The image does not depend on the choice of emitters; level and power as in tests/support/agreement.h. */
 static void test_the_same_image(void **state)
 {
 	(void)state;
 #define LIGHTS \
 	FLOOR LAMP("2", "1", "0", "0.5", "2") LAMP("-2", "1.5", "1", "0.4", "3") POINT_LIGHT("0", "3", "-2", "3") SKY
 	struct world *place = world_by(NULL, LIGHTS), *power = world_by("emitter-choice=power", LIGHTS);
-	const struct agree_side path = {.integrator = "path", .spp = dice_count(256), .groups = 16},
-				bdpt = {.integrator = "bdpt", .spp = dice_count(128), .groups = 16};
-	static struct agree_image a, b, c;
-	agree_render(place, "emitters by place", "place", &path, &a);
-	agree_render(power, "emitters by place", "power", &path, &b);
-	agree_render(place, "emitters by place", "bdpt", &bdpt, &c);
-	agree_check("emitters by place, path", &a, &b);
-	agree_check("emitters by place, bdpt", &c, &b);
+	const struct agreement_options path = {.integrator = "path", .spp = dice_scaled_count(256), .groups = 16},
+				       bdpt = {.integrator = "bdpt", .spp = dice_scaled_count(128), .groups = 16};
+	static struct agreement_image a, b, c;
+	agreement_render(place, "emitters by place", "place", &path, &a);
+	agreement_render(power, "emitters by place", "power", &path, &b);
+	agreement_render(place, "emitters by place", "bdpt", &bdpt, &c);
+	agreement_check("emitters by place, path", &a, &b);
+	agreement_check("emitters by place, bdpt", &c, &b);
 	world_free(place);
 	world_free(power);
 }

@@ -44,7 +44,7 @@ static void test_copies(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	struct world *a = world_of_text(8, 8,
+	struct world *a = world_from_text(8, 8,
 		VIEW SKY RED
 		"<shape type='shapegroup' id='g'>"
 			"<shape type='cube'>" TO(SQUEEZE) "<ref id='red'/></shape>"
@@ -56,7 +56,7 @@ static void test_copies(void **state)
 		"%s",
 		"");
 	/* clang-format on */
-	struct world *b = world_of_text(
+	struct world *b = world_from_text(
 		8, 8,
 		VIEW SKY RED "<shape type='cube'>" TO(
 			SQUEEZE TURN) "<ref id='red'/></shape>"
@@ -73,9 +73,10 @@ static void test_copies(void **state)
 	for (uint32_t i = 0; i < 6; i++)
 		assert_same_shape(&a->shapes[i], &b->shapes[i]);
 	/* All copies share one material. */
-	assert_int_equal(a->parts[0].bsdf, a->parts[2].bsdf);
-	assert_int_equal(a->parts[0].bsdf, a->parts[5].bsdf);
-	assert_true(a->parts[1].emitter >= 0 && a->parts[3].emitter >= 0 && a->parts[1].emitter != a->parts[3].emitter);
+	assert_int_equal(a->shape_bindings[0].bsdf, a->shape_bindings[2].bsdf);
+	assert_int_equal(a->shape_bindings[0].bsdf, a->shape_bindings[5].bsdf);
+	assert_true(a->shape_bindings[1].emitter >= 0 && a->shape_bindings[3].emitter >= 0 &&
+		    a->shape_bindings[1].emitter != a->shape_bindings[3].emitter);
 	world_free(a);
 	world_free(b);
 }
@@ -121,15 +122,15 @@ static void test_flat(void **state)
 					    {"flat.obj", meshes[0], strlen(meshes[0])},
 					    {"half.obj", meshes[1], strlen(meshes[1])},
 					    {NULL, NULL, 0}};
-	struct world *w = world_of_files(8, 8, files);
+	struct world *w = world_from_files(8, 8, files);
 	assert_int_equal(w->shape_count, 3);
 	assert_int_equal(w->shapes[1].triangle_count, 1);
-	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
-	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
+	assert_true(w->shapes[2].is_sphere && w->shape_bindings[2].emitter >= 0 && w->shape_bindings[1].emitter < 0);
+	assert_true(w->shape_bindings[0].bsdf != w->shape_bindings[1].bsdf);
 	assert_int_equal(w->emitter_count, 2); /* those of the sphere and of the sky */
-	assert_non_null(strstr(w->notes.flat,
+	assert_non_null(strstr(w->notes.flat_triangles,
 			       "3 triangles without area are left out, in 2 shapes (first: the obj in scene.xml:1)"));
-	assert_non_null(strstr(w->notes.flat, "1 of these shapes has no others"));
+	assert_non_null(strstr(w->notes.flat_triangles, "1 of these shapes has no others"));
 	world_free(w);
 }
 
@@ -155,10 +156,10 @@ static void test_materials_of_files(void **state)
 			cases[i].version, cases[i].inside);
 		const struct memory_file files[] = {
 			{"scene.xml", scene, strlen(scene)}, {"a.obj", mesh, strlen(mesh)}, {NULL, NULL, 0}};
-		struct world *w = world_of_files(8, 8, files);
+		struct world *w = world_from_files(8, 8, files);
 		const char *said =
-			strstr(w->notes.materials, "of 1 mesh without a bsdf (first: the obj in scene.xml:2)");
-		assert_true(cases[i].said ? said != NULL : !*w->notes.materials);
+			strstr(w->notes.unread_materials, "of 1 mesh without a bsdf (first: the obj in scene.xml:2)");
+		assert_true(cases[i].said ? said != NULL : !*w->notes.unread_materials);
 		world_free(w);
 	}
 }
@@ -209,7 +210,7 @@ static void test_sensors(void **state)
 static void test_orthographic(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		0, 0,
 		ORTHO("<transform name='to_world'><scale value='4'/><lookat origin='3,1,-10' target='3,1,0' up='0,1,0'/></transform>")
 			SKY "<shape type='cube'><transform name='to_world'><scale value='6'/></transform></shape>%s",
@@ -219,7 +220,7 @@ static void test_orthographic(void **state)
 		double x = 40 * (i + 0.3) / 20, y = 20 * (i + 0.6) / 20;
 		vec3 d = camera_direction(c, c->position, x, y);
 		double t_min, t_max;
-		camera_clip(c, d, &t_min, &t_max);
+		camera_clip_range(c, d, &t_min, &t_max);
 		for (int deep = 0; deep < 2; deep++) {
 			/* Points on the near plane, and 15 units behind it, back in scene units. */
 			double t = t_min + deep * 15 * w->scale;

@@ -37,9 +37,9 @@ static vec3 in_scene(const struct world *w, vec3 p)
 
 static void check_still(const char *shutter, double x)
 {
-	struct world *w = world_of_text(32, 32, "%s" SKY CUBE, shutter);
+	struct world *w = world_from_text(32, 32, "%s" SKY CUBE, shutter);
 	assert_false(w->effects.motion);
-	assert_null(w->shapes[0].place);
+	assert_null(w->shapes[0].placement);
 	double low = INFINITY, high = -INFINITY;
 	for (uint32_t i = 0; i < w->shapes[0].vertex_count; i++) {
 		const float *p = w->shapes[0].position[i];
@@ -62,13 +62,13 @@ static void test_still(void **state)
 	check_still(VIEW(OPEN("2", "1e30")), 4);
 	check_still(VIEW(OPEN("7", "7")), 4);
 	worlds_effects = "-motion";
-	struct world *w = world_of_text(32, 32, VIEW(OPEN("1", "2")) SKY CUBE);
+	struct world *w = world_from_text(32, 32, VIEW(OPEN("1", "2")) SKY CUBE);
 	worlds_effects = NULL;
 	assert_false(w->effects.motion);
 	world_free(w);
-	w = world_of_text(32, 32, VIEW(OPEN("1.999", "3")) SKY CUBE);
+	w = world_from_text(32, 32, VIEW(OPEN("1.999", "3")) SKY CUBE);
 	assert_true(w->effects.motion);
-	assert_int_equal(w->sharing_count, 1);
+	assert_int_equal(w->sharing_shape_count, 1);
 	world_free(w);
 }
 
@@ -77,7 +77,7 @@ static void refused(const char *body, const char *sentence)
 	char xml[2048];
 	size_t n = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", body);
 	const struct memory_file files[] = {{"s.xml", xml, n}, {NULL, NULL, 0}};
-	world_of_files_refused(files, sentence);
+	world_check_files_refused(files, sentence);
 }
 
 /* A stretched environment map would look as if it were not stretched, so its transform is refused. */
@@ -89,7 +89,7 @@ static void refused_picture(void)
 		      "<transform time='0'/><transform time='1'><scale x='2'/></transform></animation></emitter></scene>";
 	const struct memory_file files[] = {
 		{"s.xml", xml, sizeof xml - 1}, {"e.pgm", "P5 2 1 255\nab", 13}, {NULL, NULL, 0}};
-	world_of_files_refused(files, "an environment that moves may only be turned");
+	world_check_files_refused(files, "an environment that moves may only be turned");
 }
 
 static void test_refused(void **state)
@@ -164,8 +164,8 @@ static void test_many_keyframes(void **state)
 				       i, i * 50 % 360, i / 50000.0);
 	at += (size_t)snprintf(xml + at, room - at, "</animation></shape></scene>");
 	const struct memory_file files[] = {{"s.xml", xml, at}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(32, 32, files);
-	assert_int_equal(w->shapes[0].place->moves->motion.count, 99000 - 10 + 1);
+	struct world *w = world_from_files(32, 32, files);
+	assert_int_equal(w->shapes[0].placement->movement->motion.count, 99000 - 10 + 1);
 	world_free(w);
 	free(xml);
 }

@@ -67,7 +67,7 @@ static struct world *world_with(const char *body)
 					    {"small1.obj", small_obj[1], strlen(small_obj[1])},
 					    {"small2.obj", small_obj[2], strlen(small_obj[2])},
 					    {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 static void test_without_triangles(void **state)
@@ -88,16 +88,16 @@ static void test_without_triangles(void **state)
 		snprintf(body, sizeof body, "<emitter type='constant'/>%s<shape type='sphere'/>", alone[i]);
 		struct world *w = world_with(body);
 		if (w->shape_count != 1 || !w->shapes[0].is_sphere ||
-		    !strstr(w->notes.without, "1 mesh without triangles is left out (first: the "))
-			fail_msg("%s: %u shapes, \"%s\"", alone[i], w->shape_count, w->notes.without);
-		assert_string_equal(w->notes.dark, "");
+		    !strstr(w->notes.empty_meshes, "1 mesh without triangles is left out (first: the "))
+			fail_msg("%s: %u shapes, \"%s\"", alone[i], w->shape_count, w->notes.empty_meshes);
+		assert_string_equal(w->notes.no_light, "");
 		world_free(w);
 	}
 	struct world *w = world_with("<shape type='sphere'/>" FILE_OF("obj", "points.obj", LAMP)
 					     FILE_OF("ply", "faceless.ply", ""));
-	assert_string_equal(w->notes.without,
+	assert_string_equal(w->notes.empty_meshes,
 			    "2 meshes without triangles are left out (first: the obj in scene.xml:1)");
-	assert_string_equal(w->notes.dark, "the scene has no emitter with an area: the image is black");
+	assert_string_equal(w->notes.no_light, "the scene has no emitter with an area: the image is black");
 	world_free(w);
 }
 
@@ -113,13 +113,13 @@ static void test_odd_normals(void **state)
 					    {"a.obj", odd, sizeof odd - 1},
 					    {"b.obj", even, sizeof even - 1},
 					    {NULL, NULL, 0}};
-	struct world *w = world_of_files(8, 8, files);
+	struct world *w = world_from_files(8, 8, files);
 	assert_string_equal(
-		w->notes.normals,
+		w->notes.bad_normals,
 		"4 normals in 2 meshes (first: the obj in scene.xml:1) are not finite and count as missing");
 	world_free(w);
 	w = world_with("<emitter type='constant'/><shape type='sphere'/>");
-	assert_string_equal(w->notes.normals, "");
+	assert_string_equal(w->notes.bad_normals, "");
 	world_free(w);
 }
 
@@ -138,9 +138,9 @@ static void test_without_triangles_in_gltf(void **state)
 		"byteLength\":12}],\"buffers\":[{\"byteLength\":48,\"uri\":\"data:application/octet-strea"
 		"m;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAAAAAEA\"}]}";
 	const struct memory_file files[] = {{"scene.gltf", text, strlen(text)}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(8, 8, files);
+	struct world *w = world_from_files(8, 8, files);
 	assert_int_equal(w->shape_count, 1);
-	assert_non_null(strstr(w->notes.without, "1 mesh without triangles is left out (first: "));
+	assert_non_null(strstr(w->notes.empty_meshes, "1 mesh without triangles is left out (first: "));
 	world_free(w);
 }
 
@@ -158,19 +158,19 @@ static void test_too_small(void **state)
 						       "obj", "small2.obj",
 						       "") "<shape type='disk'><bsdf type='conductor'/></shape>");
 	assert_int_equal(w->shape_count, 3);
-	assert_true(w->shapes[0].is_sphere && w->parts[0].emitter >= 0 && w->emitter_count == 1);
+	assert_true(w->shapes[0].is_sphere && w->shape_bindings[0].emitter >= 0 && w->emitter_count == 1);
 	assert_int_equal(w->shapes[1].triangle_count, 12);
-	assert_true(w->parts[1].emitter < 0 && w->parts[2].emitter < 0);
-	assert_true(w->bsdfs[w->parts[2].bsdf].has_delta && !w->bsdfs[w->parts[1].bsdf].has_delta);
+	assert_true(w->shape_bindings[1].emitter < 0 && w->shape_bindings[2].emitter < 0);
+	assert_true(w->bsdfs[w->shape_bindings[2].bsdf].has_delta && !w->bsdfs[w->shape_bindings[1].bsdf].has_delta);
 	assert_string_equal(
-		w->notes.gone,
+		w->notes.tiny_shapes,
 		"4 shapes too small for the scene to have an area are left out (first: the obj in scene.xml:1)");
-	assert_string_equal(w->notes.dark, "");
+	assert_string_equal(w->notes.no_light, "");
 	world_free(w);
 	w = world_with(FILE_OF("obj", "small0.obj", LAMP) "<shape type='sphere'/>" FILE_OF("obj", "small1.obj", LAMP)
 			       FILE_OF("obj", "small2.obj", LAMP));
 	assert_int_equal(w->shape_count, 1);
-	assert_string_equal(w->notes.dark, "the scene has no emitter with an area: the image is black");
+	assert_string_equal(w->notes.no_light, "the scene has no emitter with an area: the image is black");
 	world_free(w);
 }
 
@@ -189,8 +189,8 @@ static void test_flattened(void **state)
 	const struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct error e;
-	world_of_files_refused(files,
-			       "to_world flattens the shape (it has no inverse): line 2; --lenient leaves it out");
+	world_check_files_refused(files,
+				  "to_world flattens the shape (it has no inverse): line 2; --lenient leaves it out");
 	if (scene_read_lenient(&s, &assets, "scene.xml", render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
 	assert_true(scene_has_note(&s,
@@ -228,7 +228,7 @@ static void test_no_meshes(void **state)
 			 of[i].type);
 		const struct memory_file files[] = {
 			{"scene.xml", xml, strlen(xml)}, {"m", of[i].text, strlen(of[i].text)}, {NULL, NULL, 0}};
-		world_of_files_refused(files, of[i].why);
+		world_check_files_refused(files, of[i].why);
 	}
 }
 

@@ -26,11 +26,11 @@ enum { SIDE = 4, SPP = 64 };
 static double brightness(const char *accuracy, const char *integrator)
 {
 	worlds_accuracy = accuracy;
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		SIDE, SIDE, "%s" SKY SMOKE SENSOR("0,0,9", "0,0,0") BALL("<ref name='interior' id='smoke'/>"),
 		integrator);
 	worlds_accuracy = NULL;
-	return lease_brightness(w, SIDE, SPP, 8);
+	return leases_mean_luminance(w, SIDE, SPP, 8);
 }
 
 static void test_who_leaves_media_out(void **state)
@@ -97,8 +97,8 @@ static void test_what_hides_the_sky(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		worlds_accuracy = cases[i].accuracy;
-		struct world *w = world_of_text(SIDE, SIDE, "%s" SMOKE "%s%s", cases[i].integrator, cases[i].camera,
-						cases[i].rest);
+		struct world *w = world_from_text(SIDE, SIDE, "%s" SMOKE "%s%s", cases[i].integrator, cases[i].camera,
+						  cases[i].rest);
 		worlds_accuracy = NULL;
 		if (is_noted(w) != cases[i].noted)
 			fail_msg("case %zu: %s", i, cases[i].noted ? "no note" : "a note");

@@ -95,7 +95,7 @@ static struct world *world_at(double t)
 	assert_true(at + 1 < sizeof xml);
 	const struct memory_file files[] = {
 		{"s.xml", xml, at}, {"m.obj", ball_obj, sizeof ball_obj - 1}, {NULL, NULL, 0}};
-	return world_of_files(32, 32, files);
+	return world_from_files(32, 32, files);
 }
 
 static vec3 in_scene(const struct world *w, vec3 p)
@@ -125,8 +125,8 @@ static struct surface_point point_on(const struct world *w, uint32_t shape, doub
 		struct placement now;
 		vec3 d = {r * cos(6 * u[1]), r * sin(6 * u[1]), z}; /* in the sphere's own frame */
 		vec3 a = still->sphere_axes.s, b = still->sphere_axes.t, c = still->sphere_axes.n;
-		if (s->place) {
-			placement_move(s->place, t, &now);
+		if (s->placement) {
+			placement_compute_at(s->placement, t, &now);
 			a = vec3_normalize(placement_vector(&now, a));
 			b = vec3_normalize(placement_vector(&now, b));
 			c = vec3_normalize(placement_vector(&now, c));
@@ -144,19 +144,19 @@ static struct surface_point point_on(const struct world *w, uint32_t shape, doub
 
 static void check_point(const struct world *moving, const struct world *still, uint32_t shape, double t, struct dice *d)
 {
-	const double u[2] = {dice_throw(d), dice_throw(d)};
+	const double u[2] = {dice_uniform(d), dice_uniform(d)};
 	struct surface_point x = point_on(moving, shape, t, u), y = point_on(still, shape, 0, u), z;
-	struct surface_change a, b;
+	struct surface_derivatives a, b;
 	near(in_scene(moving, x.p), in_scene(still, y.p), OFF);
 	near(x.ng, y.ng, OFF);
 	near(x.sh.n, y.sh.n, OFF);
 	assert_true(x.shape == &moving->shapes[shape] && x.prim.time == t);
 	assert_true(fabs(x.u - y.u) <= OFF && fabs(x.v - y.v) <= OFF);
-	surface_change_of(&moving->shapes[shape], &x, &a);
-	surface_change_of(&still->shapes[shape], &y, &b);
+	surface_compute_derivatives(&moving->shapes[shape], &x, &a);
+	surface_compute_derivatives(&still->shapes[shape], &y, &b);
 	for (int k = 0; k < 2; k++)
 		near(vec3_scale(moving->scale, a.dn[k]), vec3_scale(still->scale, b.dn[k]), 10 * OFF);
-	assert_true(surface_near(&moving->shapes[shape], x.prim, x.p, &z));
+	assert_true(surface_nearest(&moving->shapes[shape], x.prim, x.p, &z));
 	near(x.p, z.p, 1e-12);
 	const vec3 o = vec3_madd(x.p, 1, x.ng);
 	if (surface_reproject(&moving->shapes[shape], x.prim, prim_none_at(t), o, vec3_neg(x.ng), 1, &z))
@@ -196,18 +196,18 @@ static void check_ray(const struct world *moving, const struct world *still, dou
 static void test_at_a_time(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("a world at a time");
+	struct dice d = dice_for_test("a world at a time");
 	struct world *moving = world_at(-1);
 	assert_true(moving->effects.motion);
 	for (int i = 0; i <= 10; i++) {
-		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_throw(&d);
+		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_uniform(&d);
 		struct world *still = world_at(t);
 		assert_false(still->effects.motion);
 		assert_int_equal(moving->shape_count, still->shape_count);
 		for (uint32_t s = 0; s < moving->shape_count; s++)
-			for (size_t n = dice_count(100); n > 0; n--)
+			for (size_t n = dice_scaled_count(100); n > 0; n--)
 				check_point(moving, still, s, t, &d);
-		for (size_t n = dice_count(5000); n > 0; n--)
+		for (size_t n = dice_scaled_count(5000); n > 0; n--)
 			check_ray(moving, still, t, &d);
 		world_free(still);
 	}
@@ -231,7 +231,7 @@ static struct world *camera_world(double t)
 		snprintf(first, sizeof first, STEPS, 160 + 40 * t, -1 + 2 * t, 8 - 2 * t);
 		snprintf(place, sizeof place, TO("%s"), first);
 	}
-	return world_of_text(
+	return world_from_text(
 		32, 32,
 		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.2'/>"
 		"<float name='focus_distance' value='7'/>" OPEN("0", "1") "%s</sensor>" SKY "<shape type='cube'/>",
@@ -241,12 +241,12 @@ static struct world *camera_world(double t)
 static void test_camera(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("a camera at a time");
+	struct dice d = dice_for_test("a camera at a time");
 	struct world *moving = camera_world(-1);
-	assert_true(moving->effects.motion && moving->camera.moves);
+	assert_true(moving->effects.motion && moving->camera.motion);
 	for (int i = 0; i < 20; i++) {
-		double t = dice_throw(&d), u[2] = {dice_throw(&d), dice_throw(&d)}, film[2] = {32 * u[1], 32 * u[0]}, x,
-		       y;
+		double t = dice_uniform(&d), u[2] = {dice_uniform(&d), dice_uniform(&d)},
+		       film[2] = {32 * u[1], 32 * u[0]}, x, y;
 		struct world *still = camera_world(t);
 		struct camera room;
 		const struct camera *a = camera_at(&moving->camera, t, &room), *b = &still->camera;
@@ -254,10 +254,10 @@ static void test_camera(void **state)
 		near(a->axes.s, b->axes.s, 1e-12);
 		near(a->axes.t, b->axes.t, 1e-12);
 		near(a->axes.n, b->axes.n, 1e-12);
-		vec3 p = camera_point(a, u);
-		near(in_scene(moving, p), in_scene(still, camera_point(b, u)), 1e-12);
+		vec3 p = camera_sample_point(a, u);
+		near(in_scene(moving, p), in_scene(still, camera_sample_point(b, u)), 1e-12);
 		vec3 w = camera_direction(a, p, film[0], film[1]);
-		near(w, camera_direction(b, camera_point(b, u), film[0], film[1]), 1e-12);
+		near(w, camera_direction(b, camera_sample_point(b, u), film[0], film[1]), 1e-12);
 		assert_true(camera_project(a, p, w, 1, &x, &y));
 		assert_true(fabs(x - film[0]) < 1e-9 && fabs(y - film[1]) < 1e-9);
 		world_free(still);
@@ -293,7 +293,7 @@ static struct world *lights_at(double t)
 	assert_true(at + 1 < sizeof xml);
 	const struct memory_file files[] = {
 		{"s.xml", xml, at}, {"m.obj", ball_obj, sizeof ball_obj - 1}, {NULL, NULL, 0}};
-	return world_of_files(32, 32, files);
+	return world_from_files(32, 32, files);
 }
 
 static void expect_close(double a, double b, double tolerance)
@@ -306,14 +306,14 @@ static void expect_close(double a, double b, double tolerance)
  * world's unit of length. */
 static double per_area(const struct world *w, const struct emitter *em, double value)
 {
-	return em->delta || em->infinite ? value : value * w->scale * w->scale;
+	return em->is_delta || em->is_infinite ? value : value * w->scale * w->scale;
 }
 
 static void near_point(const struct world *moving, const struct world *still, const struct emitter_point *x,
 		       const struct emitter_point *y, double off)
 {
-	assert_int_equal(x->infinite, y->infinite);
-	if (x->infinite)
+	assert_int_equal(x->is_infinite, y->is_infinite);
+	if (x->is_infinite)
 		near(x->p, y->p, off);
 	else
 		near(in_scene(moving, x->p), in_scene(still, y->p), off);
@@ -322,37 +322,37 @@ static void near_point(const struct world *moving, const struct world *still, co
 
 static void check_light(const struct world *moving, const struct world *still, uint32_t id, double t, struct dice *d)
 {
-	static const struct wavelengths grey = {.grey = true};
-	struct emitter_room room;
+	static const struct wavelengths grey = {.is_grey = true};
+	struct emitter_storage room;
 	const struct emitter *a = emitter_at(&moving->emitters[id], t, &room), *b = &still->emitters[id];
-	const double u[2] = {dice_throw(d), dice_throw(d)}, v[2] = {dice_throw(d), dice_throw(d)};
+	const double u[2] = {dice_uniform(d), dice_uniform(d)}, v[2] = {dice_uniform(d), dice_uniform(d)};
 	struct emitter_point x, y;
 	double p, q, back[2];
 	vec3 from, to;
-	assert_true(moving->emitters[id].moves && !b->moves);
+	assert_true(moving->emitters[id].motion && !b->motion);
 	assert_true(a->ops->sample_point(a, u, &x, &p));
 	assert_true(b->ops->sample_point(b, u, &y, &q));
 	near_point(moving, still, &x, &y, 100 * OFF); /* the point lies in the cell of a narrow triangle */
 	expect_close(per_area(moving, a, p), per_area(still, b, q), OFF);
 	expect_close(a->ops->pdf_point(a, &x), p, 1e-9);
 	if (moving->emitter_shape[id] != UINT32_MAX) {
-		const struct prim_ref prim = {moving->emitter_shape[id], x.where.prim, t};
+		const struct prim_ref prim = {moving->emitter_shape[id], x.texture_point.prim, t};
 		struct surface_point on;
-		assert_true(surface_near(&moving->shapes[prim.shape], prim, x.p, &on));
+		assert_true(surface_nearest(&moving->shapes[prim.shape], prim, x.p, &on));
 		near(on.p, x.p, 1e-12);
 		near(on.ng, x.n, 1e-9);
-		assert_true(fabs(on.u - x.where.u) < 1e-9 && fabs(on.v - x.where.v) < 1e-9);
+		assert_true(fabs(on.u - x.texture_point.u) < 1e-9 && fabs(on.v - x.texture_point.v) < 1e-9);
 		a->ops->point_inverse(a, &x, back);
 		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
 	}
-	if (!a->infinite) {
+	if (!a->is_infinite) {
 		assert_true(a->ops->sample_direction(a, &x, v, &from, &p));
 		assert_true(b->ops->sample_direction(b, &y, v, &to, &q));
 		near(from, to, 1e-4);
 		expect_close(p, q, 2e-2);
 		double l = a->ops->radiance(a, &x, from, &grey).v[0], m = b->ops->radiance(b, &y, to, &grey).v[0];
-		expect_close(a->delta ? l / (moving->scale * moving->scale) : l,
-			     a->delta ? m / (still->scale * still->scale) : m, 2e-2);
+		expect_close(a->is_delta ? l / (moving->scale * moving->scale) : l,
+			     a->is_delta ? m / (still->scale * still->scale) : m, 2e-2);
 		expect_close(a->ops->pdf_direction(a, &x, from), p, 1e-9);
 	}
 	vec3 ref = vec3_scale(dice_between(d, 0, 4), dice_direction(d));
@@ -368,15 +368,15 @@ static void check_light(const struct world *moving, const struct world *still, u
 static void test_lights(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("lights at a time");
+	struct dice d = dice_for_test("lights at a time");
 	struct world *moving = lights_at(-1);
 	assert_true(moving->effects.motion && moving->emitter_count == 10);
 	for (int i = 0; i <= 10; i++) {
-		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_throw(&d);
+		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_uniform(&d);
 		struct world *still = lights_at(t);
 		assert_int_equal(moving->emitter_count, still->emitter_count);
 		for (uint32_t e = 0; e < moving->emitter_count; e++)
-			for (size_t n = dice_count(300); n > 0; n--)
+			for (size_t n = dice_scaled_count(300); n > 0; n--)
 				check_light(moving, still, e, t, &d);
 		world_free(still);
 	}
@@ -401,8 +401,8 @@ static void test_stretched(void **state)
 {
 	(void)state;
 	enum { TRIANGLES = 12 };
-	struct dice d = dice_of("a stretched lamp");
-	struct world *w = world_of_text(
+	struct dice d = dice_for_test("a stretched lamp");
+	struct world *w = world_from_text(
 		32, 32,
 		VIEW(OPEN("0",
 			  "1")) "<shape type='cube'><animation name='to_world'><transform time='0'><scale x='0.2'/>"
@@ -410,24 +410,24 @@ static void test_stretched(void **state)
 				"</transform></animation>" AREA "</shape>");
 	const double times[] = {0, 0.3, 0.999};
 	for (int k = 0; k < 3; k++) {
-		struct emitter_room room;
+		struct emitter_storage room;
 		const struct emitter *em = emitter_at(&w->emitters[0], times[k], &room);
 		double share[TRIANGLES], sum = 0, chi2 = 0, middle[2] = {0, 0};
-		size_t found[TRIANGLES] = {0}, n = dice_count(100000);
+		size_t found[TRIANGLES] = {0}, n = dice_scaled_count(100000);
 		for (uint32_t i = 0; i < TRIANGLES; i++) {
-			const struct emitter_point x = {.where.prim = i};
+			const struct emitter_point x = {.texture_point.prim = i};
 			share[i] = em->ops->pdf_point(em, &x) * area_at(w, i, times[k]);
 			sum += share[i];
 		}
 		expect_close(sum, 1, 1e-12);
 		for (size_t i = 0; i < n; i++) {
-			const double u[2] = {dice_throw(&d), dice_throw(&d)};
+			const double u[2] = {dice_uniform(&d), dice_uniform(&d)};
 			struct emitter_point x;
 			double pdf;
 			assert_true(em->ops->sample_point(em, u, &x, &pdf));
-			found[x.where.prim]++;
-			middle[0] += x.where.b1 / (double)n;
-			middle[1] += x.where.b2 / (double)n;
+			found[x.texture_point.prim]++;
+			middle[0] += x.texture_point.b1 / (double)n;
+			middle[1] += x.texture_point.b2 / (double)n;
 		}
 		for (uint32_t i = 0; i < TRIANGLES; i++)
 			chi2 += pow((double)found[i] - share[i] * (double)n, 2) / (share[i] * (double)n);
@@ -443,7 +443,7 @@ static void test_stretched(void **state)
  * times (1 + 2 + 4) / 3. */
 static void check_power(const char *shape, double area)
 {
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		32, 32,
 		VIEW(OPEN("0",
 			  "1")) "<shape type='%s'><animation name='to_world'><transform time='0'/><transform time='1'>"
@@ -452,9 +452,9 @@ static void check_power(const char *shape, double area)
 	const struct emitter *em = &w->emitters[0];
 	bool said = false;
 	for (size_t i = 0; i < w->effects.line_count; i++)
-		said |= strstr(w->effects.lines[i].why, "moves while the shutter is open") != NULL;
+		said |= strstr(w->effects.lines[i].reason, "moves while the shutter is open") != NULL;
 	assert_true(said); /* exactly one note, not one for the shape and one for the emitter */
-	expect_close(em->power / (M_PI * em->brightest * w->scale * w->scale), area * 7 / 3, 1e-3);
+	expect_close(em->power / (M_PI * em->brightness_bound * w->scale * w->scale), area * 7 / 3, 1e-3);
 	world_free(w);
 }
 

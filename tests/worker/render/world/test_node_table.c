@@ -34,7 +34,7 @@ static uint64_t work_of(uint32_t count)
 	for (uint32_t i = 0; i < count; i++)
 		assert_true(node_table_find(&t, &nodes[i * STRIDE], NULL, &k) && k == i);
 	assert_int_equal(t.count, count);
-	uint64_t r = t.compared;
+	uint64_t r = t.probe_count;
 	arena_fini(&arena);
 	return r;
 }
@@ -100,15 +100,15 @@ static void test_one_each(void **state)
 			i % 3 == 2 ? "<ref id='both'/>"
 			: i % 3	   ? ""
 				   : "<bsdf type='diffuse'/>");
-	struct world *w = world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>%s%s",
-					"<bsdf type='diffuse' id='both'/>", text);
+	struct world *w = world_from_text(8, 8, SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>%s%s",
+					  "<bsdf type='diffuse' id='both'/>", text);
 	free(text);
 	assert_int_equal(w->shape_count, SHAPES);
 	/* One BSDF for each mesh of one third, one for all that share, one for all that have none, and possibly one
 	 * for surfaces that no path meets. */
 	assert_in_range(w->bsdf_count, SHAPES / 3 + 2, SHAPES / 3 + 3);
 	for (uint32_t i = 3; i < SHAPES; i++)
-		assert_true((w->parts[i].bsdf == w->parts[i - 3].bsdf) == (i % 3 != 0));
+		assert_true((w->shape_bindings[i].bsdf == w->shape_bindings[i - 3].bsdf) == (i % 3 != 0));
 	world_free(w);
 }
 

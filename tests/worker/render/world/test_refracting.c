@@ -25,7 +25,7 @@
 
 static struct world *world_with(const char *shapes)
 {
-	return world_of_text(8, 8, "%s%s%s%s", SENSOR("0,1,6", "0,0,0"), FLOOR, LAMP, shapes);
+	return world_from_text(8, 8, "%s%s%s%s", SENSOR("0,1,6", "0,0,0"), FLOOR, LAMP, shapes);
 }
 
 /* Returns the position of point i in scene units. */
@@ -68,10 +68,10 @@ static void test_spread(void **state)
 	assert_true(fabs(left - share / 2) <= 4 && fabs(behind - share / 2) <= 4);
 	assert_true(fabs(ball_low - (128 - share) / 2) <= 3);
 	/* A point in front of the ball counts as outside, although the ball's far side faces away from it. */
-	const struct refracting_point *by[REFRACTING_RANKED];
-	const struct refracting_end from = {{0, 1, 0}, true};
+	const struct refracting_point *by[REFRACTING_POINTS_RANKED];
+	const struct refracting_light from = {{0, 1, 0}, true};
 	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 2.5, 0}), &from, by), 0);
-	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 4, 0}), &from, by), REFRACTING_RANKED);
+	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 4, 0}), &from, by), REFRACTING_POINTS_RANKED);
 	world_free(w);
 }
 
@@ -92,10 +92,10 @@ static void test_by_area(void **state)
 static void test_none(void **state)
 {
 	(void)state;
-	struct refracting_end from = {{0, 1, 0}, true};
+	struct refracting_light from = {{0, 1, 0}, true};
 	struct world *w = world_with("");
 	assert_int_equal(w->refracting_point_count, 0);
-	const struct refracting_point *by[REFRACTING_RANKED];
+	const struct refracting_point *by[REFRACTING_POINTS_RANKED];
 	assert_int_equal(refracting_points_rank(w, (vec3){0, 0, 0}, &from, by), 0);
 	world_free(w);
 	worlds_effects = "-refracted-shadows";
@@ -112,12 +112,12 @@ static double path_by(const struct refracting_point *q, vec3 z, vec3 from)
 }
 
 /* An end at infinity is represented by a point so far away that its direction is the same from everywhere. */
-static void check_soonest(const struct world *w, vec3 z, const struct refracting_end *from)
+static void check_soonest(const struct world *w, vec3 z, const struct refracting_light *from)
 {
-	const struct refracting_point *found[REFRACTING_RANKED];
-	vec3 far = from->infinite ? vec3_scale(1e6, from->at) : from->at;
-	assert_int_equal(refracting_points_rank(w, z, from, found), REFRACTING_RANKED);
-	for (uint32_t k = 0; k < REFRACTING_RANKED; k++) {
+	const struct refracting_point *found[REFRACTING_POINTS_RANKED];
+	vec3 far = from->infinite ? vec3_scale(1e6, from->position) : from->position;
+	assert_int_equal(refracting_points_rank(w, z, from, found), REFRACTING_POINTS_RANKED);
+	for (uint32_t k = 0; k < REFRACTING_POINTS_RANKED; k++) {
 		uint32_t sooner = 0;
 		double here = path_by(found[k], z, far);
 		for (uint32_t i = 0; i < w->refracting_point_count; i++)
@@ -129,8 +129,8 @@ static void check_soonest(const struct world *w, vec3 z, const struct refracting
 static void test_soonest(void **state)
 {
 	(void)state;
-	struct dice dice = dice_of("soonest");
-	const struct refracting_point *by[REFRACTING_RANKED];
+	struct dice dice = dice_for_test("soonest");
+	const struct refracting_point *by[REFRACTING_POINTS_RANKED];
 	/* The second surface has its normal downwards, with the water as its exterior. */
 	static const char *const water[] = {
 		SURFACE(WATER("1.33")),
@@ -140,11 +140,12 @@ static void test_soonest(void **state)
 	for (int k = 0; k < 2; k++) {
 		struct world *w = world_with(water[k]);
 		for (int i = 0; i < 200; i++) {
-			vec3 below = {6 * dice_throw(&dice) - 3, -3 * dice_throw(&dice) - 1e-3, dice_throw(&dice)};
-			vec3 lamp = {9 * dice_throw(&dice) - 4, 5 * dice_throw(&dice), 9 * dice_throw(&dice) - 4};
+			vec3 below = {6 * dice_uniform(&dice) - 3, -3 * dice_uniform(&dice) - 1e-3,
+				      dice_uniform(&dice)};
+			vec3 lamp = {9 * dice_uniform(&dice) - 4, 5 * dice_uniform(&dice), 9 * dice_uniform(&dice) - 4};
 			vec3 above = {below.x, -below.y, below.z};
-			struct refracting_end near = {in_world(w, lamp), false},
-					      far = {vec3_normalize((vec3){lamp.x, lamp.y + .1, lamp.z}), true};
+			struct refracting_light near = {in_world(w, lamp), false},
+						far = {vec3_normalize((vec3){lamp.x, lamp.y + .1, lamp.z}), true};
 			check_soonest(w, in_world(w, below), &near);
 			check_soonest(w, in_world(w, below), &far);
 			assert_int_equal(refracting_points_rank(w, in_world(w, above), &near, by), 0);

@@ -5,7 +5,7 @@
  * agreement of integrators on a scene with glass, metal and a coating.
  */
 #include "common/base/color.h"
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/worlds.h"
 #include "worker/render/bsdf/metal.h"
 #include "worker/render/texture/color.h"
@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-static const struct wavelengths rgb_lanes = {.rgb = true};
+static const struct wavelengths rgb_lanes = {.is_rgb = true};
 
 static void same_lanes(const struct color *c, const double rgb[3], double tolerance)
 {
@@ -114,18 +114,18 @@ static void test_closed_sphere(void **state)
 		light[k] = emitted[k] / (1 - rho[k]);
 	rec709_to_xyz(light, xyz);
 	worlds_accuracy = "colour=rgb";
-	struct world *w = world_of_text(
+	struct world *w = world_from_text(
 		16, 16,
 		SENSOR("0,0,0", "0,0,1") "<shape type='sphere'><boolean name='flip_normals' value='true'/>"
 					 "<emitter type='area'><rgb name='radiance' value='1,2,3'/></emitter>"
 					 "<bsdf type='diffuse'><rgb name='reflectance' value='0.63,0.065,0.05'/>"
 					 "</bsdf></shape>");
 	worlds_accuracy = NULL;
-	static const struct agree_side sides[] = {{"path", 64, 32, 0, 0}, {"bdpt", 64, 32, 0, 0}};
+	static const struct agreement_options sides[] = {{"path", 64, 32, 0, 0}, {"bdpt", 64, 32, 0, 0}};
 	for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
-		static struct agree_image a;
-		agree_render(w, "rgb", sides[i].integrator, &sides[i], &a);
-		agree_expect(sides[i].integrator, &a, xyz[0] + xyz[1] + xyz[2]);
+		static struct agreement_image a;
+		agreement_render(w, "rgb", sides[i].integrator, &sides[i], &a);
+		agreement_check_constant(sides[i].integrator, &a, xyz[0] + xyz[1] + xyz[2]);
 	}
 	world_free(w);
 }
@@ -138,49 +138,49 @@ static void test_nothing_disperses(void **state)
 {
 	(void)state;
 	worlds_accuracy = "colour=rgb";
-	struct world *w = world_of_text(8, 8,
-					SENSOR("0,0,3", "0,0,0") PRISM
-					"<emitter type='constant'><rgb name='radiance' value='1'/></emitter>");
+	struct world *w = world_from_text(8, 8,
+					  SENSOR("0,0,3", "0,0,0") PRISM
+					  "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>");
 	assert_true(w->effects.colour && !w->effects.dispersion);
 	bool said = false;
 	for (size_t i = 0; i < w->effects.line_count; i++)
-		said |= !w->effects.lines[i].on && strstr(w->effects.lines[i].why, "but colours are rgb");
+		said |= !w->effects.lines[i].is_on && strstr(w->effects.lines[i].reason, "but colours are rgb");
 	assert_true(said);
 	world_free(w);
 	worlds_effects = "+dispersion";
-	world_refused(PRISM, "need spectra");
+	world_check_refused(PRISM, "need spectra");
 	worlds_effects = "+wavelength";
-	world_refused(PRISM, "need spectra");
+	world_check_refused(PRISM, "need spectra");
 	worlds_effects = worlds_accuracy = NULL;
 }
 
 static void test_integrators_agree(void **state)
 {
 	(void)state;
-	static struct agree_image a, b;
+	static struct agreement_image a, b;
 	worlds_accuracy = "colour=rgb";
 	struct world *w =
-		world_of_text(32, 32,
-			      "<integrator type='path'><integer name='max_depth' value='6'/></integrator>" SENSOR(
-				      "0,0.2,3.2", "0,-0.3,0") PRISM
-			      "<shape type='rectangle'><transform name='to_world'><scale value='3'/>"
-			      "<rotate x='1' angle='-90'/><translate y='-1'/></transform>"
-			      "<bsdf type='diffuse'><rgb name='reflectance' value='0.8,0.3,0.1'/></bsdf>"
-			      "</shape><shape type='sphere'><point name='center' x='-0.9' y='-0.5'/>"
-			      "<float name='radius' value='0.5'/><bsdf type='roughconductor'>"
-			      "<string name='material' value='Cu'/><float name='alpha' value='0.15'/></bsdf>"
-			      "</shape><shape type='sphere'><point name='center' x='0.9' y='-0.5'/>"
-			      "<float name='radius' value='0.5'/><bsdf type='principled'>"
-			      "<rgb name='base_color' value='0.1,0.4,0.8'/><float name='spec_tint' value='1'/>"
-			      "<float name='roughness' value='0.4'/></bsdf></shape>"
-			      "<shape type='rectangle'><transform name='to_world'><scale value='0.8'/>"
-			      "<rotate x='1' angle='90'/><translate y='1.5'/></transform><emitter type='area'>"
-			      "<spectrum name='radiance' value='400:1 550:9 700:12'/></emitter></shape>");
+		world_from_text(32, 32,
+				"<integrator type='path'><integer name='max_depth' value='6'/></integrator>" SENSOR(
+					"0,0.2,3.2", "0,-0.3,0") PRISM
+				"<shape type='rectangle'><transform name='to_world'><scale value='3'/>"
+				"<rotate x='1' angle='-90'/><translate y='-1'/></transform>"
+				"<bsdf type='diffuse'><rgb name='reflectance' value='0.8,0.3,0.1'/></bsdf>"
+				"</shape><shape type='sphere'><point name='center' x='-0.9' y='-0.5'/>"
+				"<float name='radius' value='0.5'/><bsdf type='roughconductor'>"
+				"<string name='material' value='Cu'/><float name='alpha' value='0.15'/></bsdf>"
+				"</shape><shape type='sphere'><point name='center' x='0.9' y='-0.5'/>"
+				"<float name='radius' value='0.5'/><bsdf type='principled'>"
+				"<rgb name='base_color' value='0.1,0.4,0.8'/><float name='spec_tint' value='1'/>"
+				"<float name='roughness' value='0.4'/></bsdf></shape>"
+				"<shape type='rectangle'><transform name='to_world'><scale value='0.8'/>"
+				"<rotate x='1' angle='90'/><translate y='1.5'/></transform><emitter type='area'>"
+				"<spectrum name='radiance' value='400:1 550:9 700:12'/></emitter></shape>");
 	worlds_accuracy = NULL;
-	static const struct agree_side bdpt = {"bdpt", 512, 32, 0, 0}, hslt = {"hslt", 3072, 32, 0, 0};
-	agree_render(w, "rgb", "bdpt", &bdpt, &a);
-	agree_render(w, "rgb", "hslt", &hslt, &b);
-	agree_within_errors("rgb, hslt and bdpt", &b, &a);
+	static const struct agreement_options bdpt = {"bdpt", 512, 32, 0, 0}, hslt = {"hslt", 3072, 32, 0, 0};
+	agreement_render(w, "rgb", "bdpt", &bdpt, &a);
+	agreement_render(w, "rgb", "hslt", &hslt, &b);
+	agreement_check_any_power("rgb, hslt and bdpt", &b, &a);
 	world_free(w);
 }
 

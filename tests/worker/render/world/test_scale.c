@@ -18,11 +18,11 @@
 
 #include <cmocka.h>
 
-enum { SIDE = PLACED_SIDE };
+enum { SIDE = PLACED_SCENE_SIDE };
 
 static struct world *world_at(double s, double m)
 {
-	return placed_scene(s, m, "<bsdf type='dielectric'/>", "");
+	return placed_scene_make(s, m, "<bsdf type='dielectric'/>", "");
 }
 
 static void test_same(void **state)
@@ -36,9 +36,9 @@ static void test_same(void **state)
 		{0x1p13, -0x1p30, true}, {1e-4, 0, false},	  {1e4, 0, false},   {1, 1e5, false},
 		{3, 1e5 / 7, false},	 {1e-4, 10.0 / 3, false},
 	};
-	float *reference = lease_image(world_at(1, 0), SIDE, 32, 6);
+	float *reference = leases_render_image(world_at(1, 0), SIDE, 32, 6);
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-		float *image = lease_image(world_at(cases[i].scale, cases[i].move), SIDE, 32, 6);
+		float *image = leases_render_image(world_at(cases[i].scale, cases[i].move), SIDE, 32, 6);
 		size_t differ = 0;
 		double a = 0, b = 0;
 		for (size_t k = 0; k < (size_t)SIDE * SIDE * 3; k++) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A sheet of `thindielectric` against a pane of `dielectric` with two surfaces, between a bright lamp and a dim one.
- * Statistics as in tests/support/agree.h. */
-#include "tests/support/agree.h"
+ * Statistics as in tests/support/agreement.h. */
+#include "tests/support/agreement.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -27,14 +27,14 @@ static void test_pane(void **state)
 		SIDE("", GLASS("dielectric"))
 			SIDE("<rotate x='1' angle='180'/><translate z='-0.001'/>", GLASS("dielectric")),
 	};
-	static struct agree_image image[2];
+	static struct agreement_image image[2];
 	for (int i = 0; i < 2; i++) {
-		struct world *w = world_of_text(16, 16, SENSOR("0,-1.7,1", "0,0,0") LAMPS "%s", glass[i]);
-		const struct agree_side how = {"path", 2048, 32, 1, 64};
-		agree_render(w, __func__, i ? "pane" : "sheet", &how, &image[i]);
+		struct world *w = world_from_text(16, 16, SENSOR("0,-1.7,1", "0,0,0") LAMPS "%s", glass[i]);
+		const struct agreement_options how = {"path", 2048, 32, 1, 64};
+		agreement_render(w, __func__, i ? "pane" : "sheet", &how, &image[i]);
 		world_free(w);
 	}
-	agree_check(__func__, &image[0], &image[1]);
+	agreement_check(__func__, &image[0], &image[1]);
 }
 
 int main(void)

@@ -28,7 +28,7 @@ static struct world *world_with(const char *obj, const char *bsdf)
 			 bsdf);
 	assert_true(n < (int)sizeof xml);
 	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"m.obj", obj, strlen(obj)}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 /* Returns the unit sphere with n meridians and n / 2 circles; each triangle has its own vertices. */
@@ -62,16 +62,16 @@ static const char *sphere_obj(int n)
  * seam of u, where tangents average over one side only. */
 static double worst_turn(const struct world *w, bool smooth, int n)
 {
-	struct dice d = dice_of("points of a sphere");
+	struct dice d = dice_for_test("points of a sphere");
 	struct geom_shape s = w->shapes[0];
 	double worst = 0;
 	if (!smooth)
 		s.tangent = NULL;
 	for (int i = 0; i < 4000; i++) {
 		struct surface_point x;
-		double root = sqrt(dice_throw(&d));
+		double root = sqrt(dice_uniform(&d));
 		surface_on_triangle(&s, (struct prim_ref){0, dice_below(&d, s.triangle_count), 0}, 1 - root,
-				    root * dice_throw(&d), &x);
+				    root * dice_uniform(&d), &x);
 		vec3 east = vec3_normalize((vec3){-x.sh.n.y, x.sh.n.x, 0});
 		if (fabs(x.sh.n.z) < 0.5 && fabs(atan2(x.sh.n.y, x.sh.n.x)) > 4 * M_PI / n)
 			worst = fmax(worst, atan2(fabs(vec3_dot(x.sh.t, east)), vec3_dot(x.sh.s, east)));

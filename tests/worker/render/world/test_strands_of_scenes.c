@@ -2,11 +2,11 @@
 /*
  * Curves in scenes: which are traced as round cones and which as tubes of triangles; that both represent the same
  * body, on average and where rays meet them; furnaces of curves with joints; agreement of the integrators; and the
- * stated memory. Statistics of images as in tests/support/agree.h.
+ * stated memory. Statistics of images as in tests/support/agreement.h.
  */
-#include "tests/support/agree.h"
+#include "tests/support/agreement.h"
 #include "tests/support/dice.h"
-#include "tests/support/length.h"
+#include "tests/support/test_length.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 #include "worker/render/geom/curves.h"
@@ -40,7 +40,7 @@ static struct world *world_of_curves(const char *xml)
 		 strstr(xml, "animation") ? SHUTTER : SENSOR("0,0,5", "0,0,0"), xml);
 	const struct memory_file files[] = {
 		{"s.xml", text, strlen(text)}, {"c.txt", POINTS, sizeof POINTS - 1}, {NULL, NULL, 0}};
-	return world_of_files(16, 16, files);
+	return world_from_files(16, 16, files);
 }
 
 #define CURVES(type, inner) "<shape type='" type "'><string name='filename' value='c.txt'/>" inner "</shape>"
@@ -95,7 +95,7 @@ static void test_kinds(void **state)
 	/* A bent piece of a spline is split into more than one segment, and into fewer than a hundred. */
 	struct world *w = world_of_curves(CURVES("bsplinecurve", "") SKY);
 	const struct curves *c = w->shapes[0].curves;
-	assert_true(c && c->open && c->tangent && c->count > 8 && c->count < 100);
+	assert_true(c && c->is_open && c->tangent && c->count > 8 && c->count < 100);
 	world_free(w);
 }
 
@@ -104,14 +104,14 @@ static void test_places(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"linearcurve", "bsplinecurve"};
-	struct dice d = dice_of("places of curves and tubes");
+	struct dice d = dice_for_test("places of curves and tubes");
 	for (int k = 0; k < 2; k++) {
 		char xml[1024];
 		snprintf(xml, sizeof xml, CURVES("%s", "") SKY, types[k]);
 		struct world *w = world_of_curves(xml);
 		snprintf(xml, sizeof xml, CURVES("%s", FLAT) SKY, types[k]);
 		struct world *tubes = world_of_curves(xml);
-		size_t n = dice_count(40000), both = 0, one[2] = {0, 0}, far_away = 0;
+		size_t n = dice_scaled_count(40000), both = 0, one[2] = {0, 0}, far_away = 0;
 		double turned = 0;
 		for (size_t i = 0; i < n; i++) {
 			vec3 o = vec3_scale(2, dice_direction(&d)),
@@ -137,7 +137,7 @@ static void test_places(void **state)
 			      types[k], one[0], off, (double)far_away / (double)both, turned / (double)both);
 		/* Averaged over directions, tubes have the same width, except for joints and bends: within 1 % plus
 		 * the noise of pairs that mostly agree (standard error below 0.003; level below 1e-6). */
-		assert_true(p > 0.05 && fabs(off) < 0.01 + (test_full() ? 0 : 0.005));
+		assert_true(p > 0.05 && fabs(off) < 0.01 + (test_is_full() ? 0 : 0.005));
 		assert_true((double)far_away < 0.03 * (double)both && turned < 0.1 * (double)both);
 		world_free(w);
 		world_free(tubes);
@@ -146,18 +146,18 @@ static void test_places(void **state)
 
 static void furnace(const char *test, const char *xml, uint64_t spp)
 {
-	static struct agree_image image;
+	static struct agreement_image image;
 	struct world *w = world_of_curves(xml);
 	assert_false(w->effects.colour);
 	assert_non_null(w->shapes[0].curves);
 	double sum = 0.7 * (w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2]);
-	struct agree_side side = {"path", spp, 32, 0, 0};
-	agree_render(w, test, "path", &side, &image);
+	struct agreement_options side = {"path", spp, 32, 0, 0};
+	agreement_render(w, test, "path", &side, &image);
 	for (uint32_t g = 0; g < image.groups; g++)
-		for (int c = 0; c <= AGREE_CELLS; c++)
+		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			if (fabs(image.mean[g][c] / sum - 1) < 1e-5) /* tiles are rounded to float */
 				image.mean[g][c] = sum;
-	agree_expect(test, &image, sum);
+	agreement_check_constant(test, &image, sum);
 	world_free(w);
 }
 
@@ -184,9 +184,9 @@ static void test_furnaces(void **state)
 static void test_integrators_agree(void **state)
 {
 	(void)state;
-	static struct agree_image a, b;
+	static struct agreement_image a, b;
 	static const char *const types[] = {"bsplinecurve", "linearcurve"};
-	for (int k = 0; k < (test_full() ? 2 : 1); k++) {
+	for (int k = 0; k < (test_is_full() ? 2 : 1); k++) {
 		char xml[2048], test[64];
 		snprintf(xml, sizeof xml,
 			 PATHS("3") CURVES("%s", "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
@@ -194,13 +194,13 @@ static void test_integrators_agree(void **state)
 				     "<translate z='-1'/></transform></shape>",
 			 types[k]);
 		struct world *w = world_of_curves(xml);
-		struct agree_side path = {"path", 4096, 32, 0, 0}, hslt = {"hslt", 32768, 64, 0, 0};
+		struct agreement_options path = {"path", 4096, 32, 0, 0}, hslt = {"hslt", 32768, 64, 0, 0};
 		snprintf(test, sizeof test, "glossy %s", types[k]);
-		agree_render(w, test, "path", &path, &a);
-		agree_render(w, test, "hslt", &hslt, &b);
+		agreement_render(w, test, "path", &path, &a);
+		agreement_render(w, test, "hslt", &hslt, &b);
 		if (b.counters[COUNT_STATES_LOST] > 0)
 			fail_msg("%llu states lost", (unsigned long long)b.counters[COUNT_STATES_LOST]);
-		agree_check(test, &a, &b);
+		agreement_check(test, &a, &b);
 		world_free(w);
 	}
 }

@@ -64,7 +64,7 @@ static struct world *world_of(const char *shape, const char *bsdf)
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW "<shape type='%s'>%s</shape></scene>", shape, bsdf);
 	const struct memory_file files[] = {
 		{"s.xml", xml, strlen(xml)}, {"p0", pictures.file[0].bytes, pictures.file[0].size}, {NULL, NULL, 0}};
-	return world_of_files(8, 8, files);
+	return world_from_files(8, 8, files);
 }
 
 /* Finds the i-th point of the world's only shape. */
@@ -73,7 +73,7 @@ static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 	double u[4];
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, direction_of_square(u), x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, sphere_from_square(u), x);
 	else
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2, 0}, u[0] * (1 - u[1]), u[1] * u[0], x);
 }
@@ -84,7 +84,7 @@ static spectrum scattered_at(const struct world *w, uint64_t i, vec3 wo, vec3 wi
 {
 	struct surface_point x;
 	point_on(w, i, &x);
-	const struct bsdf *b = &w->bsdfs[w->parts[0].bsdf];
+	const struct bsdf *b = &w->bsdfs[w->shape_bindings[0].bsdf];
 	const struct bsdf_point p = world_bsdf_point(&x, &white, t);
 	vec3 o = frame_to_local(&x.sh, wo), in = frame_to_local(&x.sh, wi);
 	*side = o.z * vec3_dot(x.ng, wo) > 0 && in.z * vec3_dot(x.ng, wi) > 0;
@@ -104,10 +104,10 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 	for (uint64_t i = 0; i < 4 * POINTS; i++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
-		vec3 wo = direction_of_square(u), wi = direction_of_square(u + 2);
+		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		bool side, part_side, via_side = true;
-		spectrum got = scattered_at(all, i, wo, wi, t, &side), expected = spectrum_of(0);
+		spectrum got = scattered_at(all, i, wo, wi, t, &side), expected = spectrum_constant(0);
 		if (!side) /* here the integrators do not evaluate the BSDF */
 			continue;
 		if (via)
@@ -170,7 +170,7 @@ static void check_sampling(const char *whole)
 {
 	enum { SAMPLES = 60000, MOMENTS = 6 };
 	struct world *w = world_of("sphere", whole);
-	const struct bsdf *b = &w->bsdfs[w->parts[0].bsdf];
+	const struct bsdf *b = &w->bsdfs[w->shape_bindings[0].bsdf];
 	struct surface_point x;
 	point_on(w, 3, &x);
 	const struct bsdf_point p = world_bsdf_point(&x, &white, TRANSPORT_RADIANCE);
@@ -179,7 +179,7 @@ static void check_sampling(const char *whole)
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
-		vec3 other = direction_of_square(u);
+		vec3 other = sphere_from_square(u);
 		double density = 4 * M_PI * b->ops->pdf_solid(b, &p, wo, other);
 		struct bsdf_sample s;
 		bool any = b->ops->sample(b, &p, wo, u, &s);
@@ -245,7 +245,7 @@ static double check_shadow(const char *shape, const char *with, const char *with
 		point_on(lit, i, &y);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		const struct bsdf_point p = world_bsdf_point(&x, &white, t), q = world_bsdf_point(&y, &white, t);
-		vec3 wo = direction_of_square(u), wi = direction_of_square(u + 2), o = frame_to_local(&x.sh, wo),
+		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2), o = frame_to_local(&x.sh, wo),
 		     in = frame_to_local(&x.sh, wi);
 		double k = smith(&x, t == TRANSPORT_RADIANCE ? wi : wo);
 		spectrum f = plain->ops->eval(plain, &q, o, in);

@@ -38,7 +38,7 @@ static void note_of(const struct world *w, const char *subject, char note[1024])
 /* why: the expected note; "": none. */
 static void assert_note(const char *text, const char *why)
 {
-	struct world *w = world_of_text(32, 32, "%s", text);
+	struct world *w = world_from_text(32, 32, "%s", text);
 	char note[1024];
 	note_of(w, NOTE, note);
 	if (*why ? !strstr(note, why) : *note)
@@ -70,10 +70,10 @@ static bool meets_something(const struct world *w, uint32_t n)
 	const struct camera *c = &w->camera;
 	for (uint32_t i = 0; i < n * n; i++) {
 		double u[2] = {(i * 7 % n + 0.5) / n, (i / n * 5 % n + 0.5) / n}, low, high;
-		struct ray_end from = {.p = camera_point(c, u), .prim = PRIM_NONE};
+		struct ray_end from = {.p = camera_sample_point(c, u), .prim = PRIM_NONE};
 		vec3 d = camera_direction(c, from.p, (i % n + 0.5) / n * c->width, (i / n + 0.5) / n * c->height);
 		struct ray_hit hit;
-		camera_clip(c, d, &low, &high);
+		camera_clip_range(c, d, &low, &high);
 		if (accel_closest(w->accel, &from, d, low, high, &hit))
 			return true;
 	}
@@ -89,13 +89,13 @@ static void test_against_rays(void **state)
 		("<sensor type='thinlens'><float name='aperture_radius' value='0.5'/>"
 		 "<float name='focus_distance' value='3'/><float name='fov' value='20'/>"),
 	};
-	struct dice d = dice_of("cameras that see nothing");
+	struct dice d = dice_for_test("cameras that see nothing");
 	uint32_t blind = 0, noted = 0;
 	for (size_t i = 0; i < 300; i++) {
 		double x[9];
 		for (int k = 0; k < 9; k++)
 			x[k] = dice_between(&d, -4, 4);
-		struct world *w = world_of_text(
+		struct world *w = world_from_text(
 			48, 32,
 			"%s<transform name='to_world'><lookat origin='%g,%g,%g' target='0,0,%g' up='0,1,0'/></transform></sensor>"
 			"<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate x='%g' y='%g' z='%g'/>"
@@ -136,7 +136,7 @@ static void test_dark(void **state)
 		{"<emitter type='directional'><spectrum name='irradiance' value='1e-9'/></emitter>", false},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct world *w = world_of_text(32, 32, SENSOR("0,0,9", "0,0,0") "%s", cases[i].emitters);
+		struct world *w = world_from_text(32, 32, SENSOR("0,0,9", "0,0,0") "%s", cases[i].emitters);
 		char note[1024];
 		note_of(w, "no emitter gives light from 360 to 830 nm", note);
 		if ((*note != 0) != cases[i].dark)
@@ -168,7 +168,7 @@ static void test_too_close(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w =
-			world_of_text(32, 32, LOOK("0,0,0", "") "<emitter type='constant'/>%s", cases[i].shape);
+			world_from_text(32, 32, LOOK("0,0,0", "") "<emitter type='constant'/>%s", cases[i].shape);
 		char note[1024];
 		note_of(w, "the camera is too near to the ", note);
 		if ((*note != 0) != cases[i].close)
@@ -195,7 +195,7 @@ static void test_negative_pixels(void **state)
 		const struct memory_file files[] = {{"scene.xml", xml, strlen(xml)},
 						    {"sky.pfm", pfm, (size_t)head + sizeof pixels[i]},
 						    {NULL, NULL, 0}};
-		struct world *w = world_of_files(32, 32, files);
+		struct world *w = world_from_files(32, 32, files);
 		note_of(w, "negative", note);
 		assert_string_equal(note, said[i]);
 		world_free(w);

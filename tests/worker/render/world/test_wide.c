@@ -87,11 +87,12 @@ static double largest_extent(const struct world *w, struct dice *d, size_t n)
 static void test_wide(void **state)
 {
 	(void)state;
-	struct dice d = dice_of("wide");
+	struct dice d = dice_for_test("wide");
 	for (size_t k = 0; k < sizeof forms / sizeof *forms; k++)
 		for (double b = 1e4; b < 3e10; b *= 10) {
 			bool shines = forms[k].y == 0;
-			struct world *w = world_of_text(8, 8, text, forms[k].type, forms[k].y, b, shines ? SHINES : "");
+			struct world *w =
+				world_from_text(8, 8, text, forms[k].type, forms[k].y, b, shines ? SHINES : "");
 			double off = rays(w, &d, 1000), light_off = shines ? largest_extent(w, &d, 1000) : 0;
 			print_message("%s of %.0e: met %.2g off its plane, light %.2g\n", forms[k].type, b, off,
 				      light_off);

@@ -26,7 +26,7 @@ enum { CORNERS = 5, FACES = 3 };
 static const double corner[CORNERS][3] = {{0, 0, 0}, {2, 0, 0}, {0.5, 1.5, 0.25}, {-1, 0.5, 0}, {3, 2, -0.5}};
 static const int face[FACES][3] = {{0, 1, 2}, {0, 2, 3}, {1, 4, 2}};
 
-static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths grey = {.is_grey = true};
 
 static void write_mesh(char *text, size_t size)
 {
@@ -65,12 +65,12 @@ static struct world *world_of(const char *body)
 	write_fan(fan, sizeof fan);
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW SKY "%s</scene>", body);
 	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"m.ply", mesh, strlen(mesh)}, {NULL, NULL, 0}};
-	return world_of_files(16, 16, files);
+	return world_from_files(16, 16, files);
 }
 
 static double albedo(const struct world *w, const struct surface_point *x)
 {
-	const struct bsdf *b = &w->bsdfs[w->parts[x->prim.shape].bsdf];
+	const struct bsdf *b = &w->bsdfs[w->shape_bindings[x->prim.shape].bsdf];
 	struct bsdf_point p = world_bsdf_point(x, &grey, TRANSPORT_RADIANCE);
 	return M_PI * b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}).v[0];
 }
@@ -153,7 +153,7 @@ static void test_distances(void **state)
 	assert_true(c.edge > 30 && c.mixed > 100 && c.interior > 100);
 	const mat4 moved = {{{0, -3, 0, 5}, {3, 0, 0, 0}, {0, 0, 3, 1}, {0, 0, 0, 1}}};
 	compare(w, 1, moved, 3, 0.125, 0.75, 0.75, 0.25);
-	assert_true(w->bsdfs[0].textured && w->bsdfs[0].shape == COLOR_SHAPE_CONSTANT);
+	assert_true(w->bsdfs[0].is_textured && w->bsdfs[0].color_kind == COLOR_KIND_CONSTANT);
 	world_free(w);
 }
 
@@ -184,7 +184,7 @@ static void test_instances(void **state)
 			"<transform name='to_world'><scale x='-2' y='2' z='2'/><translate z='4'/></transform></shape>");
 	compare(w, 0, unmoved, 1, 0.125, 0.75, 0.75, 0.25);
 	const mat4 mirrored = {{{-2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 2, 4}, {0, 0, 0, 1}}};
-	compare(w, 1, mirrored, 2, w->sharing_count ? 0.25 : 0.125, 0.75, 0.75, 0.25);
+	compare(w, 1, mirrored, 2, w->sharing_shape_count ? 0.25 : 0.125, 0.75, 0.75, 0.25);
 	world_free(w);
 }
 
@@ -245,8 +245,8 @@ static void test_range(void **state)
 	}
 	double least = expected(widest, 0.75, 0.25, 0.5, 0.1);
 	assert_true(least > 0.11 && least < 0.49);
-	if (fabs(w->bsdfs[0].alpha - least) > 1e-4)
-		fail_msg("alpha %g, not %g", w->bsdfs[0].alpha, least);
+	if (fabs(w->bsdfs[0].min_alpha - least) > 1e-4)
+		fail_msg("alpha %g, not %g", w->bsdfs[0].min_alpha, least);
 	world_free(w);
 }
 
@@ -255,11 +255,11 @@ static void test_light(void **state)
 	(void)state;
 	struct world *w = world_of(PLY("<emitter type='area'>" WIRE(
 		"radiance", NUMBER("edge_color", "20") NUMBER("interior_color", "5")) "</emitter>"));
-	const struct emitter *em = &w->emitters[w->parts[0].emitter];
-	struct emitter_point x = {.n = {0, 0, 1}, .where = {.b1 = 0.001, .b2 = 0.4}};
-	assert_true(em->textured && em->shape == COLOR_SHAPE_D65);
+	const struct emitter *em = &w->emitters[w->shape_bindings[0].emitter];
+	struct emitter_point x = {.n = {0, 0, 1}, .texture_point = {.b1 = 0.001, .b2 = 0.4}};
+	assert_true(em->is_textured && em->color_kind == COLOR_KIND_D65);
 	assert_true(fabs(em->ops->radiance(em, &x, x.n, &grey).v[0] - 20) < 1e-9);
-	x.where.b1 = 0.3;
+	x.texture_point.b1 = 0.3;
 	assert_true(fabs(em->ops->radiance(em, &x, x.n, &grey).v[0] - 5) < 1e-9);
 	world_free(w);
 }
@@ -268,16 +268,16 @@ static void test_refused(void **state)
 {
 	(void)state;
 #define CUBE(inner) "<shape type='cube'>" inner "</shape>"
-	world_refused(CUBE("<bsdf type='bumpmap'>" WIRE("map", "") "<bsdf type='diffuse'/></bsdf>"),
-		      "the edges of a mesh cannot be a bump or normal map");
-	world_refused(CUBE(WIRE("displacement", "") "<integer name='displacement_level' value='1'/>"),
-		      "the edges of a mesh cannot displace a surface");
-	world_refused("<emitter type='projector'>" WIRE("irradiance", "") "</emitter>",
-		      "only the material or the light of a shape can show edges");
-	world_refused(CUBE(DIFFUSE(NUMBER("step_width", "1.5"))), "step_width");
-	world_refused(CUBE(DIFFUSE(NUMBER("line_width", "-1"))), "line_width");
-	world_refused(CUBE(DIFFUSE("<rgb name='edge_color' value='2,0,0'/>")), "edge_color");
-	world_refused(CUBE(DIFFUSE("<texture name='edge_color' type='checkerboard'/>")), "edge_color");
+	world_check_refused(CUBE("<bsdf type='bumpmap'>" WIRE("map", "") "<bsdf type='diffuse'/></bsdf>"),
+			    "the edges of a mesh cannot be a bump or normal map");
+	world_check_refused(CUBE(WIRE("displacement", "") "<integer name='displacement_level' value='1'/>"),
+			    "the edges of a mesh cannot displace a surface");
+	world_check_refused("<emitter type='projector'>" WIRE("irradiance", "") "</emitter>",
+			    "only the material or the light of a shape can show edges");
+	world_check_refused(CUBE(DIFFUSE(NUMBER("step_width", "1.5"))), "step_width");
+	world_check_refused(CUBE(DIFFUSE(NUMBER("line_width", "-1"))), "line_width");
+	world_check_refused(CUBE(DIFFUSE("<rgb name='edge_color' value='2,0,0'/>")), "edge_color");
+	world_check_refused(CUBE(DIFFUSE("<texture name='edge_color' type='checkerboard'/>")), "edge_color");
 }
 
 int main(void)

@@ -68,7 +68,7 @@ static void assert_same_node(const struct scene_node *a, const struct scene_node
 		fail_msg("%s: %u values and %u objects, not %u and %u", a->type, a->property_count, a->child_count,
 			 b->property_count, b->child_count);
 	for (uint32_t i = 0; i < a->property_count; i++)
-		assert_same_property(a, &a->properties[i], node_find(b, a->properties[i].name));
+		assert_same_property(a, &a->properties[i], node_find_property(b, a->properties[i].name));
 	for (uint32_t i = 0; i < a->child_count; i++)
 		assert_same_node(a->children[i], b->children[i]);
 }
