@@ -64,19 +64,19 @@ static inline bool fptrap_watch(void)
 	return false;
 }
 
-static inline unsigned fptrap_leave(void)
+static inline unsigned fptrap_enter_library(void)
 {
 	return 0;
 }
 
-static inline void fptrap_return(unsigned left)
+static inline void fptrap_leave_library(unsigned flags_before)
 {
-	(void)left;
+	(void)flags_before;
 }
 
-static inline void fptrap_unwatch(bool before)
+static inline void fptrap_unwatch(bool previous)
 {
-	(void)before;
+	(void)previous;
 }
 #endif
 
