@@ -7,8 +7,8 @@
  * `eval` is f (1/sr), without a cosine; delta lobes contribute nothing to eval and pdf.
  * Transport: radiance travelling along wi -> wo is scaled by (n_wo/n_wi)^2 when refracted (n_x: index on the side of
  * x; Walter 2007 eq. 21 with Veach 1997 sec. 5.2), importance is not: this factor is
- * f_radiance(wo,wi) / f_importance(wo,wi). For a BSDF that is not reciprocal (struct bsdf.directed), importance is
- * still radiance with the directions exchanged: f_importance(wo,wi) = f_radiance(wi,wo).
+ * f_radiance(wo,wi) / f_importance(wo,wi). For a BSDF that is not reciprocal (is_nonreciprocal), importance is still
+ * radiance with the directions exchanged: f_importance(wo,wi) = f_radiance(wi,wo).
  * Measure of densities: solid angle; for delta lobes the probability of choosing the lobe.
  * Immutable after creation; any thread; nothing here allocates after create.
  */
@@ -33,7 +33,7 @@ struct bsdf_point {
 	struct texture_point texture_point;
 	const struct wavelengths *wavelengths;
 	enum transport transport;
-	bool culls_backfaces; /* rays that hit the surface from below its normal ignore it: struct bsdf.culls */
+	bool culls_backfaces; /* rays that hit the surface from below its normal ignore it: see struct bsdf */
 	struct relief_frames relief_frames; /* the shading frames of single parts: tilted.h, bumpmap.c */
 };
 
@@ -102,11 +102,11 @@ struct bsdf {
 	bool is_two_sided;	/* scatters light that arrives from below the normal */
 	bool has_mirrored_back; /* is_two_sided only since bsdf_mirror_back (twosided.h) made some part of it so */
 	bool is_textured;
-	bool is_nonreciprocal; /* not reciprocal; paths from a light choose specular lobes with other probabilities than
-			  paths from the camera */
-	bool culls_backfaces;  /* light that has entered a curve with this BSDF leaves it without a vertex: struct
-			  geom_shape.culled */
-	bool uses_relief_frames;     /* some part has a shading frame of its own, and needs bsdf_point.place */
+	bool is_nonreciprocal;	     /* paths from a light choose specular lobes with other probabilities than
+				paths from the camera */
+	bool culls_backfaces;	     /* light that has entered a curve with this BSDF leaves it without a vertex: struct
+					geom_shape.culls_backfaces */
+	bool uses_relief_frames;     /* some part has a shading frame of its own, and needs bsdf_point.relief_frames */
 	bool is_see_through;	     /* a `mask` or `null`: objects behind the surface show through */
 	bool uses_tangents;	     /* anisotropic, or has a normal map: depends on the tangents of the frame */
 	bool is_black;		     /* neither reflects nor transmits */
@@ -116,7 +116,7 @@ struct bsdf {
 };
 
 /* Returns whether connections may look through surfaces with b (path/transparent.h). They do not look through hair,
- * which culls. */
+ * which culls back faces. */
 static inline bool bsdf_passes_connections(const struct bsdf *b)
 {
 	return (b->modes & BSDF_STRAIGHT) && !b->culls_backfaces;

@@ -14,14 +14,14 @@ int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_nod
 int bsdf_read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		      const struct bsdf_build *build, struct error *e);
 
-/* Like bsdf_read_texture(), for a number from 0 to 1 (texture_build.number). */
+/* Like bsdf_read_texture(), for a number from 0 to 1 (texture_build.is_number). */
 int bsdf_read_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		     const struct bsdf_build *build, struct error *e);
 
-/* Like bsdf_read_texture(), for a quantity that may exceed 1, such as an exponent or an absorption. number: it is no
- * spectrum (texture_build.number). The caller checks its range. */
+/* Like bsdf_read_texture(), for a quantity that may exceed 1, such as an exponent or an absorption. is_number: it is no
+ * spectrum (texture_build.is_number). The caller checks its range. */
 int bsdf_read_quantity(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		       bool number, const struct bsdf_build *build, struct error *e);
+		       bool is_number, const struct bsdf_build *build, struct error *e);
 
 /*
  * Points at which textures are evaluated to find their range: a grid over (u,v), combined with points of the mesh's
@@ -56,7 +56,7 @@ bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 void bsdf_make_specular(struct bsdf *b, const struct bsdf_ops *ops);
 
 /* Records that b has a part with a colour of this kind. */
-void bsdf_add_color_kind(struct bsdf *b, enum color_kind shape);
+void bsdf_add_color_kind(struct bsdf *b, enum color_kind kind);
 
 /* Mitsuba 0.6 can be told to keep reflectances that add up to more than 1. Returns -ERANGE if `sum`, their sum, exceeds
  * 1 and the node requests that, otherwise 0. For BSDFs without this parameter it has no effect (scene.c). */

@@ -12,7 +12,7 @@ struct glass {
 };
 
 /* Reads the parameters of the index, specular_reflectance and specular_transmittance. Sets b->eta, b->ior,
- * b->dispersive and the colour flags; g must outlive b. Returns 0 or a negative error code. */
+ * b->is_dispersive and the colour flags; g must outlive b. Returns 0 or a negative error code. */
 int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define GLASS_PARAMS                                                                    \

@@ -14,13 +14,13 @@
  * upsampled as reflectances, and multiplied again.
  *
  * Light scatters to both sides of the surface, so light that enters the fibre has to leave it again without another
- * event: seen from inside, the surface does not exist. Curves ignore rays from inside (bsdf.culls), as Mitsuba's do, so
- * that the fibre around a vertex does not block the connection to an emitter. A vertex scatters only if the camera's
- * side of the path meets it from outside; paths from a light therefore find only reflected light, and paths from the
- * camera and connections find the rest. Other shapes, and curves that are meshes, have a specular lobe on their back
- * that passes light straight on; it counts as an edge of the path, and next event estimation does not look through it.
- * On these shapes, a path from a light that arrives from outside cannot know whether the camera sees this surface or
- * one behind it: half of these paths pass straight through, to scatter where the light leaves.
+ * event: seen from inside, the surface does not exist. Curves ignore rays from inside (bsdf.culls_backfaces), as
+ * Mitsuba's do, so that the fibre around a vertex does not block the connection to an emitter. A vertex scatters only
+ * if the camera's side of the path meets it from outside; paths from a light therefore find only reflected light, and
+ * paths from the camera and connections find the rest. Other shapes, and curves that are meshes, have a specular lobe
+ * on their back that passes light straight on; it counts as an edge of the path, and next event estimation does not
+ * look through it. On these shapes, a path from a light that arrives from outside cannot know whether the camera sees
+ * this surface or one behind it: half of these paths pass straight through, to scatter where the light leaves.
  *
  * f is not reciprocal, because h belongs to the direction of the camera. Importance is radiance with the directions
  * exchanged, as everywhere (bsdf.h). Sampling importance draws theta from M, which is symmetric, and phi in proportion

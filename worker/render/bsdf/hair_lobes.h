@@ -21,25 +21,26 @@ struct hair_angle {
 struct hair_fibre {
 	double eta; /* index inside over the one outside */
 	struct hair_lobe_width {
-		double variance;		  /* variance along the fibre */
-		double normalization;		  /* 1 / (1 - exp(-2 / v)), over v */
-		double exp_minus_2_over_variance; /* exp(-2 / v) */
+		double variance;      /* variance along the fibre */
+		double normalization; /* 1 / (1 - exp(-2 / variance)), over variance */
+		double exp_minus_2_over_variance;
 	} longitudinal[HAIR_LOBES];
 	struct hair_angle tilt[HAIR_LOBES]; /* angle by which the scales turn theta for lobe p */
 	double azimuthal_width;		    /* width of the logistic distribution around the fibre */
-	double logistic_tail;		    /* exp(-pi / s) */
+	double logistic_tail;		    /* exp(-pi / azimuthal_width) */
 };
 
-/* Sets f. along, around: roughness along and around the fibre, in [0,1]; values below HAIR_ROUGHNESS_MIN count as
- * HAIR_ROUGHNESS_MIN. tilt: angle of the scales, in radians. */
+/* Sets f. longitudinal_roughness, azimuthal_roughness: along and around the fibre, in [0,1]; values below
+ * HAIR_ROUGHNESS_MIN count as HAIR_ROUGHNESS_MIN. tilt: angle of the scales, in radians. */
 #define HAIR_ROUGHNESS_MIN 1e-3
-void hair_fibre_init(struct hair_fibre *f, double eta, double along, double around, double tilt);
+void hair_fibre_init(struct hair_fibre *f, double eta, double longitudinal_roughness, double azimuthal_roughness,
+		     double tilt);
 
 /* How a ray enters the fibre, from the camera's side. */
 struct hair_entry {
-	double reflectance, transmittance; /* Fresnel reflectance and transmittance */
+	double reflectance, transmittance; /* Fresnel's */
 	double gamma_t;			   /* gamma inside the fibre; meaningless if nothing is transmitted */
-	double passage_length;		   /* length of one passage through the fibre */
+	double passage_length;		   /* of one passage through the fibre */
 };
 
 /* x, z: components of a unit direction in the frame whose y axis runs along the fibre and whose z axis is the normal; z
@@ -51,13 +52,13 @@ void hair_lobe_shares(const struct hair_entry *e, double t, double share[HAIR_LO
 
 /* M_p: returns the density of sin theta_o for light from theta_i; hair_sample_longitudinal draws theta_o with that
  * density. */
-double hair_longitudinal_pdf(const struct hair_fibre *f, int p, struct hair_angle from, struct hair_angle to);
-struct hair_angle hair_sample_longitudinal(const struct hair_fibre *f, int p, struct hair_angle from, double u0,
+double hair_longitudinal_pdf(const struct hair_fibre *f, int p, struct hair_angle theta_i, struct hair_angle theta_o);
+struct hair_angle hair_sample_longitudinal(const struct hair_fibre *f, int p, struct hair_angle theta_i, double u0,
 					   double u1);
 
-/* N_p: returns the density of phi_o. turn: phi_o minus that of the ideal ray, hair_azimuth_change(). For p < HAIR_LOBES
- * - 1; the last lobe is uniform in phi_o. */
-double hair_azimuthal_pdf(const struct hair_fibre *f, double turn);
+/* N_p: returns the density of phi_o. offset: phi_o minus that of the ideal ray, hair_azimuth_change(). For
+ * p < HAIR_LOBES - 1; the last lobe is uniform in phi_o. */
+double hair_azimuthal_pdf(const struct hair_fibre *f, double offset);
 double hair_sample_azimuthal(const struct hair_fibre *f, double u); /* within [-pi, pi] */
 /* Returns phi_o - phi_i of lobe p in a smooth fibre. */
 double hair_azimuth_change(int p, double gamma_i, double gamma_t);

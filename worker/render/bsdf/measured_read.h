@@ -25,7 +25,7 @@ struct measured_material {
 	struct warp_table luminance;	   /* mean of S over wavelengths, by the numbers that `visible_normals` warps */
 	struct measured_plane normal_density;	   /* D, the density of microfacet normals, by half vector */
 	struct measured_plane projected_area;	   /* sigma, the projected area of the microfacets, by direction */
-	uint32_t nodes_per_side, wavelength_count; /* nodes per side of the table of colours; number of wavelengths */
+	uint32_t nodes_per_side, wavelength_count; /* nodes_per_side: of the table of colours */
 	const double *nm;			   /* ascending; NULL: the file has rgb only */
 	const float *spectra; /* `wavelength_count` values for each slice and node of `luminance`; NULL if nm is NULL */
 	const float *rgb;     /* three values for each slice and node: linear Rec. 709 under D65 */

@@ -9,7 +9,7 @@
 struct metal {
 	struct texture eta, k;
 	bool is_textured; /* eta or k is textured; a textured one is not yet divided by the index outside */
-	double eta_divisor, k_divisor; /* divisors of eta and k: the index outside for a textured one, otherwise 1 */
+	double eta_divisor, k_divisor; /* the index outside for a textured one, otherwise 1 */
 	struct texture reflectance;    /* factor of the Fresnel term */
 	bool is_perfect_mirror;	       /* reflects all light: the Fresnel factor is 1 */
 };

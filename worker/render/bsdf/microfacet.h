@@ -24,7 +24,7 @@ struct microfacet {
 };
 
 /* Sets m, raising roughness to at least MICROFACET_ALPHA_MIN. */
-void microfacet_init(struct microfacet *m, bool ggx, double alpha_u, double alpha_v);
+void microfacet_init(struct microfacet *m, bool is_ggx, double alpha_u, double alpha_v);
 double microfacet_min_alpha(const struct microfacet *m);  /* the smaller of the two roughnesses */
 double microfacet_mean_alpha(const struct microfacet *m); /* their geometric mean */
 

@@ -72,8 +72,8 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
-/* Reads the exponent. *most: its largest value, which is that of the sharpest lobe. Returns 0 or a negative error
- * code. */
+/* Reads the exponent. *max_exponent: its largest value, which is that of the sharpest lobe. Returns 0 or a negative
+ * error code. */
 static int read_exponent(struct phong *ph, struct bsdf *b, double *max_exponent, const struct scene_node *n,
 			 const struct bsdf_build *build, struct error *e)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Disney's "principled" BSDF (Burley 2012, Physically Based Shading at Disney, and 2015, Extending the Disney BRDF to a
- * BSDF), with the parameters and defaults of Mitsuba 3's plug-in. With m = min_metallic, t = spec_trans, c =
- * base_color, and a rough GGX boundary of index eta,
+ * BSDF), with the parameters and defaults of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c = base_color,
+ * and a rough GGX boundary of index eta,
  *
  *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
  *
@@ -244,7 +244,7 @@ struct evaluation {
 	double pdf;
 };
 
-/* Adds refracted light to the pair: Walter et al. 2007, eq. 21, as in roughdielectric. wo is above; eta: index beyond
+/* Adds refracted light to *out: Walter et al. 2007, eq. 21, as in roughdielectric. wo is above; eta: index beyond
  * over index on wo's side. */
 static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double chance,
 			  enum transport transport, struct evaluation *out)
@@ -281,7 +281,7 @@ static double coat_lobe(const struct principled_point *s, vec3 wo, vec3 h)
 	return 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
 }
 
-/* Returns the density (solid angle) of reflected directions. seen: that of sampling the boundary's facets; cos_d:
+/* Returns the density (solid angle) of reflected directions. facet_pdf: that of sampling the boundary's facets; cos_d:
  * cosine of either direction to the half vector h. */
 static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double facet_pdf,
 			    bool below, const double chance[LOBE_COUNT])

@@ -43,7 +43,7 @@ struct principled {
 	struct principled_point precomputed; /* without colours; if `varies`, its numbers do not hold everywhere */
 };
 
-struct principled_point principled_point_at(const struct principled *p, const struct bsdf_point *at);
+struct principled_point principled_point_at(const struct principled *p, const struct bsdf_point *point);
 /* Computes p->precomputed; to be called once all other members are set. */
 void principled_precompute(struct principled *p, const struct bsdf_build *build);
 struct microfacet principled_facets(double anisotropic, double roughness);

@@ -26,7 +26,7 @@ enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE_REFLECT, THIN_DIFFUSE_TRANSMIT,
 
 struct thin {
 	struct principled p;
-	struct texture diff_trans;  /* without ops: the constant `through` is used instead */
+	struct texture diff_trans;  /* without ops: the constant `diffuse_transmitted` is used instead */
 	double diffuse_transmitted; /* d of the comment at the top */
 	struct texture eta;	    /* without ops: the constant p.eta is used instead */
 };

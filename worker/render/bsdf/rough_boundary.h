@@ -21,7 +21,7 @@ struct boundary_row {
 struct boundary_table {
 	bool is_ggx;
 	double eta;		    /* index below over index above */
-	double min_alpha, log_step; /* row i has the roughness least * exp(i * step) */
+	double min_alpha, log_step; /* row i has the roughness min_alpha * exp(i * log_step) */
 	int row_count;
 	struct boundary_row *row;
 	struct boundary_table *next; /* the next table of the scene */
@@ -54,11 +54,11 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p);
 /* Returns the share of light from outside, at this cosine, that the boundary transmits. */
-double rough_boundary_transmittance(const struct boundary_point *at, double cosine);
+double rough_boundary_transmittance(const struct boundary_point *point, double cosine);
 /* Returns the share of diffuse light from inside that leaves, times eta^2. */
-double rough_boundary_escape(const struct boundary_point *at);
+double rough_boundary_escape(const struct boundary_point *point);
 
 /* Calls microfacet_reflect() with the facets and the index of this boundary. */
-double rough_boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf);
+double rough_boundary_reflect(const struct boundary_point *point, vec3 wo, vec3 wi, double *pdf);
 
 #endif

@@ -46,7 +46,7 @@ static double clamped_ratio(double x, double y)
 	return fmin(x / y, DBL_MAX);
 }
 
-/* Computes the factors of f = (once rho + interreflected rho^2) / pi, with the reflectance rho. */
+/* Computes the factors of f = (direct rho + interreflected rho^2) / pi, with the reflectance rho. */
 static void compute_factors(const struct grooves *r, vec3 wo, vec3 wi, double *direct, double *interreflected)
 {
 	double so = sqrt(fmax(1 - wo.z * wo.z, 0)), si = sqrt(fmax(1 - wi.z * wi.z, 0)), s = so * si;

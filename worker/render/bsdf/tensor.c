@@ -21,7 +21,7 @@ static unsigned number_bytes(unsigned type)
 	return type <= TYPE_MAX ? widths[type] : 0;
 }
 
-/* Reads the header of an array; at: offset of its type. */
+/* Reads the header of an array; header: offset of its type. */
 static int read_array_header(const unsigned char *file, size_t size, size_t header, unsigned dimensions,
 			     struct tensor *out)
 {

@@ -41,7 +41,7 @@ int tensor_read_numbers(const struct tensor_input *in, const struct tensor *t, c
 /* Reads strictly ascending numbers from an array of one dimension, or of two if the first size is 1. Returns 0,
  * -EINVAL, -ENOTSUP or -ENOMEM. */
 int tensor_read_axis(const struct tensor_input *in, const char *name, enum tensor_type type, unsigned dimensions,
-		     uint32_t *count, const double **at);
+		     uint32_t *count, const double **values);
 
 /* Computes the weight of each wavelength in R, G and B under D65, for spectra that are linear between the wavelengths
  * and constant beyond. -ENOMEM. */

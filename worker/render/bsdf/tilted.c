@@ -17,7 +17,7 @@ struct view {
 	struct relief_frames outer;
 };
 
-/* Returns the shading frame of a part nested in this part, in the coordinates of `get_frame`. */
+/* Returns the shading frame of a part nested in this part, in the coordinates of `frame`. */
 static struct frame nested_frame(const void *point, const struct relief *r)
 {
 	const struct view *v = point;

@@ -42,11 +42,11 @@ struct warp_table {
 int warp_table_init(struct warp_table *t, uint32_t slices, uint32_t width, uint32_t height, double *value,
 		    struct arena *arena);
 
-/* Maps u in [0, 1]^2 to the point `where`; returns the density there. */
-double warp_table_sample(const struct warp_table *t, const struct warp_mix *mix, const double u[2], double where[2]);
-/* Finds the numbers u that warp_table_sample maps to `where`; returns the density at `where`. */
-double warp_table_invert(const struct warp_table *t, const struct warp_mix *mix, const double where[2], double u[2]);
-double warp_table_density(const struct warp_table *t, const struct warp_mix *mix, const double where[2]);
+/* Maps u in [0, 1]^2 to `point`; returns the density there. */
+double warp_table_sample(const struct warp_table *t, const struct warp_mix *mix, const double u[2], double point[2]);
+/* Finds the numbers u that warp_table_sample maps to `point`; returns the density there. */
+double warp_table_invert(const struct warp_table *t, const struct warp_mix *mix, const double point[2], double u[2]);
+double warp_table_density(const struct warp_table *t, const struct warp_mix *mix, const double point[2]);
 
 /* The cell of a grid of `nodes` nodes that x in [0, 1] lies in, and the position within it, from 0 to 1. */
 struct warp_cell {
