@@ -25,18 +25,16 @@
 struct camera_projection;
 
 struct camera {
-	vec3 position;	   /* the pinhole, or the centre of the aperture */
-	struct frame axes; /* s: right on the image, t: down, n: forward */
-	double width, height,
-		pixels_per_slope;   /* size of the film in pixels; pixels_per_slope: pixels per unit of slope */
+	vec3 position;				/* the pinhole, or the centre of the aperture */
+	struct frame axes;			/* s: right on the image, t: down, n: forward */
+	double width, height, pixels_per_slope; /* width, height: of the film, in pixels */
 	double center_x, center_y;  /* the film point on the axis: the middle of the film plus the offset of the
 				       principal point */
 	double near_clip, far_clip; /* distances along the axis, in the rescaled world */
 	bool has_lens; /* x_k is sampled and mutated: the radius is above 0, or camera_force_aperture was used */
-	double aperture_radius, focus_distance;	    /* radius; distance of the plane of focus along the axis */
+	double aperture_radius, focus_distance;	    /* focus_distance: of the plane of focus, along the axis */
 	const struct camera_projection *projection; /* NULL: onto a plane */
-	double kc[2], fold_slope_squared; /* for perspective_rdist; fold_slope_squared: squared slope at which the image
-					     ends */
+	double kc[2], fold_slope_squared;	    /* for perspective_rdist; fold: the slope at which the image ends */
 	const struct motion *motion; /* motion of the camera, to the rescaled world; NULL: none. With one, position and
 				       axes are those at the opening of the shutter */
 };
@@ -49,7 +47,7 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 
 /* Sets *out to the camera c, which has a motion, at the given time. */
 void camera_move(const struct camera *c, double time, struct camera *out);
-/* Returns the camera at the given time: c itself if it does not move, otherwise *room. */
+/* Returns the camera at the given time: c itself if it does not move, otherwise *storage. */
 static inline const struct camera *camera_at(const struct camera *c, double time, struct camera *storage)
 {
 	if (!c->motion)
