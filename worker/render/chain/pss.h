@@ -18,7 +18,7 @@ enum {
 };
 
 struct pss_point {
-	unsigned block_count[SAMPLER_SIDES]; /* number of blocks */
+	unsigned block_count[SAMPLER_SIDES];
 	double u[SAMPLER_SIDES][PSS_VERTICES_MAX][SAMPLER_BLOCK_SIZE];
 };
 

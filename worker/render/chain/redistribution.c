@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * bdpt calls keep() for each contribution of a sample. Nearly all are below the threshold and are left as they are.
- * For the others, keep() builds the full path x, because the share that is spread depends on the path alone, not on
- * the roulette of the sub-paths, which stays a factor of the weight. Then run_chain() runs the chains: it proposes y
- * by a local mutation, accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states
- * with their expected weights.
+ * bdpt calls spread_contribution() for each contribution of a sample. Nearly all are below the threshold and are left
+ * as they are. For the others, spread_contribution() builds the full path x, because the share that is spread depends
+ * on the path alone, not on the roulette of the sub-paths, which stays a factor of the weight. Then run_chain() runs
+ * the chains: it proposes y by a local mutation, accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))),
+ * and splats both states with their expected weights.
  *
  * Failures: redistribution_new fails if memory runs out; afterwards nothing allocates or fails. One path in millions
  * cannot be built again from its sub-paths; it keeps its contribution and starts no chain, and so does one whose
@@ -32,10 +32,10 @@ struct spread_state {
 };
 
 struct redistribution {
-	struct path_split split; /* must be first: keep() gets its address */
+	struct path_split split; /* must be first: spread_contribution() gets its address */
 	struct redistribution_rule rule;
-	struct path_context context; /* context of the chains */
-	uint32_t light_every;	     /* light_every of the samples */
+	struct path_context context; /* of the chains */
+	uint32_t light_every;	     /* of the samples */
 	const struct brightness *map;
 	struct splat_target *target;
 	struct mixture mixture; /* local strategies only */
@@ -133,8 +133,8 @@ static void run_chain(struct redistribution *r, const struct spread_state *start
 	splat_state(r, x, unit);
 }
 
-/* Returns the number of chains for `units` times the energy that one chain carries, and sets the factor *each on their
- * energy. For less than one unit: one chain with that probability, otherwise none. */
+/* Returns the number of chains for `units` times the energy that one chain carries, and sets the factor *energy_factor
+ * on their energy. For less than one unit: one chain with that probability, otherwise none. */
 static unsigned choose_chain_count(double units, double u, double *energy_factor)
 {
 	if (units < 1) {

@@ -44,9 +44,9 @@ enum { REDISTRIBUTION_CHAINS_MAX = 64 }; /* most chains for one contribution */
 /* c: the context of the samples, from which world, window, depths, light_every and counters are taken. target: where
  * the chains splat. classes: gets the sums of the energy that is spread, I by path class. Returns -ENOMEM if out of
  * memory. */
-int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
-		       const struct brightness *map, uint64_t seed, struct splat_target *target,
-		       double classes[PATH_CLASSES], struct error *e);
+int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
+		       const struct path_context *c, const struct brightness *map, uint64_t seed,
+		       struct splat_target *target, double classes[PATH_CLASSES], struct error *e);
 void redistribution_free(struct redistribution *r);
 
 /* Returns the split to be used as path_context.split while the next sample is evaluated. The two numbers identify the
