@@ -16,29 +16,29 @@
 /* Parameters of the sky for one position of the sun, for each of X, Y and Z. */
 struct daylight {
 	double coefficient[3][9]; /* A to G, I and H of equations (8) and (9) */
-	double mean_radiance[3];  /* mean radiance, W / (m^2 sr) */
+	double mean_radiance[3];  /* W / (m^2 sr) */
 };
 
-/* Computes the sky. turbidity: 1 (clear) to 10 (haze); albedo: of the ground for X, Y and Z, 0 to 1; sun: its angle
- * from the zenith, 0 to pi/2. */
-struct daylight daylight_make(double turbidity, const double albedo[3], double sun);
+/* Computes the sky. turbidity: 1 (clear) to 10 (haze); albedo: of the ground for X, Y and Z, 0 to 1; sun_angle: from
+ * the zenith, 0 to pi/2. */
+struct daylight daylight_make(double turbidity, const double albedo[3], double sun_angle);
 /* Computes the radiance of the sky at `angle` from the zenith and `gamma` from the sun, which is never negative, and 0
  * below the horizon. */
 void daylight_sky_radiance(const struct daylight *d, double angle, double gamma, double rgb[3]);
 /* Computes the radiance of the sun's disk, seen through an atmosphere that scatters (Rayleigh, aerosols) and absorbs
- * (ozone, water vapour); sun: its angle from the zenith. */
-void daylight_sun_radiance(double turbidity, double sun, double rgb[3]);
+ * (ozone, water vapour); sun_angle: from the zenith. */
+void daylight_sun_radiance(double turbidity, double sun_angle, double rgb[3]);
 
 /* A place and a time. */
 struct daylight_time {
 	double latitude, longitude; /* degrees; north and east are positive */
-	double utc_offset, hour; /* hours: of the zone from UT, positive eastwards; of the day, by the zone's clock */
+	double utc_offset, hour;    /* hours; utc_offset: of the zone, positive eastwards; hour: by the zone's clock */
 	int year, month, day;
 };
 /* Returns the unit direction to the sun, x east, y up, z south: Blanco-Muriel et al. 2001, "Computing the Solar
  * Vector", as in both Mitsuba dialects. Accurate to an arcminute until 2050. */
 vec3 daylight_sun_direction(const struct daylight_time *t);
 /* Returns the number of days from one date to the other. A day beyond the end of its month lies in the next month. */
-int daylight_days_between(const struct daylight_time *from, const struct daylight_time *to);
+int daylight_days_between(const struct daylight_time *first, const struct daylight_time *last);
 
 #endif

@@ -5,7 +5,7 @@
  *
  * They are never seen directly, so their own brightness is no bound for that of pixels. A white diffuse surface lit by
  * a point light at 1/57 of the scene's radius, or a highlight of roughness 0.01, is about a thousand times as bright as
- * the intensity at a distance of one world unit. `brightest` is therefore DELTA_HEADROOM times the latter. It
+ * the intensity at a distance of one world unit. `brightness_bound` is therefore DELTA_HEADROOM times the latter. It
  * determines the grid for the sums of an image whose bootstrap was black: if it is too small, the job fails; if it is
  * too large, bits below 2^-30 times its value are lost.
  */
@@ -27,7 +27,7 @@ struct delta_light {
  */
 int delta_create(struct emitter *em, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e);
-/* Like delta_create(), but without the colour: the caller sets shape, brightest and power. */
+/* Like delta_create(), but without the colour: the caller sets color_kind, brightness_bound and power. */
 int delta_init(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
 /* Computes unit axes of to_world: +z is kept, +y is made perpendicular to it, and a mirrored transform stays mirrored.
  * Returns false if to_world is singular. */

@@ -38,7 +38,7 @@ struct directional_area {
 	vec3 origin, n;	     /* a point of the plane, and its unit normal */
 	double plane_offset; /* largest distance of a corner from the plane */
 	vec3 local_axes[3];  /* of a mesh that moves, in its own coordinates: a frame around n, right-handed when the
-			shutter  opens */
+			shutter opens */
 };
 
 /* Sets is_plane if all triangles lie in one plane, perpendicular to the sum of their normals, and face the same

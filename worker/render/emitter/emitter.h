@@ -34,7 +34,7 @@ struct emitter_surface {
 	const double (*unrounded)[3]; /* replaces `position` unless NULL; see worker/render/geom/primitive.h */
 	const uint32_t (*index)[3];
 	const float (*uv)[2];	     /* NULL: none */
-	const struct motion *motion; /* to the rescaled world, of a sphere from `world_center`; NULL: no motion */
+	const struct motion *motion; /* to the rescaled world, of a sphere from `center`; NULL: no motion */
 };
 
 struct emitter_build {
@@ -43,7 +43,7 @@ struct emitter_build {
 	bool dialect_3;
 	const struct emitter_surface *surface; /* NULL: the emitter has no shape */
 	struct attribute_table *attributes;    /* of the mesh; NULL: none */
-	vec3 world_center;		       /* a scene point p is at scale (p - center) in the rescaled world */
+	vec3 world_center; /* a scene point p is at world_scale (p - world_center) in the rescaled world */
 	double world_scale;
 	const struct volume_build *volumes; /* NULL: none */
 	double shutter_open, shutter_close; /* of the camera */
@@ -87,7 +87,7 @@ struct emitter {
 	bool is_beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin
 		       * alike
 		       */
-	uint64_t negative_pixel_count; /* number of pixels of its image with a negative value, which counts as 0 */
+	uint64_t negative_pixel_count; /* of its image; negative values count as 0 */
 	enum color_kind color_kind;    /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
@@ -105,9 +105,8 @@ struct emitter_storage {
 	_Alignas(16) unsigned char data[EMITTER_DATA_MAX];
 };
 
-/* Sets storage->em to the moving emitter em at the given time. emitter_at returns it, or em itself if em does not move.
- */
-void emitter_move(const struct emitter *em, double time, struct emitter_storage *room) __attribute__((cold));
+/* Sets storage->em to the moving emitter em at the given time. emitter_at returns it, or em if em does not move. */
+void emitter_move(const struct emitter *em, double time, struct emitter_storage *storage) __attribute__((cold));
 static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_storage *storage)
 {
 	if (!em->motion)

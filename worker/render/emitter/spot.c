@@ -12,10 +12,10 @@ struct spot {
 	struct delta_light light;
 	struct frame axes;
 	double cutoff, beam_width; /* radians */
-	double cap_height;	   /* height of the cone's spherical cap: 1 - cos(cutoff) */
+	double cap_height;	   /* of the cone: 1 - cos(cutoff) */
 	bool has_texture;
 	struct texture texture;
-	vec3 texture_axes[3]; /* unit axes of the texture */
+	vec3 texture_axes[3]; /* unit vectors */
 	double cutoff_slope;  /* tan(cutoff) */
 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight (daylight.h) as an environment map: `sky`, `sun_angle`, `sunsky`. A sky without a sun has 512 x 256 pixels,
+ * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky without a sun has 512 x 256 pixels,
  * one with a sun 2048 x 1024: the sun's disk is three pixels wide, and its total power is preserved. The map is black
  * below the horizon, unless `stretch` or `extend` of 0.6 is given. Up is +y in 0.5/0.6 and +z in 3.x. If the sun is
  * given by time and place, south is +z and west -x in 0.5/0.6; in 3.x, south is +x and west +y, as in Mitsuba, which
@@ -21,9 +21,9 @@
 struct sky_bake {
 	struct daylight sky;
 	struct image image;
-	vec3 sun_direction;  /* direction of the sun in the axes of the map */
-	vec3 disk_direction; /* direction in which the sun is seen: `stretch` moves it down with the sky */
-	double disk_radius;  /* angular radius of the disk */
+	vec3 sun_direction;  /* in the axes of the map */
+	vec3 disk_direction; /* where the sun is seen: `stretch` moves it down with the sky */
+	double disk_radius;  /* angular */
 };
 
 static vec3 pixel_direction(const struct image *m, double column, double row)
@@ -189,7 +189,7 @@ static vec3 stretch_from_zenith(vec3 d, double factor)
 }
 
 /* Returns the scale of the sky or of the sun. In 0.6, `scale` is the default of sunsky's `sunScale` and `skyScale`, and
- * the only scale of `sky` and `sun_angle`. In 3.x, which has no `scale`, it multiplies both. */
+ * the only scale of `sky` and `sun`. In 3.x, which has no `scale`, it multiplies both. */
 static double read_scale(const struct scene_node *n, const char *name, bool dialect_3)
 {
 	double both = node_float(n, "scale", 1);

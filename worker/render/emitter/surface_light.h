@@ -23,13 +23,14 @@ struct surface_light {
 	bool has_computed_corners; /* corners are not simply surface.position: `is_moving_mesh`, or surface.unrounded */
 };
 
-/* Reads `radiance` and sets all members of `em` except its power; brightest becomes the largest radiance.
+/* Reads `radiance` and sets all members of `em` except its power; brightness_bound becomes the largest radiance.
  * build->surface must not be NULL. Returns 0, -EINVAL with a sentence if the surface has no area, or another negative
  * error code. */
 int surface_light_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 			 struct error *e);
 
-/* Operations of struct emitter_ops. A plug-in with further data that depends on the position has its own `place`. */
+/* Operations of struct emitter_ops. A plug-in with further data that depends on the position has its own
+ * `set_transform`. */
 void surface_light_set_transform(struct emitter *em, const mat4 *to_world);
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf);
 double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x);

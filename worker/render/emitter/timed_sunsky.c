@@ -38,11 +38,11 @@ static double fraction(double x)
 
 struct sun_period {
 	struct daylight_time start; /* hour: beginning of the window */
-	double window_hours;	    /* length of the window */
+	double window_hours;
 	int day_count;
 	double shutter_begin, shutter_end; /* the part of the emitter's time, from 0 to 1, during which the camera's
 					      shutter is open */
-	int sky_samples, sun_samples;	   /* numbers of samples */
+	int sky_samples, sun_samples;
 	double turbidity, albedo[3], sun_radius, sky_scale, sun_scale;
 	struct envmap_axes axes;
 	struct image image;
@@ -63,7 +63,7 @@ static bool sun_direction_at(const struct sun_period *t, double share, vec3 *sun
 	return *angle <= 0.5 * M_PI;
 }
 
-/* ---- the map: rows from up (+y) down, columns shutter_begin -z on over +x ---- */
+/* ---- the map: rows from up (+y) down, columns from -z on over +x ---- */
 
 static vec3 map_direction(double column, double row)
 {
