@@ -19,8 +19,8 @@ struct film_sums {
 	double panorama_size[2];
 	enum filter_kind filter;
 	double filter_radius;
-	double gaussian_exponent, gaussian_floor,
-		kernel_scale;	 /* Gaussian: scale (exp(-inverse d^2) - floor); Lanczos: `kernel_scale` alone */
+	/* Gaussian: kernel_scale (exp(-gaussian_exponent d^2) - gaussian_floor); Lanczos: kernel_scale alone. */
+	double gaussian_exponent, gaussian_floor, kernel_scale;
 	double cubic_b, cubic_c; /* of the cubic filters; the others do not use them */
 	double *xyz;
 	uint8_t *touched_tiles; /* one per tile */
