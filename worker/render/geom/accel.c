@@ -32,7 +32,7 @@ struct accel {
 	struct instances instances;
 	atomic_size_t bytes, peak_bytes;
 	vec3 low, high;
-	double side_sum;    /* sum of the sides of the bounding box */
+	double side_sum;    /* of the bounding box */
 	double float_error; /* error bound of Embree's floats, see float_error_in_box */
 	/* The same bound before the size of the scene is known: ray_error + ray_error_slope |p| at p. */
 	double ray_error, ray_error_slope;
@@ -133,7 +133,7 @@ static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t 
 	return attach_user_geometry(a, id, s->curves->count, &a->curves[id], &user_curve_ops);
 }
 
-/* Attaches the shape's triangles with an extent of at least `least`, as a user geometry whose ID
+/* Attaches the shape's triangles with an extent of at least `min_extent`, as a user geometry whose ID
  * follows those of the shapes. */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double min_extent)
 {

@@ -32,7 +32,7 @@ struct coincidence; /* coincide.h */
 
 /* Builds the acceleration structure. c: the result of coincide_find for the shapes; NULL if nothing coincides. It must
  * outlive the accel, and so must the shapes' arrays. Returns -ENOMEM, -ENOTSUP or -EIO if it cannot be built. */
-int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,
+int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,
 	      struct error *e);
 void accel_free(struct accel *a);
 size_t accel_bytes(const struct accel *a);	/* bytes allocated by Embree, not counting our vertices and indices */

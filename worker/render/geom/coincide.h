@@ -76,8 +76,9 @@ static inline bool coincide_directions_differ(const struct coincide_facing *a, c
 	return vec3_dot(cross_product, cross_product) * altitude * altitude > shift * shift;
 }
 
-/* Whether triangle a overlaps b in its plane by more than touching neighbours do because of rounding. off: the error of
- * their vertices in addition to the rounding of coordinates to float (struct placement). *wholly: b covers all of a. */
+/* Whether triangle a overlaps b in its plane by more than touching neighbours do because of rounding. vertex_error:
+ * that of their vertices in addition to the rounding of coordinates to float (struct placement). *covers_all: b covers
+ * all of a. */
 bool coincide_triangles(const struct triangle *a, const struct triangle *b, double vertex_error, bool *covers_all);
 
 /* Whether two spheres are equal within the rounding of floats. */

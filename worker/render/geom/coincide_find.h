@@ -5,8 +5,8 @@
 
 #include "worker/render/geom/coincide.h"
 
-/* Sets *c, or *c = NULL if nothing coincides. The arrays of the shapes are read here and later in
+/* Sets *out, or *out = NULL if nothing coincides. The arrays of the shapes are read here and later in
  * coincide_present_prim. Returns -ENOMEM if out of memory. */
-int coincide_find(struct coincidence **c, const struct accel_shape *shapes, uint32_t count, struct error *e);
+int coincide_find(struct coincidence **out, const struct accel_shape *shapes, uint32_t count, struct error *e);
 
 #endif

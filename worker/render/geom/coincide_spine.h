@@ -13,7 +13,7 @@
 #include "worker/render/geom/triangle.h"
 
 struct spine {
-	vec3 start, span; /* the segment is from + t along, for t in [0,1] */
+	vec3 start, span; /* the segment is start + t span, for t in [0,1] */
 	/* The whole mesh is within this distance of the segment, including a margin for rounded coordinates. */
 	double radius;
 	double low[3], high[3];
@@ -41,7 +41,7 @@ void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, 
 /* Whether these parts of two meshes may have a point in common. */
 bool spines_may_meet(const struct spine *a, struct spine_part part, const struct spine *b, struct spine_part other);
 
-/* For a triangle of `from` with unit normal n: returns the largest |n . s->direction| at which the triangle may be
+/* For a triangle of `other` with unit normal n: returns the largest |n . s->direction| at which the triangle may be
  * parallel to a triangle of s. If it is larger, coincide_triangles is false for all triangles of s. At most 2. */
 double spine_max_parallel_lean(const struct spine *s, const struct spine *other);
 

@@ -232,7 +232,7 @@ bool curves_intersect(const struct curves *c, uint32_t prim, const struct curve_
 
 /* ---- points ---- */
 
-/* Computes Mitsuba's directions perpendicular to the axis: u is counted from `start_prim` towards `end_prim`. */
+/* Computes Mitsuba's directions perpendicular to the axis: u is counted from `from` towards `to`. */
 static void axis_directions(vec3 axis, vec3 *from, vec3 *to)
 {
 	vec3 up = {-axis.z * axis.x, -axis.z * axis.y, 1 - axis.z * axis.z};
@@ -241,7 +241,7 @@ static void axis_directions(vec3 axis, vec3 *from, vec3 *to)
 	*from = vec3_cross(*to, axis);
 }
 
-/* Rotates a direction by the smallest rotation that turns the axis `start_prim` into `end_prim`. */
+/* Rotates a direction by the smallest rotation that turns the axis `from` into `to`. */
 static vec3 transport_direction(vec3 direction, vec3 from, vec3 to)
 {
 	double sum = 1 + vec3_dot(from, to);

@@ -31,8 +31,8 @@ struct curves {
 	float *v; /* texture coordinate v of each point */
 	/* Unit tangent of each point, for shading normals; NULL: those of the cones are used. */
 	float (*tangent)[3];
-	float max_radius; /* largest radius */
-	bool is_open;	  /* chains have no spheres at their ends */
+	float max_radius;
+	bool is_open; /* chains have no spheres at their ends */
 };
 
 /* Sets `u_start`: at the beginning of a chain u starts at Mitsuba's direction, which is then carried along
@@ -84,10 +84,10 @@ struct curve_point {
 	struct cone cone;
 	enum cone_part part;
 	vec3 p, n; /* n: unit normal, outwards */
-	/* Unit vectors: e away from the axis, side around it, up along the surface, perpendicular to n and side. */
+	/* Unit vectors: radial from the axis, side around it, up along the surface, perpendicular to n and side. */
 	vec3 radial, side, up;
-	double axis_distance; /* distance from the axis */
-	double side_position; /* position along the side, from 0 to 1 */
+	double axis_distance;
+	double side_position; /* from 0 to 1 */
 	double u, v;
 };
 

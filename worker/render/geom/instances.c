@@ -142,7 +142,7 @@ static vec3 end_normal(const struct placement *m, const struct ray_end *end)
 	return length > 0 ? vec3_scale(1 / length, n) : n;
 }
 
-/* Lifts p off a surface with normal n, to the side into which d leaves; *longer: the extra length by
+/* Lifts p off a surface with normal n, to the side into which d leaves; *extension: the extra length by
  * query_grazing_factor. */
 static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double distance, double *extension)
 {

@@ -38,8 +38,8 @@ struct instances {
 int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count);
 void instances_fini(struct instances *s);
 
-/* Callbacks whose user data is a struct instances. It must outlive the geometry, and off and ray_error_slope must be
- * set when the geometry is committed. */
+/* Callbacks whose user data is a struct instances. It must outlive the geometry, and ray_error and ray_error_slope must
+ * be set when the geometry is committed. */
 extern const struct embree_ops instances_ops;
 
 #endif

@@ -392,7 +392,7 @@ static void sphere_derivatives(const struct geom_shape *s, const struct surface_
 	c->dn[0] = vec3_scale(s->normal_sign * curvature, c->du);
 	c->dn[1] = vec3_scale(s->normal_sign * curvature, c->dv);
 	/* du is the normalised axis x w. Per unit length along the circle of latitude, it turns by `curvature` towards
-	 * the centre and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
+	 * the centre and by curvature cot(theta) towards the pole; along the meridian it is transported in parallel. */
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
 	vec3 turn = vec3_scale(-curvature, w);

@@ -2,9 +2,9 @@
 /*
  * Surface points on curves and their derivatives.
  *
- * All derivatives follow from how a point of a cone moves: moving by `around` along `side` turns e by around / x;
- * moving by `up` along the surface moves the centre of the point's sphere by up / (length cos) of the axis on the
- * cone's side, and turns the normal on a sphere.
+ * All derivatives follow from how a point of a cone moves: moving by `around` along `side` turns `radial` by around /
+ * axis_distance; moving by `up` along the surface moves the centre of the point's sphere by up / (length cos) of the
+ * axis on the cone's side, and turns the normal on a sphere.
  *
  * Nothing fails: where the frame has no derivative, at the poles of spheres and at tips, the derivative is 0.
  */
@@ -159,7 +159,7 @@ bool curve_nearest_point(const struct geom_shape *s, struct prim_ref prim, vec3 
 
 /* Derivatives as the point moves by a unit length along a tangent. */
 struct point_derivatives {
-	/* turn: of e around the axis, in radians; s: along the axis, in units of the cone's length. */
+	/* turn: of curve_point.radial around the axis, in radians; s: along the axis, in units of the cone's length. */
 	double turn, s;
 	vec3 dn, dside;
 };
@@ -181,7 +181,7 @@ static struct point_derivatives derivatives_along(const struct curve_point *p, v
 	return m;
 }
 
-/* Returns the derivative of bent(w) if w changes by dw. */
+/* Returns the derivative of bend_vector() if w changes by dw. */
 static vec3 bend_vector_derivative(const struct curve_point *p, const struct bend *b, const struct point_derivatives *m,
 				   vec3 w, vec3 dw)
 {
@@ -196,8 +196,8 @@ static vec3 unit_vector_derivative(vec3 w, vec3 dw)
 	return vec3_scale(1 / length, vec3_madd(dw, -vec3_dot(unit, dw), unit));
 }
 
-/* Returns how dp/du and dp/dv change on the side: e turns, x shrinks by sin as the point moves
- * up, and `up` turns with e. */
+/* Returns how dp/du and dp/dv change on the side: `radial` turns, axis_distance shrinks by sin as the point
+ * moves up, and `up` turns with `radial`. */
 static struct relief_derivatives make_relief_derivatives(const struct geom_shape *s, const struct surface_point *x,
 							 const struct curve_point *p, const struct point_derivatives *m,
 							 double up)

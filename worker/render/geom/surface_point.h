@@ -55,7 +55,7 @@ struct surface_point {
 struct surface_derivatives {
 	vec3 du, dv; /* orthonormal, in the plane perpendicular to ng: frame_along(ng, axis) */
 	vec3 dn[2];  /* derivatives of the shading normal; 0 on flat-shaded triangles */
-	vec3 axis;   /* the unit axis */
+	vec3 axis;   /* unit vector */
 	/* Derivatives of the unit axis: 0 on a triangle without tangents; on a sphere and around a curve it turns with
 	 * the meridians (except at their poles). */
 	vec3 daxis[2];

@@ -18,7 +18,7 @@ struct query {
 	bool is_segment;
 	double t_min;
 	double float_error; /* error bound of Embree's floats along this ray */
-	/* Times reach: the length of the ray within reach of the surface at its start, and at its end
+	/* Times float_error: the length of the ray within reach of the surface at its start, and at its end
 	 * (query_grazing_factor). */
 	double start_grazing, end_grazing;
 	double lead;	    /* distance by which Embree's ray starts earlier than this part of the ray, in units of d */
@@ -74,7 +74,7 @@ static inline bool query_is_end(const struct query *q, struct prim_ref p)
 	       (p.shape == q->end_prim.shape && p.prim == q->end_prim.prim);
 }
 
-/* Returns the triangle that is present where the ray crosses the plane of `prims`: `prims` itself, or the one
+/* Returns the triangle that is present where the ray crosses the plane of `prim`: `prim` itself, or the one
  * that hides it (coincide.h). */
 struct prim_ref query_present_prim(const struct query *q, struct prim_ref prim);
 /* Whether some primitive of this shape is hidden by another one. */
