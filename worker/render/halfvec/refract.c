@@ -27,7 +27,7 @@ static bool leaves_denser_medium(const struct path_vertex *v, vec3 d)
 	return (vec3_dot(d, v->x.ng) > 0) == (v->bsdf->eta > 1);
 }
 
-/* Sets *d to the direction from `light` to y and returns the distance. */
+/* Sets *d to the direction from `from` to y and returns the distance. */
 static double distance_to(const struct path_vertex *from, const struct path_vertex *y, vec3 *d)
 {
 	double distance2;
@@ -37,8 +37,8 @@ static double distance_to(const struct path_vertex *from, const struct path_vert
 
 /* Makes an initial guess of the vertices between z and y, ordered from z: surfaces on a line from z along d, at most
  * `max_distance` away, and behind the first of them on the straight line to y. from_denser: z is in the denser medium,
- * so the first surface must lead out of it. Returns false if the line meets nothing or a surface that does not refract.
- */
+ * so the first surface must lead out of it. Returns false if the line meets nothing, or a surface that does not
+ * refract. */
 static bool guess_vertices(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
 			   double max_distance, bool from_denser, struct path_refraction *out)
 {

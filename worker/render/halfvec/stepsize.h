@@ -17,7 +17,7 @@
 #include "worker/render/halfvec/constraint.h"
 
 struct halfvec_step {
-	mat2 rotation;	 /* a rotation */
+	mat2 rotation;
 	double sigma[2]; /* finite and above 0 */
 };
 

@@ -21,7 +21,7 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
 
-/* The state of a walk. Trials start from the kept state, so a rejected trial leaves nothing to undo. */
+/* The state of a walk. Trials start from the accepted state, so a rejected trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
 	struct full_path *y; /* the path of the trial */
@@ -35,7 +35,7 @@ struct walk {
 	uint64_t above_bits;
 	/* Bit e: a ray of this trial has hit the next vertex along edge e. */
 	uint64_t hit_edges;
-	vec3 newton_step[FULL_PATH_VERTICES_MAX]; /* a full Newton step from the kept state */
+	vec3 newton_step[FULL_PATH_VERTICES_MAX]; /* full, from the accepted state */
 };
 
 static uint64_t vertex_bit(unsigned i)
@@ -125,7 +125,7 @@ static enum walk_result try_step(struct walk *m, double step)
 	}
 }
 
-/* How near the half vectors s->k[].h are to the targets. */
+/* How near the half vectors scratch->k[].h are to the targets. */
 struct residual_summary {
 	double error;	     /* the largest residual, for step control */
 	bool within_forward; /* all are within the tolerances of a forward walk */
@@ -149,7 +149,8 @@ static struct residual_summary compute_residuals(struct walk *m)
 	return n;
 }
 
-/* Makes the trial the kept state and computes Newton's step from there. factored: s->system already belongs to s->k. */
+/* Makes the trial the accepted state and computes Newton's step from there. factored: s->system already belongs to
+ * s->k. */
 static enum walk_result accept_trial(struct walk *m, bool factored)
 {
 	struct walk_scratch *s = m->scratch;
