@@ -26,7 +26,7 @@ struct animation {
 struct motion_key {
 	double time;
 	double rotation[4];   /* R, a unit quaternion: w, x, y, z */
-	double half_angle;    /* half the angle of the rotation to the next key, in [0, pi/2] */
+	double half_angle;    /* of the rotation to the next key, in [0, pi/2] */
 	double stretch[3][3]; /* S */
 	vec3 translation;
 };
@@ -38,8 +38,8 @@ struct motion {
 };
 
 /* Makes the motion from `open` to `close` from the keyframes that matter in this interval (if both are equal, those
- * around that time). The keys are written to `room`, which needs space for all. Returns false if nothing moves. */
-bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room);
+ * around that time). The keys are written to `keys`, which needs space for all. Returns false if nothing moves. */
+bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *keys);
 /* Subtracts `center` from all positions, then multiplies lengths by `scale`. */
 void motion_rescale(struct motion *m, vec3 center, double scale);
 

@@ -26,8 +26,8 @@ void point_tree_partition(struct point_tree_node *nodes, size_t count, size_t mi
 /* Builds the tree by reordering nodes[0..count), whose memory remains the caller's; at most 2^32
  * nodes with finite positions. */
 void point_tree_build(struct point_tree *t);
-/* Calls `found` for each node at most `radius` away from `at`. */
-void point_tree_visit_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
-			     void *user);
+/* Calls `visit` for each node at most `radius` away from `center`. */
+void point_tree_visit_within(const struct point_tree *t, vec3 center, double radius,
+			     void (*visit)(void *user, uint32_t id), void *user);
 
 #endif

@@ -35,8 +35,8 @@ struct relief {
  * surface's, in the coordinates of the point's present frame. r: NULL for no relief.
  */
 struct relief_frames {
-	const void *context;						      /* argument of `get_frame` */
-	struct frame (*get_frame)(const void *point, const struct relief *r); /* NULL: the point is on no surface */
+	const void *context;							/* argument of `get_frame` */
+	struct frame (*get_frame)(const void *context, const struct relief *r); /* NULL: the point is on no surface */
 };
 
 #endif

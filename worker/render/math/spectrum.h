@@ -11,8 +11,8 @@
  * (D65) is then 0.07, 0.03, 0.02; with uniform wavelengths it is 0.61, 0.17, 0.67. Multiplying the density by D65
  * would give 0.10, 0.03, 0.04.
  *
- * In a grey scene (struct wavelengths.grey) all lanes are equal and multiply the emitters' common spectrum. Where
- * colours are rgb (struct wavelengths.rgb) the lanes are R, G and B of linear Rec. 709 and G once more, so that the
+ * In a grey scene (struct wavelengths.is_grey) all lanes are equal and multiply the emitters' common spectrum. Where
+ * colours are rgb (struct wavelengths.is_rgb) the lanes are R, G and B of linear Rec. 709 and G once more, so that the
  * mean over the lanes is close to a luminance; the fourth lane is not part of any colour.
  */
 #ifndef WORKER_RENDER_MATH_SPECTRUM_H
