@@ -15,9 +15,9 @@ enum { FLAKES_NUMBERS = 6 };
 #define FLAKES_EIGENVALUE_MIN 1e-6
 
 struct flakes {
-	double constant[FLAKES_NUMBERS]; /* the matrix at all places, unless uneven */
+	double constant[FLAKES_NUMBERS]; /* the matrix at all places, unless has_grid */
 	bool has_grid;
-	struct grid grid[2]; /* if uneven, two grids of three channels: see struct grid.area */
+	struct grid grid[2]; /* if has_grid, two grids of three channels: see struct grid.area_matrix */
 };
 
 /* Reads the property `S` of node n. A matrix of 0 at a point of a grid means that there are no flakes. Returns 0 or a
@@ -26,6 +26,6 @@ struct flakes {
 int flakes_create(struct flakes *f, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 /* Computes the matrix at a point of the world. */
-void flakes_eval(const struct flakes *f, vec3 at, double s[FLAKES_NUMBERS]);
+void flakes_eval(const struct flakes *f, vec3 position, double s[FLAKES_NUMBERS]);
 
 #endif

@@ -190,8 +190,8 @@ static spectrum eval_coefficients(const struct medium *m, spectrum first, spectr
 	return sigma_s;
 }
 
-/* Returns sigma_t. If `has_second` varies, the medium absorbs and scatters, and sigma_t does not depend on
- * `has_second`. */
+/* Returns sigma_t. If `second` varies, the medium absorbs and scatters, and sigma_t does not depend on
+ * `second`. */
 static spectrum eval_extinction(const struct medium *m, spectrum first, const struct wavelengths *w)
 {
 	spectrum sigma_t;

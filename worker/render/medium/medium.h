@@ -55,9 +55,9 @@ struct medium_lanes {
 struct medium_lanes medium_lanes_along(const struct medium *m, vec3 d, const struct wavelengths *w);
 /* Returns the optical depth of a segment of a ray along d or -d. */
 spectrum medium_optical_depth(const struct medium_lanes *m, const struct grid_ray *r);
-/* Returns the t at which the optical depth at one wavelength, `lane`, reaches `least`, and the depth up to t at all
- * wavelengths. If it does not reach `least` before t1, returns INFINITY and the depth of the whole segment. */
-double medium_invert_depth(const struct medium_lanes *m, const struct grid_ray *r, int lane, double least,
+/* Returns the t at which the optical depth at one wavelength, `lane`, reaches `target`, and the depth up to t at all
+ * wavelengths. If it does not reach `target` before t1, returns INFINITY and the depth of the whole segment. */
+double medium_invert_depth(const struct medium_lanes *m, const struct grid_ray *r, int lane, double target,
 			   spectrum *depth);
 
 #endif

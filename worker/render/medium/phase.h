@@ -20,22 +20,22 @@ struct phase_ops {
 	int (*create)(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e);
 	/* Returns the value (1/sr) at the point `position`; its integral over the sphere is 1. cosine: of the angle
 	 * between the directions before and after scattering, 1 if light goes straight on. */
-	double (*eval)(const struct phase *p, vec3 at, double cosine);
+	double (*eval)(const struct phase *p, vec3 position, double cosine);
 	/* Samples a cosine for u in [0,1); its density is exactly 2 pi times that value. */
-	double (*sample)(const struct phase *p, vec3 at, double u);
+	double (*sample)(const struct phase *p, vec3 position, double u);
 	/* For microflakes instead of eval and sample, otherwise NULL. eval_flakes returns the density (1/sr) of wi for
 	 * light that comes from or goes to wo, sample_flakes samples a direction with this density, and area returns
 	 * the area of the flakes seen along w, which is the same along -w. */
-	double (*eval_flakes)(const struct phase *p, vec3 at, vec3 wo, vec3 wi);
-	vec3 (*sample_flakes)(const struct phase *p, vec3 at, vec3 wo, const double u[2]);
-	double (*area)(const struct phase *p, vec3 at, vec3 w);
+	double (*eval_flakes)(const struct phase *p, vec3 position, vec3 wo, vec3 wi);
+	vec3 (*sample_flakes)(const struct phase *p, vec3 position, vec3 wo, const double u[2]);
+	double (*area)(const struct phase *p, vec3 position, vec3 w);
 };
 
 struct phase {
 	const struct phase_ops *ops;
 	double g;		     /* mean cosine of hg */
 	double absorbed_share;	     /* share of scattered light that is absorbed instead; eval does not include it */
-	const void *data;	     /* data of the plug-in */
+	const void *data;	     /* of the plug-in */
 	const struct flakes *flakes; /* microflakes (flakes.h); otherwise NULL */
 };
 
@@ -46,8 +46,8 @@ int phase_create(struct phase *p, const struct scene_node *n, const struct volum
 
 /* Evaluate and sample the phase function at the point `position`. wo and wi are unit vectors that both point away from
  * it. *pdf: density of wi (solid angle), which is the value of the function. */
-double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi);
-vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf);
+double phase_eval(const struct phase *p, vec3 position, vec3 wo, vec3 wi);
+vec3 phase_sample(const struct phase *p, vec3 position, vec3 wo, const double u[2], double *pdf);
 
 /* Returns the factor of the extinction along w. */
 static inline double phase_area(const struct phase *p, vec3 position, vec3 w)

@@ -24,7 +24,7 @@ struct phase_parts {
 int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct scene_node *n,
 		       const struct volume_build *build, struct error *e);
 
-double phase_parts_eval(const struct phase *p, vec3 at, double cosine);
-double phase_parts_sample(const struct phase *p, vec3 at, double u);
+double phase_parts_eval(const struct phase *p, vec3 position, double cosine);
+double phase_parts_sample(const struct phase *p, vec3 position, double u);
 
 #endif
