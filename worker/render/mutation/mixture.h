@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The mixture of strategies that a chain uses: "independent_index=0.1,hslt=0.9", as in a plan. Tests can force
+ * The mixture of strategies that a chain uses: "independent=0.1,hslt=0.9", as in a plan. Tests can force
  * choices: "hslt@b3c1". Pure.
  */
 #ifndef WORKER_RENDER_MUTATION_MIXTURE_H
@@ -15,7 +15,7 @@ struct mixture_entry {
 };
 
 struct mixture {
-	unsigned count, independent_index; /* independent_index: index of the entry that makes independent proposals */
+	unsigned count, independent_index; /* independent_index: of the entry that makes independent proposals */
 	double total_weight;
 	struct mixture_entry entries[BATCH_STRATEGIES];
 };

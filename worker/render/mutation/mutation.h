@@ -43,7 +43,7 @@ struct move {
 
 struct mutation_scratch {
 	struct walk_scratch walk;
-	struct constraint constraints[FULL_PATH_VERTICES_MAX]; /* constraints of x */
+	struct constraint constraints[FULL_PATH_VERTICES_MAX]; /* of x */
 	struct halfvec_step step[2][FULL_PATH_VERTICES_MAX];   /* steps at x, at y */
 	struct walk_target target[FULL_PATH_VERTICES_MAX];
 	double weight[FULL_PATH_VERTICES_MAX];
@@ -87,7 +87,7 @@ struct mutation_ops {
 	/* Proposes y. PROPOSAL_MADE: y is complete, and all its rays have been traced. Otherwise returns the reason,
 	 * and y's vertices first..last are undefined. */
 	enum proposal_result (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
-					const struct mutation_forced_choice *how, struct full_path *x,
+					const struct mutation_forced_choice *forced, struct full_path *x,
 					struct full_path *y, struct move *move);
 	/* Returns the logarithm of the weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
