@@ -28,7 +28,7 @@ struct path_classes {
 void path_classes_begin(struct path_classes *k, const struct path_context *c, unsigned camera, unsigned light,
 			struct path_sample *out);
 
-/* Returns the class of the path that path_connect made of s vertices of c->light_kind and t of c->camera_kind. passed:
+/* Returns the class of the path that path_connect made of s vertices of c->light and t of c->camera. passed:
  * the number of surfaces that their joint passes. */
 static inline unsigned path_classes_of_joint(const struct path_classes *k, unsigned s, unsigned t, unsigned passed)
 {

@@ -5,11 +5,11 @@
  * techniques, whose products stay near 1 where the densities themselves leave the range of doubles.
  *
  * Most connections between two surfaces contribute little once weighted, but cost a ray and a weight like any other.
- * Those that contribute less than path_context.faint are made with a probability q in proportion to their contribution,
- * and are then multiplied by 1/q. Systematic sampling decides which ones are made (Madow and Madow 1944): the intervals
- * of length q are laid end to end, starting at a random position in [0, 1), and the connections whose intervals contain
- * a whole number are made. So each has exactly its probability, from one random number for all, provided that no q
- * depends on which other connections were made.
+ * Those that contribute less than path_context.faint_threshold are made with a probability q in proportion to their
+ * contribution, and are then multiplied by 1/q. Systematic sampling decides which ones are made (Madow and Madow 1944):
+ * the intervals of length q are laid end to end, starting at a random position in [0, 1), and the connections whose
+ * intervals contain a whole number are made. So each has exactly its probability, from one random number for all,
+ * provided that no q depends on which other connections were made.
  *
  * A connection contributes nothing if it is blocked, has a delta lobe at an end, or is too faint for doubles to weight;
  * none of these is an error.
@@ -534,7 +534,7 @@ static bool project_on_film(const struct path_context *c, const struct path_vert
 	return true;
 }
 
-/* Joins the s vertices from `light_medium` on to the lens. l is the contribution without visibility and absorption. */
+/* Joins the s vertices from `light` on to the lens. l is the contribution without visibility and absorption. */
 static spectrum join_lens(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned max_s, vec3 d,
 			  spectrum l)
 {

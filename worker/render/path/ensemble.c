@@ -22,8 +22,8 @@
  * would hold most of the light. */
 enum { GUARANTEED_VERTICES = 5 };
 
-/* Draws a number of vertices from max(least, GUARANTEED_VERTICES) to `most`: n or more with probability
- * survival(n) / survival(least). */
+/* Draws a number of vertices from max(min, GUARANTEED_VERTICES) to `max`: n or more with probability
+ * survival_probability(n) / survival_probability(min). */
 static unsigned draw_vertex_count(double u, unsigned min, unsigned max)
 {
 	unsigned start = min > GUARANTEED_VERTICES ? min : GUARANTEED_VERTICES;

@@ -32,7 +32,7 @@ struct ensemble_lengths {
 	bool randomized;		/* the maxima were drawn at random; otherwise they are the depth limits */
 };
 
-/* Draws maximum lengths from two numbers in [0,1); they are at least `max_camera` and `max_light`. */
+/* Draws maximum lengths from two numbers in [0,1); they are at least `camera` and `light`. */
 struct ensemble_lengths ensemble_draw_lengths(const struct path_context *c, const double u[2], unsigned camera,
 					      unsigned light);
 struct ensemble_lengths ensemble_max_lengths(const struct path_context *c);
@@ -41,7 +41,7 @@ struct ensemble_lengths ensemble_max_lengths(const struct path_context *c);
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out);
 /* Draws a pair of sub-paths that has x among its candidates. u: three numbers in [0,1), for the
  * technique and the lengths. */
-void ensemble_draw_containing(struct path_context *c, struct sampler *s, struct full_path *x, const double u[3],
+void ensemble_draw_containing(struct path_context *c, struct sampler *sampler, struct full_path *x, const double u[3],
 			      struct ensemble *out);
 
 /* Builds the path of the candidate that u in [0,1) chooses. Must directly follow ensemble_draw or

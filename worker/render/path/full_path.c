@@ -183,7 +183,7 @@ static uint64_t range_mask(unsigned i, unsigned first, unsigned last)
 	return (~(uint64_t)0 >> (last < end ? end - last : 0)) & (~(uint64_t)0 << (first > begin ? first - begin : 0));
 }
 
-/* Copies the entries first..last from `begin` to `end`. */
+/* Copies the entries first..last from `from` to `to`. */
 static void copy_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
 {
 	for (unsigned i = first / 64; i <= last / 64; i++) {
@@ -273,8 +273,8 @@ bool full_path_project(const struct path_context *c, struct full_path *x)
 	return film_window_contains(&c->window, x->film);
 }
 
-/* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `delta` only if `left`: the path leaves the
- * vertex in the way its sub-path did. */
+/* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `delta` only if `keeps_mode`: the path leaves
+ * the vertex in the way its sub-path did. */
 static void copy_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool keeps_mode)
 {
 	x->v[i] = *from;

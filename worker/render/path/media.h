@@ -62,8 +62,8 @@ struct path_emission {
 	spectrum sum;
 };
 /* Like path_extend(), but ends at the next event in a medium, chosen by u in [0,1), or at the first hit that is not a
- * `null` face. Sets *left to the transmittance of the edge. If emission is not NULL, the light emitted along the way is
- * added to its sum, whatever the ray meets. */
+ * `null` face. Sets *transmittance to that of the edge. If emission is not NULL, the light emitted along
+ * the way is added to its sum, whatever the ray meets. */
 bool path_extend_in_media(struct path_context *c, const struct path_vertex *vertex, vec3 d, double t_min, double t_max,
 			  double u, struct path_emission *emission, struct path_vertex *to, spectrum *transmittance);
 /* Like path_extend_in_media(), but without events and emission. */
@@ -72,7 +72,7 @@ bool path_extend_without_events(struct path_context *c, const struct path_vertex
 /* Makes `to` an event at that distance from `from` along d. Its edge is not set. */
 void path_make_medium_vertex(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d);
 /* Whether z (an end of the camera's sub-path, not at infinity) and y see each other through faces of `null`. Fills in
- * the edge to y, whose `before` is the medium at z, and sets *left to its transmittance. Counts rays. */
+ * the edge to y, whose `before` is the medium at z, and sets *transmittance. Counts rays. */
 bool path_is_visible_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 			      struct path_edge *edge, spectrum *transmittance);
 
@@ -81,7 +81,7 @@ bool path_is_visible_in_media(struct path_context *c, const struct path_vertex *
  * event happens on the edge. */
 double path_edge_pdf(const struct path_context *c, const struct path_edge *edge, uint32_t medium,
 		     const struct path_vertex *to);
-/* Multiplies the density of `to` by path_edge_pdf of its edge, and its beta by left / path_edge_pdf. */
+/* Multiplies the density of `to` by path_edge_pdf of its edge, and its beta by transmittance / path_edge_pdf. */
 void path_apply_edge(const struct path_context *c, struct path_vertex *to, spectrum transmittance);
 
 /* Returns sigma_s times the phase function at a VERTEX_MEDIUM, in 1 / (length x solid angle). */

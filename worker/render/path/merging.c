@@ -81,7 +81,7 @@ static double intensity_of(struct path_context *c, spectrum l)
 	return sample.intensity;
 }
 
-/* Returns the factor that media on a sub-path's edge contribute to the density of `previous_medium`, the vertex where
+/* Returns the factor that media on a sub-path's edge contribute to the density of `before`, the vertex where
  * the edge begins, as generated from its end. */
 static double edge_pdf_rev(const struct path_context *c, const struct path_edge *e, const struct path_vertex *before)
 {

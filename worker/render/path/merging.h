@@ -2,7 +2,7 @@
 /*
  * Vertex merging (Georgiev et al. 2012, Hachisuka et al. 2012): light that path sampling rarely finds, such as sunlight
  * on the floor of a pool, is found at once where camera sub-paths meet nearby photons. An image made this way would be
- * blurred, so none is made. Merging only estimates how rarely `path` and `bdpt_contribution` would find that light, and
+ * blurred, so none is made. Merging only estimates how rarely `path` and `bdpt` would find that light, and
  * how bright it would then be. One thread; only merging_trace_photons allocates.
  */
 #ifndef WORKER_RENDER_PATH_MERGING_H
@@ -28,9 +28,9 @@ struct photon {
 		bool delta;
 	} prev;
 	/* Sums of the densities of techniques with fewer than s light vertices, divided by the density of technique s -
-	 * 1: `fewer_sum` sums all of them; `path` sums those with at most one light vertex, the only ones that the
+	 * 1: `fewer_sum` sums all of them; `path_sum` sums those with at most one light vertex, the only ones that the
 	 * integrator `path` has. Techniques whose joint passes all surfaces up to the photon (transparent.h) are summed
-	 * separately, in the members ..._through, divided by the density of technique s. */
+	 * separately, in the members ..._passing_sum, divided by the density of technique s. */
 	double fewer_sum, path_sum;
 	double fewer_passing_sum, path_passing_sum;
 };

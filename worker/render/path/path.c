@@ -120,8 +120,8 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	return next->kind == VERTEX_INFINITE ? solid : solid * path_jac_solid_from_vertex(next, omega, distance2);
 }
 
-/* Traces to the next vertex. u in [0,1) draws the distance where media scatter; *left is then set to the
- * transmittance. */
+/* Traces to the next vertex. u in [0,1) draws the distance where media scatter; *transmittance is then set to
+ * that of the edge. */
 static bool trace_next(struct path_context *c, const struct path_vertex *vertex, vec3 d, double t_min, double t_max,
 		       double u, struct path_vertex *to, spectrum *transmittance)
 {
@@ -220,7 +220,7 @@ static bool sample_departure(const struct path_context *c, const struct path_ver
 	return true;
 }
 
-/* Returns the density of `next` (per area, per solid angle at infinity), reached from `vertex` by a direction of
+/* Returns the density of `to` (per area, per solid angle at infinity), reached from `vertex` by a direction of
  * density `solid` per solid angle. For a delta lobe, `solid` is a probability and per_solid turns it into a density:
  * see path_delta_densities. Otherwise per_solid is 1. */
 static double vertex_pdf(const struct path_context *c, const struct path_vertex *vertex, const struct path_vertex *to,
@@ -253,8 +253,8 @@ static bool survives_roulette(const struct path_context *c, unsigned scatterings
 	return true;
 }
 
-/* Traces from vertex n - 1 of a sub-path to the next vertex, in a world with media. Sets *left to the transmittance of
- * the edge where media scatter, otherwise to 1. */
+/* Traces from vertex n - 1 of a sub-path to the next vertex, in a world with media. Sets *transmittance to
+ * that of the edge where media scatter, otherwise to 1. */
 static __attribute__((noinline)) bool trace_next_in_media(struct path_context *c, struct sampler *s,
 							  enum sampler_side side, unsigned n,
 							  const struct departure *out, double u,

@@ -16,7 +16,7 @@
 #include "worker/render/path/sampler.h"
 #include "worker/render/path/vertex.h"
 
-/* The usual value of path_context.roulette; below 1, so that paths between mirrors end, too. */
+/* The usual value of path_context.max_survival; below 1, so that paths between mirrors end, too. */
 #define PATH_SURVIVAL_MAX 0.95
 
 enum { PATH_SPLATS_MAX = PATH_EDGES_MAX + 2 };
@@ -35,7 +35,7 @@ struct path_sample {
 	uint32_t splat_count;
 	double intensity; /* I: the sum of X + Y + Z over all splats */
 	/* Bit n is set if path class n carries light; class_intensity is 0 for all other classes. Always 0
-	 * with path_context.unclassed. */
+	 * with path_context.skips_classes. */
 	uint32_t class_mask;
 	double class_intensity[PATH_CLASSES]; /* the part of the intensity in each class */
 	struct splat splats[PATH_SPLATS_MAX];
@@ -69,9 +69,9 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 		const struct path_vertex *next, enum transport transport);
 
 /* Returns the point of a surface vertex with the shading frame in which it scatters towards the camera. Where a relief
- * bends the normal away from the camera, this is the frame of the turned normal (relief.turns), stored in *turned;
- * otherwise such places would be black. Surfaces with specular lobes keep their frame, because their paths are found
- * with the normal, before the side is known. */
+ * bends the normal away from the camera, this is the frame of the turned normal (relief.flips_invalid_normals), stored
+ * in *turned; otherwise such places would be black. Surfaces with specular lobes keep their frame, because their paths
+ * are found with the normal, before the side is known. */
 const struct surface_point *path_bent_point_facing_camera(const struct path_vertex *v, vec3 to_camera,
 							  struct surface_point *turned);
 static inline const struct surface_point *path_point_facing_camera(const struct path_vertex *v, vec3 to_camera,

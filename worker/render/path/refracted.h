@@ -47,9 +47,9 @@ bool path_should_refract(const struct path_context *c, const struct path_vertex 
 			 const struct path_vertex *y, double pdf_toward, spectrum f);
 
 /* Joins z, a vertex of the camera's sub-path, to y by a refracted path. Fills in c->passed and c->log_transfer, the
- * logarithm of T. Sets *left to the product of the weights of the lobes and of the transmittance of absorbing media
- * between z and the last surface; the caller adds the edge from that surface to y. before: the vertex before z. Returns
- * false if there is no such path. Counts rays. */
+ * logarithm of T. Sets *transmittance to the product of the weights of the lobes and of the transmittance of absorbing
+ * media between z and the last surface; the caller adds the edge from that surface to y. before: the vertex before z.
+ * Returns false if there is no such path. Counts rays. */
 bool path_trace_refracted(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 			  const struct path_vertex *y, spectrum *transmittance);
 

@@ -15,11 +15,11 @@ enum { SAMPLER_BLOCK_SIZE = 8 };
 
 /* The uses of the numbers in a block. Block 0 of the camera: film x and y, wavelength, distance to the first event in a
  * medium, point of the aperture, whether there is a light sub-path (path_context.light_every), and which faint
- * connections are made (path_context.faint). Block 0 of the light: point, direction and choice of the emitter, and the
- * time of both sub-paths. All other blocks: one vertex, including the distance to the next vertex where media scatter.
- * Block e - 1 of the light also holds the position on edge e of the camera's sub-path at which the emission of media is
- * evaluated. Numbers that are used together lie in the same half of the block: low-discrepancy samplers (sobol.h)
- * stratify the four numbers of a half jointly. */
+ * connections are made (path_context.faint_threshold). Block 0 of the light: point, direction and choice of the
+ * emitter, and the time of both sub-paths. All other blocks: one vertex, including the distance to the next vertex
+ * where media scatter. Block e - 1 of the light also holds the position on edge e of the camera's sub-path at which the
+ * emission of media is evaluated. Numbers that are used together lie in the same half of the block: low-discrepancy
+ * samplers (sobol.h) stratify the four numbers of a half jointly. */
 enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_CAMERA_DISTANCE = 3 };
 enum { DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_HAS_LIGHT = 6, DIM_FAINT = 7 };
 enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4, DIM_TIME = 5, DIM_EMISSION = 6 };

@@ -35,7 +35,7 @@ static bool has_finite_pdf(const struct path_vertex *from, const struct path_ver
 	return distance2 > 0 && fabs(vec3_dot(v->x.ng, d)) > 0;
 }
 
-/* Whether v, met by a ray to y, lies before y and is not y itself. whole: squared length of the ray. */
+/* Whether v, met by a ray to y, lies before y and is not y itself. */
 static bool is_before(const struct path_vertex *v, const struct path_vertex *y, double ray_length2)
 {
 	double distance2;

@@ -37,9 +37,9 @@ static inline bool path_vertex_is_see_through(const struct path_vertex *v)
 }
 
 /* Whether z, a vertex of the camera's sub-path, and y see each other through at least one and at most PATH_PASSED_MAX
- * surfaces. before: the vertex before z; NULL if z is on the lens. Fills in c->passed. Sets *left to the share of light
- * that the surfaces let through, times the transmittance of absorbing media between z and the last surface; the caller
- * adds the edge from that surface to y. Counts rays. */
+ * surfaces. before: the vertex before z; NULL if z is on the lens. Fills in c->passed. Sets *transmittance to the share
+ * of light that the surfaces let through, times the transmittance of absorbing media between z and the last surface;
+ * the caller adds the edge from that surface to y. Counts rays. */
 bool path_trace_passed(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 		       const struct path_vertex *y, spectrum *transmittance);
 

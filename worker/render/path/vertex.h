@@ -72,7 +72,7 @@ struct path_context;
  * joining s light vertices to t camera vertices, which lands at `film`. It returns the part of l that the film gets and
  * takes care of the rest. It must leave the context as it finds it. */
 struct path_split {
-	spectrum (*film_part)(struct path_split *p, struct path_context *c, unsigned s, unsigned t,
+	spectrum (*film_part)(struct path_split *split, struct path_context *c, unsigned s, unsigned t,
 			      const double film[2], spectrum l);
 };
 
@@ -103,7 +103,7 @@ struct path_context {
 	/* Limits on the number of edges of a path. */
 	uint32_t min_depth, max_depth;
 	double max_survival; /* upper limit on the survival probability; 0: no roulette */
-	bool skips_classes;  /* path_sample.classes is not needed */
+	bool skips_classes;  /* path_sample.class_mask and class_intensity are not needed */
 	/* pdf_rev is not needed, because no technique has more than one light vertex. */
 	bool unidirectional;
 	/* Points of emitters are joined to the lens, which also finds paths of one edge. */
