@@ -60,7 +60,7 @@ static void set_value(struct accuracy_settings *k, size_t index, double value)
 	memcpy((char *)k + setting_offset[index], &value, sizeof value);
 }
 
-/* Copies the choice at index `index`, or, if place is -1, the choice worth `value`. Returns false if there is none. */
+/* Copies the choice at index `index`, or, if it is -1, the choice worth `value`. Returns false if there is none. */
 static bool copy_choice(const char *choices, int index, double value, char *text, size_t size)
 {
 	const char *choice = choices;

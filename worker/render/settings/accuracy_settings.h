@@ -26,7 +26,7 @@ struct render_setting {
 	const char *name, *summary;
 	enum setting_kind kind;
 	enum setting_scope scope;
-	double default_value, min, max; /* standard is the default */
+	double default_value, min, max;
 	/* For SETTING_CHOICE: the choices, separated by spaces. A numeric choice has that number as its value, any
 	 * other its index from 0 on. */
 	const char *choices;
