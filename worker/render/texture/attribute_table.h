@@ -49,8 +49,8 @@ struct attribute_table {
 
 enum attribute_use { ATTRIBUTE_COLOR, ATTRIBUTE_COORDINATES };
 
-/* Computes the edges of a triangle in scene units; side[k] is opposite corner k. */
-void attribute_table_edges(const struct attribute_table *t, uint32_t triangle, vec3 side[3]);
+/* Computes the edges of a triangle in scene units; edge[k] is opposite corner k. */
+void attribute_table_edges(const struct attribute_table *t, uint32_t triangle, vec3 edge[3]);
 
 /* Finds the attribute `name`. Returns NULL if there is none or its values are not valid for that use, and sets e to
  * -EINVAL with a sentence that names the mesh and the most similar name. n: node of the texture. */

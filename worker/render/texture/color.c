@@ -165,7 +165,7 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	return 0;
 }
 
-/* A position in a table: from sample i, `part` of the way to sample i + 1. */
+/* A position in a table: from sample i, `fraction` of the way to sample i + 1. */
 struct table_position {
 	uint32_t i;
 	double fraction;

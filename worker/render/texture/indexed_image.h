@@ -21,14 +21,14 @@ struct indexed_image {
 	float *palette;			  /* the distinct numbers; without indices all: [height][width][channels] */
 	const uint8_t *index8;		  /* [height][width][channels]; at least one of index8 and index16 is NULL */
 	const uint16_t *index16;
-	uint32_t palette_count; /* count of distinct numbers, with indices */
+	uint32_t palette_count; /* with indices */
 };
 
 /* Copies an image into the arena. Returns 0, -ENOMEM, or -EFBIG with a sentence if the arena would hold more than
  * IMAGE_SCENE_BYTES_MAX. */
-int indexed_image_make(const struct image *from, struct arena *arena, struct indexed_image *out, struct error *e);
-/* Returns an image that refers to the pixels of `from` without copying them. */
-struct indexed_image indexed_image_wrap(const struct image *from);
+int indexed_image_make(const struct image *source, struct arena *arena, struct indexed_image *out, struct error *e);
+/* Returns an image that refers to the pixels of `source` without copying them. */
+struct indexed_image indexed_image_wrap(const struct image *source);
 /* Returns the count of numbers at i->palette. To inspect or map all values of the image, it suffices to do so with
  * these numbers. */
 size_t indexed_image_palette_count(const struct indexed_image *i);

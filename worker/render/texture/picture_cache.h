@@ -31,16 +31,16 @@ struct picture {
 	struct indexed_image image;
 	uint64_t raised_pixel_count; /* number of pixels with a value that was raised to the least of the range */
 	/* Computed by users of the picture; negative: not known yet. */
-	double max_value;      /* largest of all values, at least 0 */
+	double max_value;      /* at least 0 */
 	double spectrum_bound; /* upper bound of the spectra of all pixels */
 };
 
-/* Returns a picture with this key whose pixels are the same as if clamped to [least, largest], or NULL if there is
+/* Returns a picture with this key whose pixels are the same as if clamped to [min, max], or NULL if there is
  * none. */
-struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest);
-/* Adds an image that was clamped to [least, largest]; cut: whether that changed any pixel. Returns NULL if out of
+struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double min, double max);
+/* Adds an image that was clamped to [min, max]; was_clamped: whether that changed any pixel. Returns NULL if out of
  * memory; the image is then not shared. */
 struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct indexed_image *image,
-			    double least, double largest, bool cut, struct arena *arena);
+			    double min, double max, bool was_clamped, struct arena *arena);
 
 #endif

@@ -25,7 +25,7 @@ struct raster {
 
 struct raster_options {
 	double min, max;  /* pixels outside are clamped */
-	bool default_raw; /* default of the parameter `default_raw`, unless `gamma` is given */
+	bool default_raw; /* default of the parameter `raw`, unless `gamma` is given */
 	enum image_channel
 		default_channel; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
 };
@@ -34,7 +34,7 @@ struct raster_options {
  * channel, as three equal values) and threshold (pixels become 1 at or above it, 0 below). Returns 0 or a negative
  * error code. */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
-		const struct raster_options *range, struct arena *arena, struct error *e);
+		const struct raster_options *options, struct arena *arena, struct error *e);
 #define RASTER_PARAMS                                                                        \
 	{.name = "filename", .types = VALUE_STRING}, ASSET_PART_PARAMS,                      \
 		{.name = "channel", .types = VALUE_STRING, .choices = "all|r|g|b|a"},        \

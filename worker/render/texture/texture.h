@@ -57,7 +57,7 @@ struct texture_ops {
 	size_t data_size; /* bytes of t->data, which is zeroed before `create` is called */
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);
-	spectrum (*eval)(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
+	spectrum (*eval)(const struct texture *t, const struct texture_point *point, const struct wavelengths *w);
 	double (*height)(const struct texture *t, double u, double v);			 /* for COLOR_HEIGHT */
 	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* for COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
