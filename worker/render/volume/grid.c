@@ -189,7 +189,7 @@ struct grid_walk {
 	int cell[3], end_cell[3], step[3]; /* end_cell: the first cell beyond the box, in the direction of the ray */
 	struct cell_block block;	   /* the block that contains `cell` */
 	double t_exit[3];		   /* the t at which the ray leaves the block along each axis */
-	double corner_area_squared[8];	   /* if the grid has `area`: the squared factor at the cell's corners */
+	double corner_area_squared[8]; /* if the grid has an area_matrix: the squared factor at the cell's corners */
 };
 
 /* Returns the t at which the ray meets the plane with the given number across axis i. */
@@ -394,7 +394,7 @@ static void integrate_cell(const struct grid_walk *c, const float *const corner[
 	}
 }
 
-/* Returns the t in [a,b] at which the integral from a reaches `least`, which is at most the integral up to b. */
+/* Returns the t in [a,b] at which the integral from a reaches `target`, which is at most the integral up to b. */
 static double invert_in_cell(const struct grid_walk *c, const double corner[8], double a, double b, double target)
 {
 	enum { STEPS_MAX = 100 };

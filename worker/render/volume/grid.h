@@ -24,8 +24,8 @@ struct grid {
 	const float *value;		 /* channels vary fastest, then x, then y, then z */
 	mat4 to_cells;			 /* from the world to cells; points are at integers */
 	double cell_min[3], cell_max[3]; /* the box, in cells */
-	bool is_world_aligned; /* the box is [world_min, most] in the world instead, parallel to its axes; `cell_min`
-			and `cell_max` then bound it in cells, limited to +-GRID_CELL_MAX */
+	bool is_world_aligned;	   /* the box is [world_min, world_max] in the world instead, parallel to its axes;
+				      `cell_min` and `cell_max` then bound it in cells, limited to +-GRID_CELL_MAX */
 	vec3 world_min, world_max; /* corners of the box if `is_world_aligned` */
 	bool is_nearest;	   /* constant in each cell instead of linear; cells begin at integers */
 	enum grid_wrap wrap;
@@ -42,9 +42,9 @@ struct grid {
  * points. grid_brick_count returns the number of bricks. */
 enum { GRID_BRICK = 8 };
 size_t grid_brick_count(const struct grid *g);
-/* Sets the elements of `occupied_bricks`, grid_brick_count() zeros, of all bricks that are not empty, whatever g->wrap
+/* Sets the elements of `occupied`, grid_brick_count() zeros, of all bricks that are not empty, whatever g->wrap
  * is. Needs only the sizes, channels and values of g. */
-void grid_find_occupied_bricks(const struct grid *g, unsigned char *full);
+void grid_find_occupied_bricks(const struct grid *g, unsigned char *occupied);
 
 /* Computes the values at p; a single channel is copied to all three. Returns false if p is outside the box, where
  * integrals take the value as 0. */
@@ -59,9 +59,9 @@ struct grid_ray {
 /* Computes the integral of each channel over the part of the segment in the box, in units of t; 0 for channels that the
  * grid does not have. */
 void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX]);
-/* Returns the t at which the integral of weight[0] value[0] + ... from t0 reaches `world_min`, or INFINITY if it does
+/* Returns the t at which the integral of weight[0] value[0] + ... from t0 reaches `target`, or INFINITY if it does
  * not before t1. sum: the integral of each channel up to that t. Weights and values must not be negative. */
 double grid_invert_integral(const struct grid *g, const struct grid_ray *r, const double weight[GRID_CHANNELS_MAX],
-			    double least, double sum[GRID_CHANNELS_MAX]);
+			    double target, double sum[GRID_CHANNELS_MAX]);
 
 #endif

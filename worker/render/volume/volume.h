@@ -27,7 +27,7 @@ struct volume_build {
 	struct arena *arena;
 	struct grid_cache *cache;
 	bool dialect_3;	   /* a scene of 3.x; otherwise grids are placed as in 0.6 */
-	vec3 world_center; /* a scene point p is at scale (p - center) in the rescaled world */
+	vec3 world_center; /* a scene point p is at world_scale (p - world_center) in the rescaled world */
 	double world_scale;
 };
 
@@ -48,9 +48,9 @@ struct grid_file;
 int volume_make_grid(struct grid *g, const struct scene_node *n, const struct grid_file *f,
 		     const struct volume_build *build, struct error *e);
 
-/* Multiplies the values of v along rays by the area of two grids (struct grid.area), which must outlive v. n: the node
- * that errors name. -ENOTSUP if v has no grid, or one with other points; a constant in a cube adopts the points of
- * `area`. */
+/* Multiplies the values of v along rays by the area of two grids (struct grid.area_matrix), which must outlive v. n:
+ * the node that errors name. -ENOTSUP if v has no grid, or one with other points; a constant in a cube adopts the
+ * points of `area`. */
 int volume_scale_by_area(struct volume *v, const struct grid area[2], const struct scene_node *n,
 			 const struct volume_build *build, struct error *e);
 
