@@ -82,7 +82,7 @@ static void set_volumes(struct builder *b)
 					   .world_scale = b->w->scale};
 }
 
-/* Uses BSDF number `bsdf_nodes` for a shape. There is one BSDF per node, however many shapes refer to it, unless it
+/* Uses BSDF number `bsdf` for a shape. There is one BSDF per node, however many shapes refer to it, unless it
  * uses the shape's attributes: then there is one per mesh, which instances share, or one per shape if it shows edges.
  * The default is grey; black for emitters; and, in 0.6, `null` for shapes that bound media. */
 static void set_bsdf(struct world *w, uint32_t shape, uint32_t bsdf)

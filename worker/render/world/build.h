@@ -16,7 +16,7 @@ struct world;
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e);
 
-/* Like render_check(), but continues after an error in a shape, a material or an emitter. *found (report_init)
+/* Like render_check(), but continues after an error in a shape, a material or an emitter. *report (report_init)
  * collects these errors, each once; *out is only filled in if there are none. Any other error is returned, as by
  * render_check(). */
 int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
@@ -24,12 +24,12 @@ int render_check_all(const struct scene *s, const struct asset_source *assets, c
 
 /* Builds a world with Embree's tree; ticks meanwhile (common/base/liveness.h). The scene description
  * may be freed afterwards. */
-int world_new(struct world **w, const struct scene *s, const struct asset_source *assets,
+int world_new(struct world **out, const struct scene *s, const struct asset_source *assets,
 	      const struct render_options *o, struct error *e);
 void world_free(struct world *w);
-/* Changes the settings (render_options.settings) of an existing world while no lease runs in it. *fits is false if one
- * of the changed settings requires building again: then a new world is needed, and this one is unchanged. */
-int world_set_accuracy(struct world *w, const char *accuracy, bool *can_apply, struct error *e);
+/* Changes the settings (render_options.accuracy) of an existing world while no lease runs in it. *can_apply is false if
+ * one of the changed settings requires building again: then a new world is needed, and this one is unchanged. */
+int world_set_accuracy(struct world *w, const char *text, bool *can_apply, struct error *e);
 void world_summary(const struct world *w, struct render_summary *out);
 /* Returns X+Y+Z of the brightest emitter; used by canvas_grid_exponent if the bootstrap is black. */
 double world_brightness_bound(const struct world *w);

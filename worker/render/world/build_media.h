@@ -10,7 +10,7 @@
 #include "worker/render/world/build_private.h"
 
 int build_media(struct builder *b);
-/* Call after the emitters are built. Sets w->notes.endless if an unbounded medium around the camera
+/* Call after the emitters are built. Sets w->notes.endless_medium if an unbounded medium around the camera
  * hides emitters at infinity. */
 void build_note_endless_medium(struct builder *b);
 /* Call after Embree's tree is built. Determines through which shapes light passes without a vertex, and

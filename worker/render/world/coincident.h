@@ -13,7 +13,7 @@
 
 /* Returns one accel_shape per shape of the world, in `arena`; NULL if out of memory. */
 struct accel_shape *coincident_make_shapes(const struct world *w, struct arena *arena);
-/* Sets w->coincidence and w->coincident. nodes: one per shape. Returns -ENOMEM if out of memory. */
+/* Sets w->coincidence and w->coincidence_notes. nodes: one per shape. Returns -ENOMEM if out of memory. */
 int coincident_find(struct world *w, const struct scene_node *const *nodes, const struct accel_shape *shapes,
 		    struct error *e);
 

@@ -28,7 +28,7 @@ struct emitter_pick {
 
 /* Chooses an emitter for a point at p from three numbers in [0,1). Returns false if nothing emits. Pure. */
 bool emitter_choice_pick(const struct world *w, vec3 p, const double u[3], struct emitter_pick *out);
-/* Returns emitter_pick.denser for a point y of em, which is the emitter at some time. */
+/* Returns emitter_pick.density_ratio for a point y of em, which is the emitter at some time. */
 double emitter_choice_density_ratio(const struct world *w, vec3 p, int32_t emitter, const struct emitter *em,
 				    const struct emitter_point *y);
 

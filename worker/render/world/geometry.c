@@ -397,7 +397,7 @@ static void add_curve_chain(struct curves *out, const struct world *w, const str
 	}
 }
 
-/* Leaves g->curve_count NULL if no piece has a radius in float. */
+/* Leaves g->curves NULL if no piece has a radius in float. */
 static int place_curves(struct builder *b, struct geom_shape *g, const struct curve *c, const struct scene_node *n)
 {
 	struct curves *out = arena_alloc(&b->w->arena, 1, sizeof *out);
@@ -432,7 +432,7 @@ static void place_sphere(struct builder *b, struct geom_shape *g, const struct s
 	g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
 }
 
-/* Places shape i. *gone: rounded to float, no part of the shape has an area. */
+/* Places shape i. *is_empty: rounded to float, no part of the shape has an area. */
 static int place_shape(struct builder *b, uint32_t i, double min_wide_extent, bool *is_empty)
 {
 	struct world *w = b->w;
@@ -456,7 +456,7 @@ static int place_shape(struct builder *b, uint32_t i, double min_wide_extent, bo
 	return rc || *is_empty ? rc : build_keep_unrounded(b, g, &geometry->mesh, min_wide_extent);
 }
 
-/* Moves all data of shape `geometry` to index `to` <= `geometry`. */
+/* Moves all data of shape `from` to index `to` <= `from`. */
 static void move_shape(struct builder *b, uint32_t from, uint32_t to)
 {
 	if (from == to)

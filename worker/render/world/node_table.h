@@ -22,7 +22,7 @@ struct node_entry {
 struct node_table {
 	struct node_entry *entries;
 	size_t mask, count, capacity;
-	uint64_t probe_count; /* number of entries probed so far */
+	uint64_t probe_count; /* so far */
 };
 
 /* Makes a table for at most that many entries. Returns 0 or -ENOMEM. */

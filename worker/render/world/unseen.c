@@ -119,7 +119,8 @@ void world_note_no_light(struct world *w, bool dropped_emitter)
 
 enum { GRID_SIDE = 32, BACKS_ONE_IN = 20 }; /* the note appears from a fraction of 1 / BACKS_ONE_IN on */
 
-/* Whether a ray meets the back of an opaque material that `twosided` does not cover, black or lit by `black_backs`. */
+/* Whether a ray meets the back of an opaque material that `twosided` does not cover, black or lit by the setting
+ * `backs`. */
 static bool is_bare_back(const struct world *w, const struct ray_hit *hit, vec3 from, vec3 d)
 {
 	const struct bsdf *b = &w->bsdfs[w->shape_bindings[hit->prim.shape].bsdf];

@@ -53,7 +53,7 @@ struct world {
 	/* camera_medium: 1 + its index, as in shape_binding; 0: none. */
 	uint32_t media_count, camera_medium;
 	struct medium *media;
-	bool has_null_faces;	       /* some shape is passable */
+	bool has_null_faces;	       /* is_null_face is set for some shape */
 	struct box see_through_bounds; /* bounds all surfaces that connections may look through; may be empty */
 	struct box refracting_bounds;  /* bounds all surfaces that may refract connections; may be empty */
 	struct refracting_point *refracting_points; /* points on these surfaces: refracting.h */
