@@ -170,9 +170,8 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;
 	find_enclosed(w, src, shape);
-	bool dark = true,
-	     media_scatter =
-		     false; /* media_scatter: faces that are not vertices let light through, whatever the depth */
+	bool dark = true;
+	bool media_scatter = false; /* then faces that are not vertices let light through, whatever the depth */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		dark &= !visibility_bounds_emitter_is_visible(w, shape, i);
 	for (uint32_t i = 0; i < w->media_count; i++) {
