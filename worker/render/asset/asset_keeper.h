@@ -18,7 +18,7 @@ struct asset_keeper {
 	char *kept_name; /* NULL: nothing is kept */
 	struct asset kept_asset;
 	unsigned user_count;
-	uint64_t bytes_read; /* bytes read so far */
+	uint64_t bytes_read;
 };
 
 /* k->inner_source must be set and all other members 0. */

@@ -20,7 +20,7 @@ enum { VALUES_MAX = 1 << 22 }; /* for all channels together */
 struct animation_reader {
 	struct gltf *g;
 	const json_t *samplers;
-	uint64_t value_count; /* number of values read so far */
+	uint64_t value_count; /* read so far */
 };
 
 /* What a channel changes: `value_count` numbers of a node. They follow `skip_count` others in the first `vector_count`

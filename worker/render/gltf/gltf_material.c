@@ -18,11 +18,10 @@
 /* ---- the surface below the layers */
 
 struct gltf_surface {
-	double base_colour[4]; /* base colour and alpha */
+	double base_colour[4]; /* with alpha */
 	double metallic, roughness;
-	const json_t *base_texture;		  /* texture that multiplies the base; NULL: none */
-	const json_t *roughness_metallic_texture; /* texture that multiplies roughness (green) and metallic (blue);
-						     NULL: none */
+	const json_t *base_texture;		  /* multiplies the base colour; NULL: none */
+	const json_t *roughness_metallic_texture; /* multiplies roughness (green) and metallic (blue); NULL: none */
 };
 
 static const double dielectric_reflectance = 0.04;

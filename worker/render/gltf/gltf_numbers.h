@@ -14,9 +14,9 @@ struct gltf_vectors {
 	unsigned component_count;
 };
 
-/* Reads an accessor. `normalized` integers, which represent -1 to 1 or 0 to 1, are converted. component_count: the
- * number required, 1 to 4, or 16 for matrices; 0: any. purpose: what the numbers are for, in messages. Returns false
- * after a failure. */
+/* Reads an accessor. `normalized` integers, which represent -1 to 1 or 0 to 1, are converted. components: the number
+ * required, 1 to 4, or 16 for matrices; 0: any. purpose: what the numbers are for, in messages. Returns false after a
+ * failure. */
 bool gltf_vectors_read(struct gltf *g, const struct gltf_entry *accessor, const char *purpose, unsigned components,
 		       struct gltf_vectors *out);
 /* Returns what a normalized integer x of that type represents; floats and 32-bit integers are returned unchanged. */

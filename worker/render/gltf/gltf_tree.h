@@ -62,9 +62,9 @@ struct gltf_unpacked_view {
 struct gltf_range {
 	const char *file;
 	uint64_t first_byte, byte_count;
-	bool is_base64;	     /* first and count are of the text, offsets of views of the decoded bytes */
+	bool is_base64;	     /* first_byte and byte_count are of the text, offsets of views of the decoded bytes */
 	uint64_t size;	     /* number of decoded bytes */
-	unsigned skip_bytes; /* number of decoded bytes to skip at the beginning */
+	unsigned skip_bytes; /* decoded bytes to skip at the beginning */
 };
 
 struct gltf {
@@ -90,7 +90,7 @@ struct gltf {
 	uint64_t unpacked_bytes;		   /* total size of these */
 	size_t *parents;			   /* by node (gltf_node.h); NULL: not needed so far */
 	uint64_t embedded_bytes;		   /* total size of computed vertices */
-	uint64_t bytes_read;			   /* bytes read so far from files with buffers */
+	uint64_t bytes_read;			   /* so far, from files with buffers */
 	double *mesh_use_counts;		   /* by mesh: number of nodes that use it */
 	bool *meshes_made;			   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
@@ -111,7 +111,7 @@ bool gltf_find_entry(struct gltf *g, enum gltf_array array, uint64_t index, stru
 int gltf_resolve(struct gltf *g, const struct gltf_entry *referrer, const json_t *object, const char *key,
 		 enum gltf_array array, struct gltf_entry *out);
 /* Sets g->error_code, and the error with "file:line: array[index]: " before the text. Returns g->error_code. */
-__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_entry *at, int errno_value,
+__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_entry *entry, int errno_value,
 						    const char *format, ...);
 
 /* Called after a node or a primitive, which is complete by itself: moves a failure to the list of what is missing,
@@ -119,33 +119,36 @@ __attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct
 void gltf_record_failure(struct gltf *g);
 
 /* Each returns a member of an object, or a default if it is missing; a member of another type is an error. */
-double gltf_number(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, double fallback);
-uint64_t gltf_integer(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, uint64_t fallback);
-const char *gltf_string(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key,
+double gltf_number(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key, double fallback);
+uint64_t gltf_integer(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key,
+		      uint64_t fallback);
+const char *gltf_string(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key,
 			const char *fallback);
-/* Stores `byte_count` numbers in x, which keeps its values if the member is missing. */
-void gltf_numbers(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key, double *x,
+/* Stores `count` numbers in x, which keeps its values if the member is missing. */
+void gltf_numbers(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key, double *x,
 		  size_t count);
-const json_t *gltf_object(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *key); /* or NULL */
-const json_t *gltf_extension(struct gltf *g, const struct gltf_entry *at, const json_t *o, const char *name);
+const json_t *gltf_object(struct gltf *g, const struct gltf_entry *entry, const json_t *o,
+			  const char *key); /* or NULL */
+const json_t *gltf_extension(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *name);
 
 /* Make elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
-struct xml_element *gltf_add_element(struct gltf *g, struct xml_element *parent, const struct gltf_entry *at,
+struct xml_element *gltf_add_element(struct gltf *g, struct xml_element *parent, const struct gltf_entry *entry,
 				     const char *name);
 __attribute__((format(printf, 4, 5))) void gltf_add_attribute(struct gltf *g, struct xml_element *el, const char *name,
 							      const char *format, ...);
 /* <cls type="..." name="...">; without a name if that is NULL */
-struct xml_element *gltf_add_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_entry *at,
+struct xml_element *gltf_add_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_entry *entry,
 				    const char *cls, const char *type, const char *name);
-void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name, double x);
-void gltf_put_integer(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name,
+		     double x);
+void gltf_put_integer(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name,
 		      uint64_t x);
-void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name, bool x);
-void gltf_put_string(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name, bool x);
+void gltf_put_string(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name,
 		     const char *text);
-void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name,
 		  const double rgb[3]);
-void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_entry *at, const char *name,
+void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_entry *entry, const char *name,
 		     const mat4 *m);
 void gltf_extend_bounds(struct gltf *g, vec3 p); /* extends the box by a vertex */
 /* Adds a note, only once per file. */

@@ -21,10 +21,10 @@ enum {
 struct bmp {
 	const struct image_input *in;
 	uint64_t width, height;
-	bool is_top_down; /* rows from top to bottom */
+	bool is_top_down;
 	uint32_t bits_per_pixel, pixel_offset;
 	const unsigned char *palette;
-	uint32_t colour_count, entry_size; /* entries, and bytes per entry: blue, green, red */
+	uint32_t colour_count, entry_size; /* entries of the palette, and bytes per entry: blue, green, red */
 };
 
 static int read_palette(struct bmp *b, uint32_t header_size, uint32_t used_colours)

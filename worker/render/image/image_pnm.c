@@ -20,8 +20,8 @@ struct pnm {
 	const struct image_input *in;
 	const unsigned char *cursor;
 	int64_t width, height;
-	double scale;			 /* of a PFM file; for PGM and PPM, the largest sample */
-	uint32_t channels, sample_bytes; /* sample_bytes: per sample */
+	double scale; /* of a PFM file; for PGM and PPM, the largest sample */
+	uint32_t channels, sample_bytes;
 	bool is_float, is_big_endian;
 };
 

@@ -17,7 +17,7 @@ enum { HEADER_SIZE = 18, KIND_PALETTE = 1, KIND_COLOUR = 2, KIND_GREY = 3, KIND_
 
 struct tga {
 	const struct image_input *in;
-	uint32_t width, height, kind, pixel_bytes; /* pixel_bytes: per pixel, or per palette index */
+	uint32_t width, height, kind, pixel_bytes; /* pixel_bytes: with a palette, per index */
 	bool is_rle, is_top_down, is_right_to_left;
 	const unsigned char *palette; /* the palette; NULL: the pixels are colours */
 	uint32_t palette_first, palette_count, palette_entry_bytes;

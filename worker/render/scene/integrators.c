@@ -88,7 +88,7 @@ const struct scene_node *integrator_inner(const struct scene_node *n)
 }
 
 /* Returns the maximum depth of n; -1: no limit. `inherited_depth` is the depth of the enclosing integrator, which
- * applies if n states none. In Mitsuba `is_direct` has no such parameter, so a stated depth can only shorten its paths.
+ * applies if n states none. In Mitsuba `direct` has no such parameter, so a stated depth can only shorten its paths.
  */
 static int64_t effective_depth(const struct scene_node *n, int64_t inherited_depth)
 {

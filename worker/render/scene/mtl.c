@@ -8,7 +8,7 @@
  * scene file, so values that are not numbers are reported there, with the line in the .mtl file.
  *
  * A file that cannot be opened has no materials. A keyword that would change the image but is not supported is stored
- * in mtl.unread, for the caller to report. Too many materials give -E2BIG, lack of memory -ENOMEM.
+ * in mtl.unsupported, for the caller to report. Too many materials give -E2BIG, lack of memory -ENOMEM.
  */
 #include "worker/render/scene/mtl.h"
 
@@ -68,7 +68,7 @@ const char *mtl_resolve_file(const struct asset_source *assets, const char *besi
 
 static const struct keyword {
 	const char *word;
-	size_t offset; /* offset of the mtl_value in struct mtl_material */
+	size_t offset; /* of the mtl_value in struct mtl_material */
 	bool is_file;
 } keywords[] = {
 	{"Kd", offsetof(struct mtl_material, diffuse), false},

@@ -16,9 +16,9 @@
 #define NESTING_PARTS_MAX 65536	     /* for one material or texture: an evaluation may visit all its objects */
 #define NESTING_OBJECTS_MAX 67108864 /* for the scene */
 
-/* Adds `part`, which has been made, to the contents of `owner`, an object of class `cls`; `el` is the element
- * inside the owner that names it. is_shared: `part` is built once for all its owners, and adds only depth. Returns
- * -E2BIG with a sentence if a limit is exceeded. `owner` is then marked as beyond the limits, and taking it returns
+/* Adds `part`, which has been made, to the contents of `owner`, an object of class `cls`; `el` is the element inside
+ * the owner that names it. is_shared: `part` is built once for all its owners, and adds only depth. Returns -E2BIG with
+ * a sentence if a limit is exceeded. `owner` is then marked as beyond the limits, and taking it returns
  * REPORT_ALREADY_REPORTED, without another sentence. */
 int nesting_add(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
 		const struct xml_element *part, bool is_shared, struct error *e);

@@ -14,9 +14,9 @@ struct notes {
 	struct report *report;
 	struct error *error;
 	const struct xml_element *last_owner; /* the object whose parameters without effect were noted last, or NULL */
-	uint32_t note_index;		      /* the index of that note */
-	int note_line;			      /* its line */
-	char parameter_names[256];	      /* the parameters that it lists */
+	uint32_t note_index;		      /* of that note */
+	int note_line;
+	char parameter_names[256]; /* the parameters that it lists */
 };
 
 /* Adds a note. The element's name, `type` and `property` together identify the kind of thing. */

@@ -57,13 +57,12 @@ struct obj_shape {
 	const char *file; /* NULL: the shape names none */
 	struct asset contents;
 	struct child *children;
-	size_t child_count, unnamed_count,
-		named_count;	      /* plain, named_count: number of BSDFs without and with a name */
-	bool loads_library, is_fixed; /* loads_library: the shape asks for the .mtl file; is_fixed: it emits light, or
-			     states itself which faces it wants */
-	int64_t mesh_index;	      /* shape_index; negative: all meshes */
-	struct material *materials;   /* [OBJ_MATERIALS_MAX] */
-	uint32_t *buckets;	      /* hash table of BUCKETS entries by name: 1 + index, or 0 if free */
+	size_t child_count, unnamed_count, named_count; /* unnamed_count, named_count: of BSDFs */
+	bool loads_library,
+		is_fixed; /* the shape asks for the .mtl file; it emits light, or states itself which faces it wants */
+	int64_t mesh_index;	    /* shape_index; negative: all meshes */
+	struct material *materials; /* [OBJ_MATERIALS_MAX] */
+	uint32_t *buckets;	    /* hash table of BUCKETS entries by name: 1 + index, or 0 if free */
 	size_t material_count;
 	const char *library; /* name in the last mtllib, or NULL */
 	size_t library_length;
@@ -185,8 +184,8 @@ static int read_library(const struct obj_splitter *s, struct obj_shape *o)
 
 /* ---- the choice of materials */
 
-/* Chooses the last applicable BSDF of the shape for each material. *found: the number of materials with faces that
- * have a BSDF or an entry in the .mtl file. */
+/* Chooses the last applicable BSDF of the shape for each material. *found_count: the number of materials with faces
+ * that have a BSDF or an entry in the .mtl file. */
 static int choose_bsdfs(const struct obj_splitter *s, struct obj_shape *o, size_t *found_count)
 {
 	*found_count = 0;

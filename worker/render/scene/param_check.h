@@ -22,7 +22,7 @@ int clip_value(const struct notes *t, const struct xml_element *owner, const str
 /* Refuses a property that an object is given a second time. Returns -EINVAL. */
 int refuse_second_value(const struct xml_element *el, const struct property *previous, struct error *e);
 
-/* For files of 0.6: sets *before to the value that counts in Mitsuba 0.6, with a note. Returns -EINVAL if two names
+/* For files of 0.6: sets *previous to the value that counts in Mitsuba 0.6, with a note. Returns -EINVAL if two names
  * of 0.6 that mean the same parameter are given. */
 int resolve_second_value(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
 			 struct property *previous, struct value v);

@@ -118,7 +118,7 @@ static int remark_on_boundary(struct report *r, const struct scene_node *n, bool
 		"lets light through");
 }
 
-/* Notes that Mitsuba's integrator shows no media. Whether the image has them depends on the setting `has_media`. */
+/* Notes that Mitsuba's integrator shows no media. Whether the image has them depends on the setting `media`. */
 static int remark_on_media(struct report *r, const struct scene_node *integrator, struct error *e)
 {
 	const struct scene_node *n = integrator_find_without_media(integrator);

@@ -38,9 +38,9 @@ int report_note(struct report *r, const char *file, const char *key, struct erro
 /* Like report_note(), for a text that is already formatted. */
 int report_note_text(struct report *r, const char *file, const char *key, const char *message, struct error *e);
 
-/* Handles a failure with this `first_code` and the text in e. A recoverable failure is stored, and the result is 0;
- * lack of memory is not recoverable. REPORT_ALREADY_REPORTED, for a failure that was stored before, and 0 give 0.
- * REPORT_FULL, returned when there is no room for more problems, ends the reading; it is returned unchanged. */
+/* Handles a failure with this `code` and the text in e. A recoverable failure is stored, and the result is 0; lack of
+ * memory is not recoverable. REPORT_ALREADY_REPORTED, for a failure that was stored before, and 0 give 0. REPORT_FULL,
+ * returned when there is no room for more problems, ends the reading; it is returned unchanged. */
 enum { REPORT_ALREADY_REPORTED = 1, REPORT_FULL = 2 };
 int report_problem(struct report *r, int code, struct error *e);
 /* Like report_problem(), but does nothing if the text is already stored, because several objects refer to the one it

@@ -44,7 +44,7 @@ static int make_object(struct maker *m, struct xml_element *el, const struct sce
 	return r;
 }
 
-static int read_top_level(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
+static int read_top_level(struct maker *m, const struct xml_element *container, const struct scene_node **objects);
 
 static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
 {
@@ -153,7 +153,7 @@ static bool add_default_light(struct xml_tree *t, const struct plugin_decl *decl
 	return make_daylight(t->root, arena);
 }
 
-/* Notes, in one sentence, all shapes that `is_lenient` leaves out because their transforms have no inverse. */
+/* Notes, in one sentence, all shapes that --lenient leaves out because their transforms have no inverse. */
 static int note_flat_shapes(const struct maker *m)
 {
 	const struct xml_element *first = m->first_flat_shape;

@@ -31,7 +31,7 @@ struct scene {
 	uint32_t problem_count;		 /* 0 except after scene_read_all */
 	const char *const *problems;	 /* "scene.xml:12: <bsdf>: ...", in file order */
 	uint32_t flawed_count;
-	const struct scene_node *const *flawed; /* the nodes with scene_node.flawed, at any depth */
+	const struct scene_node *const *flawed; /* the nodes with is_flawed, at any depth */
 	uint32_t note_count;
 	const char *const *notes; /* "scene.xml:12: ignored ...", each once, for the log */
 };

@@ -10,8 +10,8 @@
 
 enum filter_kind { FILTER_BOX, FILTER_TENT, FILTER_GAUSSIAN, FILTER_CUBIC, FILTER_LANCZOS };
 
-/* How directions are mapped to film points: projected on a plane, by longitude and latitude, or on a plane distorted
- * by kc. */
+/* How directions are mapped to film points: projected on a plane, by longitude and latitude, or on a plane with lens
+ * distortion. */
 enum scene_projection { PROJECTION_PLANE, PROJECTION_SPHERE, PROJECTION_DISTORTED };
 
 /* The side at which a rolling shutter begins; it exposes rows or columns of the film one after the other. */
@@ -32,14 +32,14 @@ struct scene_settings {
 	char integrator[32]; /* type of the scene's own integrator ("": none), which is ignored except for its depths
 				and media */
 	mat4 to_world;	     /* camera, as the shutter opens: +z forward, +x LEFT on the image, +y up; no scale */
-	bool is_moving;	     /* the camera moves while the shutter is open */
+	bool is_moving;	     /* while the shutter is open */
 	double half_width;   /* above 0: half of the film's width in scene units (orthographic, telecentric) */
 	double fov;	     /* degrees, along fov_axis */
 	char fov_axis[16];   /* x, y, diagonal, smaller, larger: resolved by the camera, which knows the film's size */
 	double principal_x, principal_y; /* offset of the principal point from the centre, relative to the film's size,
 					    as in Mitsuba 3 */
 	enum scene_projection projection;
-	double distortion[2]; /* PROJECTION_DISTORTED: the two coefficients */
+	double distortion[2]; /* PROJECTION_DISTORTED: the two coefficients of `kc` */
 	double near_clip, far_clip;
 	double shutter_open, shutter_close; /* if they are equal, nothing moves */
 	enum scene_rolling_shutter rolling_shutter;
@@ -61,9 +61,9 @@ static inline uint32_t scene_settings_height(const struct scene_settings *s)
 	return s->crop_width ? s->crop_height : s->height;
 }
 
-/* Reads the settings. width, height: replace the film's size and drop its crop window (0: keep). sensor: number of
- * the sensor to use, from 1 on. */
-int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
+/* Reads the settings. width, height: replace the film's size and drop its crop window (0: keep). sensor_number: of the
+ * sensor to use, from 1 on. */
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor_number,
 			struct scene_settings *out, struct error *e);
 
 /* Makes the columns of a camera's transform orthonormal, keeping the view direction; a mirrored transform stays

@@ -25,9 +25,9 @@ struct curve_reader {
 	const char *file_name;
 	mat4 to_world;
 	double radius;	     /* of all points; negative: each line has its own */
-	uint32_t min_points; /* least number of points of a curve */
+	uint32_t min_points; /* of a curve */
 	bool drop_short;     /* curves with fewer points are left out */
-	bool in_curve;	     /* a curve has been begun */
+	bool in_curve;
 	struct curve_points *out;
 	struct error *error;
 };

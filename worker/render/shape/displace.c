@@ -22,9 +22,8 @@
 
 /* The contributions of the triangles around a place. */
 struct place {
-	vec3 position, direction_sum, normal_sum; /* weighted sums, except for p */
-	double weight_sum, height_sum, min_height,
-		max_height;	     /* sum of weights; weighted sum, least and largest of heights */
+	vec3 position, direction_sum, normal_sum;	       /* sums are weighted */
+	double weight_sum, height_sum, min_height, max_height; /* height_sum: weighted */
 	bool has_samples, is_crease; /* some triangle has contributed; the place is on a crease or seam */
 };
 

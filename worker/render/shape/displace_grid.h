@@ -18,9 +18,9 @@ struct displace_side {
 struct displace_grid {
 	uint32_t parts_per_edge, base_vertex_count, base_place_count;
 	uint32_t vertex_edge_count, place_edge_count;
-	uint32_t *place;	      /* place of each base vertex */
-	struct displace_side *side;   /* 3 per triangle, side k from corner k to the next; NULL if parts is 1 */
-	const uint32_t (*index)[3];   /* of the base mesh */
+	uint32_t *place;	    /* place of each base vertex */
+	struct displace_side *side; /* 3 per triangle, side k from corner k to the next; NULL if parts_per_edge is 1 */
+	const uint32_t (*index)[3]; /* of the base mesh */
 	uint64_t border_vertex_count; /* vertices below this number have a place, the others do not */
 	uint64_t vertex_count, place_count;
 };

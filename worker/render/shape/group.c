@@ -39,8 +39,8 @@ static const struct scene_node *node_placed_at(const struct scene_node *n, mat4 
 				  arena);
 }
 
-/* Replaces a moving node by a still one at its position when the shutter opens. *moves: its motion while the shutter is
- * open; NULL if it does not move then. */
+/* Replaces a moving node by a still one at its position when the shutter opens. *animation: its motion while the
+ * shutter is open; NULL if it does not move then. */
 static int freeze_motion(struct listing *l, const struct scene_node **n, const struct animation **animation)
 {
 	const struct animation *a = node_animation(*n);

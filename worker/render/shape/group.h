@@ -18,7 +18,7 @@ struct listed_shape {
 	const struct scene_node *instance; /* its to_world is applied after the node's; NULL: none */
 	const struct animation *animation; /* of the instance, or of the node without one; NULL: no motion */
 	uint32_t first_use, use_count;	   /* position of the first shape in the list that instantiates the same node;
-				     number of     these shapes */
+					      number of these shapes */
 };
 
 /* Lists the shapes in the order of the file; the list is in the arena. Moving shapes are at their positions of the time

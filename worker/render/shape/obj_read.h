@@ -23,7 +23,7 @@ struct obj_run {
 /* The beginning of a mesh, which ends where the next one begins: the faces between two lines with `g` or `usemtl`,
  * which therefore have one material. `o` does not begin a mesh, as in Mitsuba 0.6. */
 struct obj_mesh {
-	size_t run;			     /* its run in `runs` */
+	size_t run;			     /* index in `runs` */
 	size_t first_corner, first_triangle; /* the first ones of the mesh */
 };
 

@@ -462,7 +462,7 @@ static int read_body(struct ply *f)
 static int check_header(struct ply *f)
 {
 	uint64_t vertices = 0;
-	bool has_faces = false, has_other_elements = false; /* others: for instance strips of triangles */
+	bool has_faces = false, has_other_elements = false; /* for instance strips of triangles */
 	for (uint32_t i = 0; i < f->element_count; i++) {
 		const struct ply_element *el = &f->elements[i];
 		if (el->kind == ELEMENT_VERTEX)

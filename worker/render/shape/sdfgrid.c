@@ -163,8 +163,8 @@ static uint32_t vertex_between(struct surface *s, const struct cell *c, unsigned
 
 /* ---- triangles ---- */
 
-/* Adds a triangle, oriented such that it faces away from the point `inside`, in the direction in which the field grows.
- * v: 1 + vertices. -EFBIG or -ENOMEM. */
+/* Adds a triangle, oriented such that it faces away from `inside_point`, in the direction in which the field grows. v:
+ * 1 + vertices. -EFBIG or -ENOMEM. */
 static int add_triangle(struct surface *s, const uint32_t v[3], const double inside_point[3])
 {
 	const double(*p)[3] = s->positions.items;

@@ -23,7 +23,7 @@ struct smoothing {
 	double (*normal)[3];	/* unit normal of each triangle */
 	double min_cosine;	/* cosine of the largest angle between normals that share a vertex */
 	struct mesh out;
-	uint32_t *source_vertex; /* for each vertex of `out`, the vertex of m with its attributes */
+	uint32_t *source_vertex; /* for each vertex of `out`, the vertex of `mesh` with its attributes */
 	uint64_t comparison_count;
 };
 

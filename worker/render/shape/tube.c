@@ -55,8 +55,8 @@ static unsigned ring_count(double angle)
 	return (unsigned)fmax(1, ceil(fabs(angle) / (2 * pi / TUBE_SIDES)));
 }
 
-/* Adds rings from one angle to another around the same axis, without the one at `from` unless it is the first of the
- * tube. */
+/* Adds rings from one angle to another around the same axis, without the one at `from_angle` unless it is the first of
+ * the tube. */
 static int add_cap(struct list *rings, const struct joint_sphere *s, vec3 axis, double from_angle, double to_angle,
 		   bool first)
 {

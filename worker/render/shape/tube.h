@@ -19,8 +19,9 @@ enum { TUBE_SIDES = 12 };
 struct tube_ring {
 	vec3 center, axis; /* axis: unit */
 	double radius;
-	/* The normal at a vertex is (1 - offset . bend) cos e + normal_sin axis, where `offset` is the vector from the
-	 * center to the vertex and e its direction. curvature: the change of the axis, c'' / |c'|^2 for a curve c. */
+	/* The normal at a vertex is (1 - offset . curvature) normal_cos e + normal_sin axis, where `offset` is the
+	 * vector from the center to the vertex and e its direction. curvature: the change of the axis, c'' / |c'|^2 for
+	 * a curve c. */
 	double normal_cos, normal_sin;
 	vec3 curvature;
 	double v;

@@ -17,7 +17,7 @@ enum { DEFINE_MAX = 1024, DEFINE_MISSING_MAX = 64 };
 
 struct define_entry {
 	const char *name, *value;
-	bool from_command_line, is_used; /* given: on the command line */
+	bool from_command_line, is_used;
 };
 
 struct define_table {
@@ -25,7 +25,7 @@ struct define_table {
 	struct define_entry *entries; /* DEFINE_MAX */
 	size_t count, missing_count;
 	bool is_incomplete; /* a file that may define more names is missing, so undefined names are not reported */
-	const char *missing_names[DEFINE_MISSING_MAX]; /* names used without being defined, each once */
+	const char *missing_names[DEFINE_MISSING_MAX]; /* names that are used but not defined, each once */
 };
 
 int define_init(struct define_table *t, const struct scene_define *defines, size_t count, struct arena *arena,

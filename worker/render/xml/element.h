@@ -35,8 +35,8 @@ struct xml_element {
 	const struct scene_node *node;	       /* for the interpreter: the node made from it */
 	const struct scene_node *limited_node; /* for the interpreter: with colours limited to 1 (over_one.h) */
 	struct xml_nesting nesting;	       /* for the interpreter: what that node contains */
-	bool is_in_progress, is_rejected; /* for the interpreter: busy: being made into a node; is_rejected: cannot be
-			    made into one, which has been reported */
+	bool is_in_progress, is_rejected; /* for the interpreter: it is being made into a node; it cannot be made into
+					     one, which has been reported */
 	bool is_counted;		  /* for the interpreter: included in the scene's count of objects */
 	bool is_too_deep; /* for the interpreter: a reference to it is too deep, which has been reported */
 };

@@ -17,7 +17,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* A rule. before: the minor version from which it no longer applies (4: files before 0.4). NULL: any element or
+/* A rule. before_minor: the minor version from which it no longer applies (4: files before 0.4). NULL: any element or
  * type. */
 struct rename_rule {
 	int before_minor;
