@@ -45,10 +45,10 @@ struct accuracy_design {
 /* Indices of the first two settings. The reference has accurate values and is rendered longer. */
 enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
-/* Makes the design for a scene. base: complete; its settings are the default. only: the parameters to vary, as
+/* Makes the design for a scene. base: complete; its settings are the default. parameters: those to vary, as
  * "NAME,NAME"; NULL: all. Returns -EINVAL with a sentence if one of them does not exist. */
 int accuracy_make_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
-			 const char *only, struct error *e);
+			 const char *parameters, struct error *e);
 
 /* Writes the name of a setting, such as "tolerance 0.01" or "default". */
 void accuracy_setting_name(const struct accuracy_setting *s, char *text, size_t size);

@@ -43,8 +43,7 @@ static void put_paragraph(struct text_file *p, const char *text)
 	text_file_put(p, "</p>\n");
 }
 
-/* Appends a cell such as "12.3 (11.9 to 12.8)", in percent. sign: print + or -; is_significant: mark it as significant.
- */
+/* Appends a cell such as "12.3 (11.9 to 12.8)", in percent. sign: print + or -; is_significant: mark it so. */
 static void put_interval_cell(struct text_file *p, struct interval x, bool sign, bool is_significant)
 {
 	if (!isfinite(x.value))

@@ -16,16 +16,16 @@ enum { ACCURACY_CELLS_MAX = 17 }; /* room for the blocks of an image, and its me
 struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;
-	struct interval mutation_us;	 /* microseconds of CPU time per mutation */
-	double acceptance;		 /* share of accepted mutations */
-	double failed_walks;		 /* share of all walks; NAN: there were none */
-	double rays_per_mutation;	 /* per mutation */
+	struct interval mutation_us; /* microseconds of CPU time per mutation */
+	double acceptance;	     /* share of accepted mutations */
+	double failed_walks;	     /* share of all walks; NAN: there were none */
+	double rays_per_mutation;
 	struct interval equal_mutations; /* error after as many mutations as the default's */
 	struct interval equal_time;	 /* error after as much CPU time as the default's */
 	struct interval bias_mean;	 /* of the image's mean, relative to the reference */
 	struct interval
 		bias_worst_block; /* of the block that differs most significantly; 95 % for all blocks together */
-	unsigned worst_block;	  /* which block that is: blocks_across + down * blocks_across */
+	unsigned worst_block;	  /* its index: column + row * blocks_across */
 	double bias_lower_joint;  /* lower bound of the bias, all settings and blocks tested together; 0: none */
 	double bias_upper;	  /* upper bound of the bias of the mean or of any block */
 	size_t dominated_by; /* index of a better setting (stats_front); its own: it is on the front, or the reference

@@ -42,9 +42,9 @@ struct stats_point {
  * larger, and its bias_upper is not above 1.5 times i's;
  * - or if j's bias is smaller (j's bound is below i's bias_lower_joint; or i's bias was seen, j's is not even
  * suspected, and j's bound is not above 1.5 times i's), and j's error is not certainly larger. "Certainly" means: with
- * a probability of error of `level`, shared among the n - 1 other settings. by[i]: of the settings that beat i, the one
- * with the smallest error; i itself if it is on the front.
+ * a probability of error of `level`, shared among the n - 1 other settings. dominated_by[i]: of the settings that beat
+ * i, the one with the smallest error; i itself if it is on the front.
  */
-void stats_front(const struct stats_point *p, size_t n, double level, size_t *by);
+void stats_front(const struct stats_point *p, size_t n, double level, size_t *dominated_by);
 
 #endif

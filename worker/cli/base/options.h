@@ -30,7 +30,7 @@ bool integrator_is_undecided(const struct plan_request *r);
 
 /* Fills in the values that the options have left to the scene: film, depth, samples, mixture of mutations. Returns
  * -EINVAL, a usage error, if the given mixture is invalid or the integrator cannot render this scene. */
-int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
+int render_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e);
 
 /* Prints a note if the integrator's chains hold only shorter paths than the plan has; otherwise the text is empty. */
 void option_depth_note(const char *integrator, uint32_t max_depth, char *text, size_t size);

@@ -2,7 +2,8 @@
 /*
  * Crops are added one by one (add_crop). The first determines the film, the layers and the attributes that all must
  * share; each crop is checked against the first, its pixels are copied, and the numbers in its header are added up. At
- * the end, the film is cut to the rectangle that the crops cover (crop_to_covered), and the header is written (write).
+ * the end, the film is cut to the rectangle that the crops cover (crop_to_covered), and the image is written
+ * (encode_image).
  *
  * Failures name the file, and the attribute or pixel that is wrong: crops of different renders, crops that overlap, or
  * a pixel inside the rectangle that no crop has.
@@ -20,8 +21,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Attributes that must be equal in all crops (alike), whose numbers are added up (added), or that have rules of their
- * own in add_header and write (own). Any other attribute is kept if all crops agree on it. */
+/* Attributes that must be equal in all crops, whose numbers are added up, or that have rules of their own in add_header
+ * and encode_image. Any other attribute is kept if all crops agree on it. */
 static const char *const equal_attributes[] = {"hslt:version",	"hslt:scene",	 "hslt:integrator",
 					       "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
 static const char *const summed_attributes[] = {"hslt:mutations",   "hslt:accepted",   "hslt:independent",
@@ -45,8 +46,8 @@ struct sums {
 	double mse;		   /* sum of relMSE times pixels */
 	double squares_below,
 		squares_above; /* sums of squares: distance of relMSE from the ends of its interval, times pixels */
-	double pixels;	       /* number of pixels */
-	bool has_mse;	       /* every crop has a relMSE and its interval */
+	double pixels;
+	bool has_mse; /* every crop has a relMSE and its interval */
 	double cpu_seconds, wall_seconds;
 	int mixed;
 	bool too_short, disagree, agree;

@@ -25,7 +25,7 @@ int compare_to_reference(const struct picture *a, const struct picture *b, doubl
 			 struct error *e);
 
 /* Shows the relative error of each pixel as a colour, from black (0.1 %) through violet, red and orange to white
- * (100 %), and cyan if it is not finite. rgb: 3 bytes per pixel. Errors as for compare. */
+ * (100 %), and cyan if it is not finite. rgb: 3 bytes per pixel. Errors as for compare_to_reference. */
 int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e);
 
 #endif

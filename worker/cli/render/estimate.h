@@ -19,10 +19,10 @@
 /* clang-format on */
 
 struct estimate {
-	const char *scene, *machine;	      /* name of the file; where it is rendered, as "this machine, 2 threads" */
-	const struct plan_request *request;   /* of the render being predicted; each row sets its own target error */
-	const struct plan *plan;	      /* its plan for its own target error, or the one that pilot.h chose */
-	const struct plan *pilot;	      /* the plan of the pilot */
+	const char *scene, *machine;	    /* name of the file; where it is rendered, as "this machine, 2 threads" */
+	const struct plan_request *request; /* of the render being predicted; each row sets its own target error */
+	const struct plan *plan;	    /* its plan for its own target error, or the one that pilot.h chose */
+	const struct plan *pilot;
 	const struct forecast_history *looks; /* the pilot's estimates of its error */
 	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */
 	double bootstrap_cpu_seconds,

@@ -6,8 +6,8 @@
 
 #include "worker/cli/base/options.h"
 
-/* Reads the scene at `path` and prints the explanation on stdout; if `json` is set, as one JSON object. *usage: the
- * command line is wrong. */
-int explain_scene(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
+/* Reads the scene at `path` and prints the explanation on stdout; if `json` is set, as one JSON object.
+ * *is_usage_error: the command line is wrong. */
+int explain_scene(const char *path, struct render_arguments *a, bool json, bool *is_usage_error, struct error *e);
 
 #endif

@@ -72,7 +72,7 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const cha
 	}
 }
 
-/* Writes the part of the file before the text. */
+/* Writes the part of the file before the identity text. */
 static void pack_mark(const struct kept_bootstrap *k, unsigned char bytes[MARK_SIZE])
 {
 	memcpy(bytes, magic, sizeof magic);

@@ -39,11 +39,11 @@ struct kept_bootstrap {
 /* Returns a source that opens the files of `inner` and adds them to the checksum. k and inner must outlive it. */
 struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct asset_source *inner);
 
-/* Determines the path and the text. Call when the plan is known and the scene has been read. fingerprint: of this
- * program (worker/render/fingerprint.h). */
+/* Determines the path and the identity text. Call when the plan is known and the scene has been read. fingerprint: of
+ * this program (worker/render/fingerprint.h). */
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a);
-/* Adds the leases in the file, if there is one. identity_text: a message for the user, or "". */
+/* Adds the leases in the file, if there is one. text: a message for the user, or "". */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size);
 /* Writes the finished leases, if there are any, and sets k->message. */
 void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b);

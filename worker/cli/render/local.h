@@ -39,8 +39,9 @@ struct local_run {
 	/* Called after each complete round, from the calling thread while no lease runs. May set *stop: then the rounds
 	 * end, and `end` stays MERGE_CONTINUES. Its CPU time is not counted. May be NULL. */
 	void (*on_round)(void *user, const struct local_round *r);
-	/* resume is called before the bootstrap, to add leases that an earlier run kept; keep after a stop before the
-	 * first round was complete, to keep the finished leases. From the calling thread; may be NULL. */
+	/* load_bootstrap is called before the bootstrap, to add leases that an earlier run kept; save_bootstrap after a
+	 * stop before the first round was complete, to keep the finished leases. From the calling thread; may be NULL.
+	 */
 	int (*load_bootstrap)(void *user, struct bootstrap *b, struct error *e);
 	void (*save_bootstrap)(void *user, const struct bootstrap *b);
 	void *user;
@@ -62,7 +63,7 @@ int local_run(struct local_run *r, struct error *e);
  * was completed or stopped. The run must outlive the job.
  */
 struct local_job;
-int local_start(struct local_run *r, struct local_job **j, struct error *e);
+int local_start(struct local_run *r, struct local_job **out, struct error *e);
 int local_step(struct local_job *j, struct error *e); /* does nothing if the scene is black or *stop is set */
 void local_end(struct local_job *j);		      /* frees the job; run->canvas remains the caller's */
 

@@ -10,7 +10,7 @@
 #include "worker/cli/base/options.h"
 
 /* *speed: mutations or samples per second; 0: no light was found. The plan request in `a` must be complete. */
-int speed_measure(const struct render_arguments *a, const char *folder, const char *scene, double *speed,
+int speed_measure(const struct render_arguments *a, const char *folder, const char *name, double *speed,
 		  struct error *e);
 
 #endif

@@ -11,7 +11,7 @@
 struct reconnect {
 	const char *coordinator, *tls;
 	bool insecure;
-	double patience_seconds; /* how long to wait for a coordinator, s */
+	double patience_seconds; /* how long to wait for a coordinator */
 };
 
 /* Waits for the job's end and fetches its result, if there is one, into `output`. *cl may be another connection

@@ -243,8 +243,8 @@ static int send_chunk(struct client *cl, const struct scene_file *f, uint64_t of
 			   bytes, size, e);
 }
 
-/* Opens a file as when the scene was read, below the scene's folder or one source_files --path, and sends it only if it
- * still has the hash of that time. */
+/* Opens a file as when the scene was read, below the scene's folder or one of --path, and sends it only if it still has
+ * the hash of that time. */
 static int send_file(struct client *cl, const struct scene_files *files, const struct scene_file *f, struct error *e)
 {
 	struct asset_source folder = asset_source_for_folders(&files->folders);

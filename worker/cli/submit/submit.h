@@ -45,16 +45,16 @@ struct submit_request {
 /* Identifies a job of a coordinator. A new spool counts from 1 again, so the number alone could mean another job. */
 struct submitted_job {
 	uint64_t job;
-	double submitted_at; /* when it was submitted, s since 1970 by the coordinator's clock */
+	double submitted_at; /* s since 1970 by the coordinator's clock */
 };
 
 /* Sends a job and the files that the coordinator lacks. plan_text: the plan, and by which rules it was made. Returns
  * -EACCES, with the coordinator's sentence, if the job is refused. */
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *files,
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_files *source_files,
 		struct submitted_job *job, char *plan_text, size_t plan_size, struct error *e);
 
 struct submit_outcome {
-	uint32_t exit_code; /* exit code for a program that waits for the job */
+	uint32_t exit_code; /* for a program that waits for the job */
 	bool has_result;
 	char state[16];		       /* "done", "failed" or "cancelled" */
 	struct forecast_history looks; /* estimates of the error; their times count from the first round on */
