@@ -27,7 +27,7 @@ int agent_run(const struct agent_config *c, struct error *e);
 
 /* Like agent_run, in parts: an open agent works whenever its loop runs. */
 struct agent;
-int agent_open(struct agent **a, const struct agent_config *c, struct error *e);
+int agent_open(struct agent **out, const struct agent_config *c, struct error *e);
 void agent_close(struct agent *a); /* leaves at once, if it has not left; waits for the threads */
 /* Leaves, if the worker is leaving and nothing is left to do. */
 void agent_leave_if_idle(struct agent *a);

@@ -15,8 +15,8 @@ enum { IDLE_WORLDS_MAX = 2 /* number of scenes kept in memory for jobs without l
 /* The job whose scene may be in memory while only one scene may (scenes_kept_admit). Times are of clock_seconds. */
 struct scene_turn {
 	uint64_t job;
-	bool has_waiter;	/* another job waits for its turn */
-	double waiting_since;	/* since when another job has waited */
+	bool has_waiter; /* another job waits for its turn */
+	double waiting_since;
 	double last_refused_at; /* when a lease of another job was last refused */
 };
 
@@ -29,11 +29,11 @@ struct agent {
 	uv_signal_t sigterm_handle, sigint_handle;
 	uv_getaddrinfo_t resolve_request;
 	bool is_resolving;	/* the coordinator's name is being looked up */
-	unsigned attempt_count; /* number of connection attempts; selects one of the name's addresses in turn */
+	unsigned attempt_count; /* selects one of the name's addresses in turn */
 	struct tls *tls;	/* NULL: plaintext */
 	struct conn *conn;	/* NULL: not connected */
 	bool is_accepted;	/* the coordinator has accepted Hello */
-	double backoff_seconds; /* pause before the next attempt, s */
+	double backoff_seconds; /* pause before the next attempt */
 	char fingerprint[FINGERPRINT_MAX];
 	struct cache cache;
 	struct thread_pool *thread_pool;
@@ -41,9 +41,9 @@ struct agent {
 	struct fetch *fetches;
 	struct lease_task *leases;
 	struct scene_turn scene_turn;
-	uint64_t use_counter;		       /* counter of uses of job_caches */
+	uint64_t use_counter;		       /* counts uses of job_caches */
 	bool has_backlog;		       /* too many results wait to be acknowledged: no leases are requested */
-	uint64_t last_busy_ms;		       /* ms of the loop's clock: when the worker last had a lease */
+	uint64_t last_busy_ms;		       /* by the loop's clock: when the worker last had a lease */
 	bool has_watchdog;		       /* the service manager expects notifications */
 	bool is_leaving;		       /* no more leases are accepted */
 	bool has_left;			       /* Bye has been sent, and the handles are being closed */

@@ -24,8 +24,8 @@ enum job_cache_state {
 enum job_cache_files {
 	JOB_CACHE_FILES_COMPLETE,  /* all files are in the cache */
 	JOB_CACHE_FILE_MISSING,	   /* the file `wanted_file` must be fetched */
-	JOB_CACHE_FILE_BEING_READ, /* `wanted_file` is being read by libuv's pool: look again once reading.done has been
-				      called */
+	JOB_CACHE_FILE_BEING_READ, /* `wanted_file` is being read by libuv's pool: look again once reading.on_done has
+				      been called */
 };
 
 struct job_cache {
@@ -41,8 +41,8 @@ struct job_cache {
 	struct blob_hash wanted_file; /* while FETCHING: the file being waited for */
 	struct {
 		uv_work_t work;
-		struct blob_check *check;	     /* NULL: nothing is being read */
-		size_t file_index;		     /* index of the file */
+		struct blob_check *check; /* NULL: nothing is being read */
+		size_t file_index;
 		bool has_more;			     /* its end has not been reached */
 		bool has_failed;		     /* the file cannot be used and must be fetched */
 		const bool *stop_requested;	     /* set when the worker stops: ends the reading */
@@ -52,7 +52,7 @@ struct job_cache {
 	struct brightness *brightness_map; /* see render_brightness_map_new */
 	struct lease_key waiting_lease;	   /* one of the leases that wait for the world; job 0: none */
 	unsigned lease_count;		   /* number of leases that need the world */
-	uint64_t last_used;		   /* value of the counter of uses */
+	uint64_t last_used;		   /* value of agent.use_counter at the last use */
 	bool ended;			   /* the job has ended at the coordinator */
 	bool confirmed; /* on this connection, the coordinator has said that this number is still this job's */
 	double build_seconds;
@@ -65,7 +65,7 @@ struct job_cache {
 };
 
 struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL if none has this number */
-int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e); /* 0 or -ENOMEM */
+int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs, struct error *e); /* 0 or -ENOMEM */
 /* Must not be called while BUILDING, nor while a file is being read. */
 void job_cache_free(struct job_cache *b);
 
@@ -74,8 +74,8 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 /* Returns whether a description is that of this job: all but the bounds, which may have been changed, must be equal.
  * False also if memory is out. */
 bool job_cache_matches(const struct job_cache *b, const Farm__JobInfo *info);
-/* Holds the job's files that are in the cache, up to the first that is missing or must be read first. reading.stop and
- * reading.done must be set. */
+/* Holds the job's files that are in the cache, up to the first that is missing or must be read first.
+ * reading.stop_requested and reading.on_done must be set. */
 enum job_cache_files job_cache_check_files(struct job_cache *b, uv_loop_t *loop);
 /* Builds the world in the thread pool, after job_cache_check_files has returned JOB_CACHE_FILES_COMPLETE. Returns 0 or
  * -ENOMEM. */

@@ -11,8 +11,9 @@
 void send_message(struct agent *a, const Farm__Envelope *m); /* any message */
 void send_lease_request(struct agent *a);		     /* how many leases the worker wants to hold */
 void send_job_get(struct agent *a, uint64_t job);	     /* asks for the description of a job */
-/* Returns a lease as failed. With an empty text, nobody is blamed; own: this machine is at fault, not the job. */
-void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
+/* Returns a lease as failed. With an empty text, nobody is blamed; worker_at_fault: this machine is at fault, not the
+ * job. */
+void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool worker_at_fault);
 /* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator will offer it
  * again soon. */
 void send_lease_deferred(struct agent *a, const struct lease_key *k, const char *text);

@@ -23,7 +23,7 @@ struct supervisor {
 	pid_t child;
 	int forwarded_signal;  /* the last signal passed on to the process; 0: none */
 	bool has_lost_process; /* an earlier process has been lost, so a process that cannot start is tried again */
-	double pause_seconds;  /* pause before the next start, s */
+	double pause_seconds;  /* before the next start */
 };
 
 /* Under nohup SIGHUP is ignored, also by the rendering process; sigwaitinfo would receive it nevertheless. */

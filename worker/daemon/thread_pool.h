@@ -25,7 +25,7 @@ struct task {
 
 struct thread_pool;
 
-int thread_pool_new(struct thread_pool **c, uv_loop_t *loop, unsigned threads, struct error *e);
+int thread_pool_new(struct thread_pool **out, uv_loop_t *loop, unsigned threads, struct error *e);
 void thread_pool_add(struct thread_pool *c, struct task *t);
 /* Removes a task from the queue. Returns false if it has started. */
 bool thread_pool_remove(struct thread_pool *c, struct task *t);
