@@ -50,7 +50,7 @@ static double instructions_per_mutation(const char *bin, const char *options)
 
 static const struct {
 	const char *effect, *with_effect, *without_effect; /* scenes that call for the effect, and that do not */
-	bool can_be_forced_off;				   /* the effect can be forced off */
+	bool can_be_forced_off;
 } rows[] = {
 	{"colour", BOX COLOURED, BOX, false},
 	{"wavelength", BOX COLOURED, BOX, true},

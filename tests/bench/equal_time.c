@@ -94,7 +94,7 @@ enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, B
 
 struct shot {
 	struct canvas_image image;
-	double cpu_seconds, pilot_seconds; /* pilot: part of cpu */
+	double cpu_seconds, pilot_seconds; /* pilot_seconds: part of cpu_seconds */
 	char integrator[16];
 };
 
@@ -494,7 +494,7 @@ static void compare_methods(const struct world *w, const struct trial_scene *s, 
 			     "of the time", BENCH_NO_TARGET, 0);
 }
 
-/* Returns a whole number from the environment, between 1 and `most`, or the default. */
+/* Returns a whole number from the environment, between 1 and `max`, or the default. */
 static unsigned env_count(const char *name, unsigned fallback, unsigned max)
 {
 	const char *text = getenv(name);

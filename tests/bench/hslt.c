@@ -13,7 +13,7 @@
 /* Figures of the method's reference renderer on these scenes, measured in the same way. */
 struct reference {
 	const char *file;
-	double mutations, rays, failed_percent; /* failed: percentage of walks */
+	double mutations, rays, failed_percent;
 };
 static const struct reference references[] = {
 	{"three-spheres.xml", 25300, 5.2, 15.6},
@@ -28,9 +28,8 @@ static const struct reference references[] = {
 
 struct figures {
 	double seconds, mutations, rays, accepted;
-	double walks, failed_walks, occluded_walks, walks_back,
-		failed_walks_back; /* walks; occluded_walks: they arrived, but
-				    * an edge of the path is occluded */
+	/* occluded_walks: they arrived, but an edge of the path is occluded */
+	double walks, failed_walks, occluded_walks, walks_back, failed_walks_back;
 };
 
 static double sum_range(const uint64_t *n, unsigned first, unsigned last)

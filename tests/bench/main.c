@@ -109,7 +109,7 @@ void *bench_alloc(size_t count, size_t size)
 static const struct {
 	const char *name;
 	void (*run)(const char *bin);
-	bool only_when_named; /* runs only when named */
+	bool only_when_named;
 } benches[] = {
 	{"rays", bench_rays, false},	   {"hslt", bench_hslt, false},	      {"equal-time", bench_equal_time, true},
 	{"tiles", bench_tiles, false},	   {"parts", bench_parts, false},     {"farm", bench_farm, false},

@@ -30,8 +30,8 @@ void process_stop(struct process *p); /* sends SIGTERM and waits */
 bool process_is_running(const struct process *p);
 /* CPU seconds so far of a running process and its children. */
 double process_cpu_seconds(const struct process *p);
-double process_peak_bytes(const struct process *p, double *current); /* peak of resident memory; *now: the present
-								      * value, if not NULL */
+/* Returns the peak of resident memory. *current: the present value; may be NULL. */
+double process_peak_bytes(const struct process *p, double *current);
 
 double process_wall_seconds(void);
 

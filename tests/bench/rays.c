@@ -9,7 +9,7 @@
 
 #include <stdio.h>
 
-/* ratio: the least share of Embree's rate that is required; 0: none. The world stays the caller's. */
+/* min_share: the least share of Embree's rate that is required; 0: none. The world stays the caller's. */
 static void measure(struct world *w, const char *integrator, double min_share)
 {
 	struct subject s;

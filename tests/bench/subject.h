@@ -18,7 +18,7 @@ struct subject {
 	uint64_t *seeds;
 	struct recorded_ray *rays;
 	struct subject_embree *embree;
-	size_t ray_count; /* number of rays */
+	size_t ray_count;
 };
 
 /* Chooses samples per pixel or mutations per chain such that about 2^19 rays are traced. mutations: the mixture, for

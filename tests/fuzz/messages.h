@@ -24,20 +24,20 @@ struct step {
 
 size_t script_read(const uint8_t *bytes, size_t size, struct step steps[SCRIPT_STEPS]);
 /* Returns the size written; 0: it does not fit. */
-size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t room);
+size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t max_size);
 /* Appends a step; returns the new size, or the old one if the step does not fit. */
-size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload,
-		  size_t payload_size);
+size_t script_add(uint8_t *bytes, size_t size, size_t max_size, uint8_t speaker, const Farm__Envelope *m,
+		  const void *payload, size_t payload_size);
 
 /* For LLVMFuzzerCustomMutator: speakers are numbered below `speakers`. */
-size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, unsigned speakers);
+size_t script_mutate(uint8_t *bytes, size_t size, size_t max_size, unsigned seed, unsigned speakers);
 /* Like script_mutate(), for one packed Envelope. */
-size_t message_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed);
+size_t message_mutate(uint8_t *bytes, size_t size, size_t max_size, unsigned seed);
 
 /* Provided by libFuzzer. */
-size_t LLVMFuzzerMutate(uint8_t *bytes, size_t size, size_t room);
+size_t LLVMFuzzerMutate(uint8_t *bytes, size_t size, size_t max_size);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 int LLVMFuzzerInitialize(int *argc, char ***argv);
-size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigned seed);
+size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t max_size, unsigned seed);
 
 #endif

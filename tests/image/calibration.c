@@ -32,7 +32,7 @@ static const struct {
 	uint64_t spp; /* samples or mutations per pixel of the shortest renders */
 } integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128},  {"bdpt", 64}, {"erpt", 64},
 			      {"erpt4", 96}, {"pssmlt", 128}, {"hslt", 128}};
-/* time_factor: samples relative to the shortest length; time_fraction: the part of a scene's seconds that its reference
+/* times: samples relative to the shortest length; time_fraction: the part of a scene's seconds that its reference
  * takes. */
 static const struct {
 	uint64_t times;
@@ -114,7 +114,7 @@ static void add_image(const struct reference *r, const struct canvas_image *img,
 	f->values += VALUES;
 }
 
-/* What to measure, and the results: all[kind][integrator][length], of cases whose references are good enough. */
+/* What to measure, and the results: figures[kind][integrator][length], of cases whose references are good enough. */
 struct calibration {
 	uint32_t renders;
 	int last;

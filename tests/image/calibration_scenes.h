@@ -12,8 +12,8 @@ struct calibration_scene {
 	const char *kind, *name;   /* kind: tree, public, made */
 	const char *folder, *file; /* NULL: the scene is `xml` */
 	const char *xml;
-	const char *reference_integrator; /* the integrator that renders the reference */
-	double reference_seconds;	  /* approximate processor seconds of a reference */
+	const char *reference_integrator;
+	double reference_seconds; /* approximate processor time */
 };
 
 extern const struct calibration_scene calibration_scenes[]; /* ends with a NULL name */

@@ -30,7 +30,7 @@ struct process {
 	pid_t pid, parent;
 	char state; /* as in proc(5) */
 	char name[32];
-	double cpu_seconds; /* seconds: its own and those of its children that it waited for */
+	double cpu_seconds; /* its own and those of its children that it waited for */
 	bool is_descendant;
 };
 

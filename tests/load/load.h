@@ -25,9 +25,8 @@ enum load_behaviour {
 
 struct load_settings {
 	unsigned misbehaving[LOAD_BEHAVIOURS]; /* number of workers of each kind; LOAD_HONEST: all others */
-	unsigned workers, width, height, groups, parts, jobs; /* jobs: 0: as many as keep all workers busy */
-	double minutes, interval_seconds,
-		connections_per_second; /* interval_seconds: s between batches; connections_per_second: connections/s */
+	unsigned workers, width, height, groups, parts, jobs;	  /* jobs: 0: as many as keep all workers busy */
+	double minutes, interval_seconds, connections_per_second; /* interval_seconds: between batches */
 	double heartbeat_seconds;
 	unsigned leases_per_worker; /* leases that a worker holds: one in work, the others waiting */
 	bool insecure, only_losses; /* only_losses: only lost and wrong results are judged */
@@ -62,7 +61,7 @@ struct load_job {
 		unsigned char hash[32];
 		uint64_t size;
 	} file;
-	uint64_t *acknowledged_epochs; /* [slot]: epochs acknowledged so far; one out of order counts as disordered */
+	uint64_t *acknowledged_epochs; /* [slot]: epochs acknowledged so far; one out of order counts in out_of_order */
 };
 
 struct load {
@@ -84,7 +83,7 @@ struct load {
 	/* counted only while measuring */
 	uint64_t batches, bytes;
 	struct load_times grant_times, first_grant_times, ack_times, send_times, heartbeat_times, timer_delays;
-	char first_fault[256]; /* the first fault */
+	char first_fault[256];
 };
 
 double load_now(void);				      /* s */

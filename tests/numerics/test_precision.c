@@ -54,7 +54,7 @@ struct precision_case {
 	const char *name;
 	double index, alpha;
 	unsigned edges;
-	double max_error; /* allowed error of the program, in the logarithm of the acceptance ratio */
+	double max_error; /* of the program, in the logarithm of the acceptance ratio */
 };
 
 static const struct precision_case cases[] = {
@@ -69,7 +69,7 @@ static const struct precision_case cases[] = {
 };
 
 struct errors {
-	unsigned count, wrong_in_float; /* wrong: cases in which float's acceptance is off by more than 1 % */
+	unsigned count, wrong_in_float; /* wrong_in_float: cases in which float's acceptance is off by more than 1 % */
 	double max_program_error, max_double_error, in_float, *float_errors;
 };
 

@@ -16,7 +16,7 @@ enum {
 	QUEUE_MAX = 64,
 	MESSAGES_MAX = 1 << 14,
 	SIM_STEPS_MAX = 400000,
-	HOARDED_THREADS = 4096 /* number of threads that a hoarding worker claims to have */
+	HOARDED_THREADS = 4096 /* threads that a hoarding worker claims to have */
 };
 
 enum sim_message_kind {

@@ -8,7 +8,7 @@
 struct agreement_case {
 	const char *topic, *name;
 	struct world *(*build)(const struct agreement_case *k); /* the caller frees it */
-	double a, b;						/* arguments of make */
+	double a, b;						/* arguments of build */
 	uint32_t max_depth;
 	uint64_t path_spp, spp; /* samples per pixel: of `path`, of the other integrators */
 	const char *integrators[4];

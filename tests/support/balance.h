@@ -24,8 +24,8 @@ struct balance_trial {
 	const struct mutation_ops *ops;
 	struct mutation_forced_choice setting;
 	enum balance_side side;
-	unsigned proposals_per_start; /* number of proposals from each start */
-	bool is_broken;		      /* a deliberately broken mutation: paths are not checked */
+	unsigned proposals_per_start;
+	bool is_broken; /* a deliberately broken mutation: paths are not checked */
 	uint64_t pairs, accepted, counters[STRATEGY_COUNTERS];
 	double acceptance_sum; /* sum of the acceptance probabilities a */
 	double phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS],

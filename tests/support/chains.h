@@ -20,7 +20,7 @@ struct chains_result {
 	uint64_t invalid_film_values; /* number of film values that are not finite, or below 0 */
 	uint64_t heaviest_index;      /* index of the bootstrap's largest weight */
 	double heaviest_share;	      /* its fraction of the sum of all weights */
-	double normalization, mean;   /* mean: of X + Y + Z over the film, in units of b */
+	double normalization, mean;   /* mean: of X + Y + Z over the film, in units of `normalization` */
 	double quarter_means[4];
 	float *xyz; /* the film, allocated with malloc() */
 };

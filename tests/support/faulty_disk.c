@@ -35,8 +35,7 @@ struct entry {
 	struct faulty_disk_node *node;
 };
 
-/* A change to a folder since its last flush: the name `gone` was removed, the name `made` was added (either may be
- * NULL). */
+/* A change to a folder since its last flush: `old_name` was removed, `new_name` was added (either may be NULL). */
 struct renaming {
 	struct renaming *next;
 	char *old_name, *new_name;
@@ -45,8 +44,8 @@ struct renaming {
 
 struct faulty_disk_node {
 	bool is_folder;
-	char last_component[64];   /* last component of its first name */
-	unsigned char *safe_bytes; /* for a file: the safe bytes */
+	char last_component[64];   /* of its first name */
+	unsigned char *safe_bytes; /* for a file */
 	uint64_t safe_size;
 	struct change *changes, **changes_tail;
 	struct entry *current_names, *safe_names; /* for a folder: its names */

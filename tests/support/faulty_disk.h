@@ -37,10 +37,10 @@ struct faulty_disk_options {
 	uint64_t seed;
 	uint64_t power_loss_at;	     /* power is lost before this modifying call, counted from 1; 0: never */
 	uint64_t first_failing_call; /* calls fail from this one on, counting all calls; 0: none fails */
-	uint64_t failing_call_count; /* number of calls that fail */
-	int failure_errno;	     /* errno */
-	uint64_t power_loss_after;   /* power is lost this many modifying calls after the first failed call; 0: not */
-	bool fail_writes_only;	     /* as on a disk that is full or read-only: reading and removing still work */
+	uint64_t failing_call_count;
+	int failure_errno;
+	uint64_t power_loss_after; /* power is lost this many modifying calls after the first failed call; 0: not */
+	bool fail_writes_only;	   /* as on a disk that is full or read-only: reading and removing still work */
 	enum faulty_disk_forget forget;
 	const char *forget_name; /* only for files or folders whose last path component is this; NULL: for all */
 	/* Shared with the parent process; may be NULL. [0]: modifying calls; [1]: all calls; [2]: failed calls; [3]:

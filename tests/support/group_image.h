@@ -17,7 +17,7 @@ struct plan group_image_plan(enum plan_kind kind, uint32_t width, uint32_t heigh
 /* Returns the value of a pixel in a group; called once for each, in order. */
 typedef double group_image_value(void *user, uint32_t group, uint32_t pixel);
 
-/* Makes an image of one round in which pixel i of group g has the value of(user, g, i) in all channels.
+/* Makes an image of one round in which pixel i of group g has value(user, g, i) in all channels.
  * canvas_image_fini frees it. */
 void group_image_make(const struct plan *p, group_image_value *value, void *user, struct canvas_image *img);
 /* blue: an additional value for the blue channel, or NULL. */

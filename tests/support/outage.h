@@ -28,13 +28,13 @@ struct outage_run {
 	struct plan plan;
 	struct plan_request request;
 	pid_t pid;
-	int exit_code; /* exit code */
+	int exit_code;
 	uint16_t port;
 	struct outage_job jobs[OUTAGE_JOBS_MAX];
 	uint64_t accepted_jobs;
 	struct scripted_peer *client, *worker;
 	uint64_t power_losses, acks, refusals, failed_jobs;
-	bool has_failing_calls; /* calls fail: a request refused with a message is repeated */
+	bool has_failing_calls; /* a request refused with a message is repeated */
 };
 
 struct outage_findings {
@@ -49,8 +49,8 @@ extern struct outage {
 	bool accept_loss;		  /* --accept-loss */
 	uint64_t journal_bytes;		  /* --journal; 0: a checkpoint after every result or two */
 	uint64_t undisturbed_calls;	  /* number of modifying calls in an undisturbed run */
-	char run_name[64];		  /* the name of the current run, or "" */
-	char spool[80];			  /* the spool's path */
+	char run_name[64];		  /* of the current run, or "" */
+	char spool[80];			  /* its path */
 } outage;
 
 void outage_begin(struct outage_run *f, uint64_t seed); /* begins with an empty spool */

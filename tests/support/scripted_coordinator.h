@@ -22,7 +22,7 @@ struct coord_state {
 	struct agent *agent;
 	int listener;
 	char address[32];
-	struct scripted_peer *connection; /* the connection, from the coordinator's side */
+	struct scripted_peer *connection; /* from the coordinator's side */
 	struct coord_file mesh, scenes[4];
 	unsigned char mesh_bytes[COORD_MESH_BYTES];
 	bool failed_own; /* of the last LeaseFailed */
@@ -31,7 +31,7 @@ extern struct coord_state coord;
 
 void coord_make_file(struct coord_file *f, const void *bytes, size_t size);
 
-/* Starts both; the worker's cache is in `folder` (folder.h). */
+/* Starts both; the worker's cache is in `folder` (temporary_folder.h). */
 void coord_start(uint64_t cache_bytes);
 void coord_stop(void);
 void coord_accept_worker(void); /* accepts a connection of the worker */
@@ -52,7 +52,7 @@ void coord_send_revoke(uint64_t job);
 void coord_send_job_info(uint64_t job);
 void coord_send_job_end(uint64_t job);
 void coord_send_piece(struct coord_file *f, uint64_t offset);
-/* Sends pieces from .. to - 1 of the mesh, each after the worker has asked for it. */
+/* Sends pieces first .. end - 1 of the mesh, each after the worker has asked for it. */
 void coord_serve_mesh(int first, int end);
 /* Grants one lease each of jobs 1 to count, and sends their scene files. The worker then asks for the mesh once. */
 void coord_begin_jobs(uint64_t count);

@@ -11,7 +11,7 @@
 
 enum { STARTS_EDGES_MAX = 8 };
 
-struct start { /* technique s of pair `index` of sub-paths */
+struct start { /* `technique` of pair `index` of sub-paths */
 	uint64_t index;
 	unsigned technique, passed_count;
 	double cumulative; /* sum of the contributions up to this one */
@@ -23,7 +23,7 @@ struct starts {
 	struct {
 		struct start *items;
 		size_t count, capacity;
-	} by_edges[STARTS_EDGES_MAX + 1]; /* by number of edges */
+	} by_edges[STARTS_EDGES_MAX + 1];
 	uint64_t pairs;
 };
 

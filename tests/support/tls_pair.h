@@ -34,7 +34,7 @@ extern struct tls_pair_end tls_pair_caller, tls_pair_listener;
 void tls_pair_end_open(struct tls_pair_end *x, const char *folder, bool listening);
 void tls_pair_end_close(struct tls_pair_end *x);
 void tls_pair_end_read(struct tls_pair_end *x);
-/* Passes the output of `from` to `to`, `piece` bytes at a time. Returns false if there was none. */
+/* Passes the output of `source` to `target`, `piece` bytes at a time. Returns false if there was none. */
 bool tls_pair_carry(struct tls_pair_end *source, struct tls_pair_end *target, size_t piece);
 /* Opens both ends and carries until neither has anything to send. */
 void tls_pair_handshake(const char *caller_folder, const char *listener_folder, size_t piece);

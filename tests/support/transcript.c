@@ -290,8 +290,8 @@ static void parse_worker(const char **cursor, struct event *ev, char *name, char
 	}
 }
 
-/* Parses restore [is_requested] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of
- * submit]. */
+/* Parses restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit].
+ */
 static void parse_restore(const char **cursor, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
 			  const struct forecast_history *history, char owner[WORD_BYTES])
 {

@@ -36,8 +36,9 @@ static void estimated_error_covers_the_truth(void **unused)
 		double deviation = 0.08, truth = 0, mean_estimate = 0;
 		int covered_count = 0;
 		enum { RUNS = 400 };
-		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, equal in X, Y and Z
-		 * when correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
+		/* The mean of 16 groups has a variance of deviation^2/16 per pixel, relative to B = 1, equal in X, Y
+		 * and Z when correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs.
+		 */
 		for (int run = 0; run < RUNS; run++) {
 			struct canvas *c;
 			struct canvas_image img;

@@ -131,8 +131,8 @@ static double realised_error(const struct canvas_image *img, truth_of *truth)
 }
 
 struct interval_minimum {
-	double known_share, held_share; /* known: share of the pictures with a known interval; held: share of these
-					 * intervals that hold */
+	double known_share; /* of the pictures: those with a known interval */
+	double held_share;  /* of these intervals: those that hold */
 };
 
 /* fault: factor by which planted estimates are too small. */
@@ -181,7 +181,8 @@ static void error_intervals_hold(void **state)
 
 struct gold {
 	struct dice dice;
-	double max_blue, noise; /* blue ranges from -most to most, with this noise in a group; the floor is 1 / 150 */
+	/* Blue ranges from -max_blue to max_blue, with this noise in a group; the floor is 1 / 150. */
+	double max_blue, noise;
 };
 
 /* Blue values in another order than the pixels'. */

@@ -34,8 +34,8 @@ static double rare_light(void *user, uint32_t group, uint32_t pixel)
 	return 1 + 0.02 * dice_normal(&r->d) + dice_poisson(&r->d, r->hits_per_group) / r->hits_per_group;
 }
 
-/* Over 50 pictures, from column `first` on: *beyond is the share of values more than three errors from the truth,
- * *ratio the mean squared error over the mean squared deviation. */
+/* Over 50 pictures, from column `first` on: *outlier_share is the share of values more than three errors from the
+ * truth, *ratio the mean squared error over the mean squared deviation. */
 static void compare_with_truth(group_image_value *value, struct rare_light_model *r, double truth, uint32_t first,
 			       double *outlier_share, double *ratio)
 {

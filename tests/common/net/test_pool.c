@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-static int created_count, allowed_count; /* threads created in a test, and the first that is refused */
+static int created_count, allowed_count; /* threads created in a test, and those before the first that is refused */
 
 int __real_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);
 int __wrap_uv_thread_create(uv_thread_t *thread, uv_thread_cb run, void *arg);

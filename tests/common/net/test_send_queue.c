@@ -25,7 +25,7 @@
 enum {
 	LIMIT = 1 << 20,
 	KERNEL_BUFFER = 1 << 16,
-	LARGE = 4 << 20 /* more than the kernel takes at once, which is 2 x KERNEL */
+	LARGE = 4 << 20 /* more than the kernel takes at once, which is 2 x KERNEL_BUFFER */
 };
 
 static uv_loop_t loop;

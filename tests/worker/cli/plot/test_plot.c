@@ -22,7 +22,7 @@
 
 /* The contents of an SVG, as read by an XML parser in this test. */
 struct content {
-	char text[4096]; /* of <on_text> elements, separated by bars */
+	char text[4096]; /* of <text> elements, separated by bars */
 	size_t text_size, use_count, script_count;
 	double use_x[64], use_y[64];
 	bool in_text;

@@ -286,8 +286,8 @@ static void test_below_the_horizon(void **state)
 	arena_fini(&a);
 }
 
-/* The parameters that scale sky and sun: in 0.6, `world_scale` is a default, and the only scale of `sky` and `sun`;
- * in 3.x, it is a further factor. */
+/* The parameters that scale sky and sun: in 0.6, `scale` is a default, and the only scale of `sky` and `sun`; in 3.x,
+ * it is a further factor. */
 static void test_scales(void **state)
 {
 	(void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Merging with a photon placed exactly where the camera's sub-path ends: the contribution found by bdpt and
- * `path_contribution` must be f divided by the densities of the full path, multiplied out vertex by vertex. And the
- * light of a room by merging, against `path_contribution`.
+ * Merging with a photon placed exactly where the camera's sub-path ends: the contribution found by bdpt and `path` must
+ * be f divided by the densities of the full path, multiplied out vertex by vertex. And the light of a room by merging,
+ * against `path`.
  */
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -144,7 +144,7 @@ static void test_densities(void **state)
 	assert_true(check_densities("glass",
 				    world_from_text(32, 32, ROOM ROUND_LAMP BALL("<bsdf type='dielectric'/>") "%s", ""),
 				    3000) > 3000);
-	/* `path_contribution` finds all of the light from the point behind the ball by refracted connections. */
+	/* `path` finds all of the light from the point behind the ball by refracted connections. */
 	assert_true(
 		check_densities("glass and a point",
 				world_from_text(32, 32,
