@@ -16,7 +16,7 @@ struct accuracy_job {
 	struct local_job *job;
 	size_t cost_count;
 	double costs[ACCURACY_COSTS_MAX]; /* CPU seconds per mutation, of each round */
-	double cpu_seconds;		  /* CPU seconds of all rounds */
+	double cpu_seconds;		  /* of all rounds */
 };
 
 struct accuracy_run {

@@ -37,14 +37,14 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 
 unsigned option_threads_default(void); /* the number of processors */
 
-/* Functions for option_row.take, which fill a struct render_arguments; -EINVAL with a sentence is a usage error. */
+/* Functions for option_row.parse, which fill a struct render_arguments; -EINVAL with a sentence is a usage error. */
 
 /* Takes the image to write, which is OpenEXR; the extension of another format is an error. "-" is /dev/stdout. */
 int option_image(void *target, char *arg, struct error *e);
 int option_path(void *target, char *arg, struct error *e);   /* a folder of --path, which must exist */
 int option_define(void *target, char *arg, struct error *e); /* NAME=VALUE of -D, split in place */
 
-/* program.word of a program that takes one scene. */
+/* parse_word of a program that takes one scene. */
 int option_scene(void *target, size_t index, char *word, struct error *e);
 
 /* Like render_scene_read; also turns a sensor that was given by its id into a number in the settings. */
