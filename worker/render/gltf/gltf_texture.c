@@ -117,7 +117,7 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_add_plugin(g, el, &texture, "texture", unsupported_format(&texture), name);
 		return;
 	}
-	/* The exporter lost the image, or it belongs to an unknown extension: refused, or left out with `lenient`. */
+	/* The exporter lost the image, or it belongs to an unknown extension: refused, or left out with --lenient. */
 	if (found <= 0) {
 		gltf_add_plugin(g, el, &texture, "texture", "unknown_format", name);
 		return;

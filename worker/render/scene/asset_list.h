@@ -10,7 +10,7 @@
 struct asset_use {
 	const char *name;
 	const struct xml_element *element; /* the element that names the file; NULL: none */
-	size_t index;			   /* index in order of appearance */
+	size_t index;			   /* in order of appearance */
 };
 
 struct asset_list {
