@@ -68,12 +68,12 @@ struct sim_job {
 	double verify;
 	uint32_t answered_by[SLOTS];	 /* by slot: bits of the workers whose answers the core has noted */
 	bool held[JOB_HOLD_COUNT], done; /* done: it has ended successfully, and may be extended */
-	double elapsed_seconds;		 /* seconds at its end */
+	double elapsed_seconds;		 /* at its end */
 	double cancel_at, lease_seconds, error_scale;
 	uint64_t next[SLOTS], state[SLOTS], bootstrap_slots;
 	uint64_t round_sum[ROUNDS];
 	uint64_t rounds;	  /* number of complete rounds, counted here */
-	double completed_seconds; /* seconds from its first lease to its last complete round */
+	double completed_seconds; /* from its first lease to its last complete round */
 	char fingerprint[2];	  /* of the workers whose results are merged */
 	double last_progress;
 };

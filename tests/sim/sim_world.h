@@ -3,8 +3,8 @@
  * A farm in virtual time around the real core. Its workers compute, crash, hang, come back, fail, send damaged or wrong
  * results, send results without a lease, or hoard leases without answering. Its network drops, repeats, delays and
  * reorders messages. Its coordinator dies and remembers what is merged. Its jobs have priorities and bounds; some are
- * cancelled, held, or extended while they run or after they are done. Everything follows from one seed. After `calm`
- * seconds the trouble ends, and then every job must end, too.
+ * cancelled, held, or extended while they run or after they are done. Everything follows from one seed. After
+ * `calm_from` seconds the trouble ends, and then every job must end, too.
  *
  * The result of a lease is a number computed from its key and from the result of the previous epoch, as a chain state
  * is, so an epoch that is merged out of order or from a wrong state shows in the sums. The following is checked

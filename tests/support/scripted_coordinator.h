@@ -31,7 +31,7 @@ extern struct coord_state coord;
 
 void coord_make_file(struct coord_file *f, const void *bytes, size_t size);
 
-/* Starts both; the worker's cache is in `folder` (temporary_folder.h). */
+/* Starts both; the worker's cache is in `temporary_folder`. */
 void coord_start(uint64_t cache_bytes);
 void coord_stop(void);
 void coord_accept_worker(void); /* accepts a connection of the worker */

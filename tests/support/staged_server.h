@@ -18,8 +18,8 @@ enum { STAGED_TWO_TICKS_US = 500000 }; /* the length of two ticks of the coordin
 struct staged_disk {
 	/* hold_checkpoint: the next checkpoint waits before it is renamed to its name, until release_checkpoint. */
 	_Atomic bool hold_checkpoint, checkpoint_held, release_checkpoint;
-	_Atomic bool fail_folder_flush;	  /* the flush of its folder then fails */
-	_Atomic bool fail_ledger_writes;  /* writes to the ledger fail */
+	_Atomic bool fail_folder_flush; /* the flush of its folder then fails */
+	_Atomic bool fail_ledger_writes;
 	_Atomic unsigned refused_commits; /* number of failed writes to the ledger */
 	_Atomic bool no_journal_room;	  /* there is no room for the copy of a journal */
 	/* hold_flush: the next flush of a journal waits until release_flush. */

@@ -51,7 +51,7 @@ struct stationary_result {
 	int worst_function;	       /* the function that differs most */
 	double p;		       /* p of that function, times the number of functions */
 	double accepted_share;	       /* accepted mutations as a fraction of accepted mutations and starts */
-	double cpu_seconds;	       /* CPU */
+	double cpu_seconds;
 };
 
 /* Call before runs on paths of given lengths: otherwise the bootstrap's roulette would leave few long paths. */

@@ -26,7 +26,7 @@ struct tls_pair_end {
 	struct tls_link *link;
 	struct error e;
 	int rc;
-	unsigned char received[1 << 17]; /* bytes received */
+	unsigned char received[1 << 17];
 	size_t received_size;
 };
 extern struct tls_pair_end tls_pair_caller, tls_pair_listener;

@@ -72,7 +72,7 @@ static void add_batch(struct canvas *c, struct batch *b)
 	batch_fini(b);
 }
 
-/* Simulates where a chain is: it draws a tile, or none, and stays there for `stay` mutations. */
+/* Simulates where a chain is: it draws a tile, or none, and stays there for a number of mutations. */
 static const double tile_probability[TILES] = {0.3, 0.05, 0.1, 0, 0.25, 0.2};
 
 static uint32_t draw_tile(struct dice *d)
