@@ -121,7 +121,8 @@ static int open_output(void)
 	return fd >= 0 ? fd : STDERR_FILENO;
 }
 
-/* Writes one line. Returns false if it was dropped; otherwise *before is the number of lines dropped just before. */
+/* Writes one line. Returns false if it was dropped; otherwise *dropped_before is the number of lines dropped just
+ * before. */
 static bool write_or_drop(const char *line, size_t size, uint64_t *dropped_before)
 {
 	pthread_mutex_lock(&output_lock);

@@ -71,7 +71,7 @@ enum log_event {
 enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERROR };
 
 /* Suppresses events below this level. The default is INFO. */
-void log_set_level(enum log_level least);
+void log_set_level(enum log_level level);
 
 /* Writes one line. `fields` is a format such as "job=j%llu name=%s"; text from outside must go through log_quote. A
  * line has at most 2,047 bytes. Returns false if the rate limit of its kind suppressed it (see log_report_withheld). */

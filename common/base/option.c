@@ -3,8 +3,9 @@
  * Parses a command line by a program's tables.
  *
  * Happy path: defaults and environment variables are stored by the same function as arguments (store_argument). Then
- * argv is scanned once (parse_arguments): each option is looked up among all rows (find), its argument is checked by
- * its kind and stored in the struct that its table fills. Checks that involve several options come last (check).
+ * argv is scanned once (parse_arguments): each option is looked up among all rows (find_option), its argument is
+ * checked by its kind and stored in the struct that its table fills. Checks that involve several options come last
+ * (run_checks).
  *
  * Failures: one sentence in struct error and -EINVAL. For an unknown name, the sentence suggests the nearest known one.
  */
@@ -61,8 +62,8 @@ const struct option_row *option_row_at(const struct program *p, size_t i, const 
 
 /* ---- arguments ---- */
 
-/* Sets the error "--NAME takes WHAT RANGE MORE, not 'ARG'", where RANGE is such as "of at least 0 and below 1" or "from
- * 1 to 1024". A count without an upper bound of its own must still fit into 64 bits. */
+/* Sets the error "--NAME takes KIND RANGE SUFFIX, not 'ARG'", where RANGE is such as "of at least 0 and below 1" or
+ * "from 1 to 1024". A count without an upper bound of its own must still fit into 64 bits. */
 static int refuse_out_of_range(const struct option_row *r, const char *kind, const char *suffix, const char *arg,
 			       struct error *e)
 {

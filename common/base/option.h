@@ -23,7 +23,7 @@ enum option_kind {
 	OPTION_KIND_TEXT,   /* any text; points into argv */
 	OPTION_KIND_OUTPUT, /* the path of an output file, like a text, but "-" becomes /dev/stdout */
 	OPTION_KIND_NAME,   /* a text to be displayed: 1 to `max` bytes of UTF-8 without control characters */
-	OPTION_KIND_NUMBER, /* a floating point number from least to most */
+	OPTION_KIND_NUMBER, /* a floating point number from `min` to `max` */
 	OPTION_KIND_COUNT,  /* a whole number: 4000, 1.5k */
 	OPTION_KIND_SIZE,   /* a number of `unit` bytes, or 500k, 64M, 20G, 2T; stored in bytes */
 	OPTION_KIND_TIME,   /* a number of `unit` seconds, or 90s, 5m, 2h, 3d; stored in seconds */
@@ -58,8 +58,8 @@ struct option_row {
 	const char *environment;	 /* environment variable used if the option is not given; NULL: none */
 	option_values *values;		 /* the only accepted arguments; NULL: any */
 	int (*parse)(void *target, char *arg, struct error *e); /* arg may be changed; may be NULL */
-	void (*append_default)(char *text,
-			       size_t size); /* appends a default known only at run time to the help; NULL: none */
+	/* appends a default known only at run time to the help; NULL: none */
+	void (*append_default)(char *text, size_t size);
 };
 
 #define OPTION_FIELD(type, field) \
@@ -108,9 +108,9 @@ struct program {
 	const char *details;	/* further text */
 	const char *exit_codes; /* "0 done, 1 failed, 2 usage" */
 	struct option_table options;
-	const struct option_table
-		*shared_options; /* options of several programs: fill the struct's first member; NULL: none */
-	option_values *verbs;	 /* accepted first words; NULL: any */
+	/* options of several programs: fill the struct's first member; NULL: none */
+	const struct option_table *shared_options;
+	option_values *verbs; /* accepted first words; NULL: any */
 	/* Called with the index-th word that is not an option; NULL: such words are errors. */
 	int (*parse_word)(void *target, size_t index, char *word, struct error *e);
 };
@@ -119,9 +119,9 @@ struct program {
 int option_set_defaults(const struct option_table *t, void *target, struct error *e);
 
 /* Stores the defaults, then reads the environment and the command line, then runs the checks. Returns -EINVAL with a
- * sentence for the user after a usage error. If an option that every program has was given, *asked is its kind and the
- * words after it have not been parsed; otherwise *asked is OPTION_KIND_END. */
-int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
+ * sentence for the user after a usage error. If an option that every program has was given, *requested is its kind and
+ * the words after it have not been parsed; otherwise *requested is OPTION_KIND_END. */
+int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *requested,
 		  struct error *e);
 
 /* Returns the i-th row of a program, NULL after the last: its own rows, the shared ones, then those that every program

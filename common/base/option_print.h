@@ -10,6 +10,6 @@
 
 #include <stdio.h>
 
-void option_print(const struct program *p, enum option_kind what, FILE *out);
+void option_print(const struct program *p, enum option_kind request, FILE *out);
 
 #endif

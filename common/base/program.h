@@ -12,7 +12,7 @@
  * error is printed and exit code 0 becomes 1. */
 void program_parse_options(const struct program *p, int argc, char **argv, void *target);
 
-/* option_row.take of --verbose: shows debug events in the log. */
+/* option_row.parse of --verbose: shows debug events in the log. */
 int program_parse_verbose(void *target, char *arg, struct error *e);
 
 #endif

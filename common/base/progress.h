@@ -9,8 +9,8 @@
 #include <stddef.h>
 
 struct progress {
-	bool is_terminal;	     /* stderr is a terminal that can redraw a line */
-	bool is_bar_drawn;	     /* a bar has been drawn */
+	bool is_terminal; /* stderr is a terminal that can redraw a line */
+	bool is_bar_drawn;
 	double printed_fraction;     /* fraction in the last plain line; negative: none yet */
 	double printed_time;	     /* when the last plain line was written, s */
 	char printed_state[32];	     /* state in the last plain line */
@@ -21,7 +21,7 @@ struct progress {
 void progress_begin(struct progress *p);
 /* Shows a fraction in [0,1], the state (one word), and a text after the bar. */
 void progress_show(struct progress *p, double fraction, const char *state, const char *detail);
-/* Returns the largest fraction passed since `printed_state` last changed. If the total is only an estimate, the
+/* Returns the largest fraction passed since `state` last changed. If the total is only an estimate, the
  * fraction done falls when the estimate grows; a bar that goes backwards would confuse, and the remaining time shows
  * the change. */
 double progress_max_fraction(struct progress *p, double fraction, const char *state);
