@@ -20,7 +20,7 @@ struct blob_entry;
 /* Opens a store: creates the folder if necessary, removes temporary files of earlier runs, and lists the blobs. limit:
  * most bytes of all blobs; 0: none. Blobs beyond the limit are not evicted yet. Returns 0, -ENOMEM, or -errno if the
  * folder or a file in it cannot be read. */
-int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, struct error *e);
+int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit, struct error *e);
 void blob_store_close(struct blob_store *s);
 /* Evicts the least recently used blob that is not held, to make room on the disk; false if there is none. */
 bool blob_store_evict(struct blob_store *s);
@@ -64,7 +64,7 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
  * them is added, and the caller may try again); -EMSGSIZE for more bytes than announced, or an announced size above the
  * limit; -EBADMSG if the hash does not match the name; -errno of the disk. */
 struct blob_writer;
-int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,
+int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e);
 uint64_t blob_write_offset(const struct blob_writer *w); /* bytes written so far */
 void blob_write_pause(struct blob_writer *w);		 /* closes the file until more is added */
@@ -76,7 +76,7 @@ void blob_write_abort(struct blob_writer *w);
  * as missing, so that nothing is evicted under its name. Paths may be asked for on any thread. */
 struct blob_deferred {
 	struct blob_hash hash;
-	uint64_t size, temp_number; /* temp_number: of the temporary file */
+	uint64_t size, temp_number; /* size of the blob; number of the temporary file */
 };
 
 void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);

@@ -17,7 +17,7 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
  * true; each call reads some megabytes. blob_check_end returns the result and frees the check; if it is called early,
  * the result is -ECANCELED and nothing is known. The blob is held in the meantime. */
 struct blob_check;
-int blob_check_begin(struct blob_check **c, struct blob_store *s, const struct blob_hash *h, double seconds,
+int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct blob_hash *h, double seconds,
 		     struct error *e);
 bool blob_is_being_checked(struct blob_store *s, const struct blob_hash *h); /* a check has begun and not ended */
 bool blob_check_read(struct blob_check *c);

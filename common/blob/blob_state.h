@@ -16,24 +16,24 @@ enum { BLOB_PATH_MAX = 4096 };
 struct blob_entry {
 	TAILQ_ENTRY(blob_entry) order; /* position in the list of idle blobs */
 	struct blob_hash hash;
-	uint64_t size;	      /* 0 while the blob is missing */
-	unsigned hold_count;  /* number of holds */
-	unsigned check_count; /* number of checks that have begun and not ended */
+	uint64_t size; /* 0 while the blob is missing */
+	unsigned hold_count;
+	unsigned check_count; /* checks that have begun and not ended */
 	double check_time; /* when the contents were last verified, s of the monotonic clock; 0: not since the start */
 	bool opened_since_check; /* opened since then, so the file may have been changed */
-	bool is_missing;	 /* missing: the file does not exist or is damaged. Holds are kept */
+	bool is_missing;	 /* the file does not exist or is damaged; holds are kept */
 };
 
 struct blob_store {
 	char *folder;
 	uint64_t max_bytes, bytes;		 /* most bytes (0: no limit), and bytes of all complete blobs */
 	TAILQ_HEAD(blob_order, blob_entry) idle; /* present and not held, the least recently used first */
-	uint64_t idle_bytes;			 /* bytes of the idle blobs */
-	size_t evicted_count;			 /* entries of evicted blobs since the last sweep */
-	uint64_t partial_bytes;			 /* bytes received of blobs that are being written */
-	uint64_t last_temp_number;		 /* number of the last temporary file */
-	struct blob_entry *
-		*entries; /* sorted by hash; pointers, since there may be a million and inserting moves them */
+	uint64_t idle_bytes;
+	size_t evicted_count;	   /* entries of evicted blobs since the last sweep */
+	uint64_t partial_bytes;	   /* bytes received of blobs that are being written */
+	uint64_t last_temp_number; /* number of the last temporary file */
+	/* sorted by hash; pointers, since there may be a million and inserting moves them */
+	struct blob_entry **entries;
 	bool (*free_space)(void *user); /* see blob_store_set_full_handler; NULL: not set */
 	void *user;
 	size_t count, capacity; /* of the entries */
