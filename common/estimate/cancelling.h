@@ -13,7 +13,7 @@
 /* Returns whether colours cancel in channel k of the pixel. */
 bool channel_is_cancelling(const struct tile_error *t, size_t pixel, size_t k);
 
-/* Sets t->cancelling_spread from the pixels and channels that are marked in t->cancels. */
+/* Sets t->cancelling_spread from the pixels and channels that are marked in t->is_cancelling. */
 void cancelling_find_spread(struct tile_error *t);
 
 /* Returns the moments of 1 / (B^2 + floor^2) over the brightnesses B that the channel may have. */

@@ -33,21 +33,21 @@ enum { FOLDED_GROUPS = ERROR_GROUPS_FOLDED, VALUES_MAX = 3 * PLAN_GROUPS_MAX };
 static const double one_group_kurtosis_16 = 9.6, highlight_errors_16 = 1.5;
 
 /* The tail index of errors is the smaller of two estimates, from the largest 1 / TAIL_DIVISOR of the errors and from
- * the largest 1 / (TAIL * EXTREME_DIVISOR), but from at least 32 and 8 errors; worker/render/choose.h uses the same
- * shares for samples. With fewer than ERRORS_MIN errors in all, these would not be the tail but the bulk, and no index
- * is estimated. */
+ * the largest 1 / (TAIL_DIVISOR * EXTREME_DIVISOR), but from at least 32 and 8 errors; worker/render/choose.h uses the
+ * same shares for samples. With fewer than ERRORS_MIN errors in all, these would not be the tail but the bulk, and no
+ * index is estimated. */
 enum { TAIL_DIVISOR = 128, TAIL_SIZE_MIN = 32, TAIL_SIZE_MAX = 1 << 16, EXTREME_DIVISOR = 4, ERRORS_MIN = 2048 };
 
 /* ---- weights: 1 / (B^2 + floor), with an estimate of B that is as little noisy as possible */
 
-/* A square of pixels: sums over all its pixels (all...) and over the waiting ones (open...), whose brightness is not
- * settled yet. */
+/* A square of pixels: sums over all its pixels and over the waiting ones (waiting_...), whose brightness is not settled
+ * yet. */
 struct pixel_block {
 	uint32_t pixel_count, waiting_count[3];	 /* numbers of pixels; waiting ones by channel */
 	double sum[3], waiting_sum[3];		 /* sums of the brightness */
 	double rare_sum[3], waiting_rare_sum[3]; /* sums of the brightness minus the base (tile_error.h) */
-	double deviation_sum[VALUES_MAX],
-		waiting_deviation_sum[VALUES_MAX]; /* sums of the groups' deviations, [3][groups] */
+	/* sums of the groups' deviations, [3][groups] */
+	double deviation_sum[VALUES_MAX], waiting_deviation_sum[VALUES_MAX];
 };
 
 /* Returns the squared denominator of errors, B^2 + floor^2 plus a correction for the noise of B: on average, noise
@@ -59,8 +59,8 @@ static double divisor_square(const struct tile_error *t, double brightness, doub
 	return brightness * brightness + t->floor_square + variance_weight * variance;
 }
 
-/* Adds a part of the relMSE whose pixels have one brightness in common, and its uncertainty: square is the variance of
- * the brightness. */
+/* Adds a part of the relMSE whose pixels have one brightness in common, and its uncertainty. variance: of the
+ * brightness. */
 static void add_share(struct tile_error *t, double part, double brightness, double variance, double divisor)
 {
 	double slope = 2 * brightness * part / divisor;

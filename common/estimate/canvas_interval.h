@@ -16,9 +16,9 @@ struct error_sums {
 	uint32_t groups;
 	double total;		    /* sum of all parts */
 	double brightness_variance; /* sum of the variances of parts due to the uncertainty of their brightness */
-	double lower_bound;	    /* lower bound of share: parts divided by the brightness with all fireflies */
-	double upper_bound;	/* upper bound of share: parts divided by the brightness that the other groups found */
-	double dark_total;	/* sum of the parts whose brightness is a block's mean */
+	double lower_bound;	    /* lower bound of `total`: parts divided by the brightness with all fireflies */
+	double upper_bound; /* upper bound of `total`: parts divided by the brightness that the other groups found */
+	double dark_total;  /* sum of the parts whose brightness is a block's mean */
 	double one_group_total; /* sum of the parts in which one group has most of the variance */
 	double kurtosis_total;	/* sum of the kurtosis of the groups' values, weighted by parts */
 	double tail_index;	/* tail index of the groups' relative errors on the bright side; INFINITY: not known */

@@ -29,9 +29,9 @@
 #define CLASS_DIFFERENCE_OF_B 0.02
 #define CLASS_DIFFERENCE_OF_CLASS 0.2
 #define CLASS_SHARE_MIN 0.005
-/* Groups are apart if the standard error of a class's energy in the chains, from the spread of the groups, exceeds
- * these shares of the energy and of b. It is a quarter of the energy if half of the groups found the class and have
- * equal shares of it (sqrt((16 / 8 - 1) / 15) for 16 groups). With fewer than INCONSISTENT_GROUPS_MIN groups the
+/* Groups are inconsistent if the standard error of a class's energy in the chains, from the spread of the groups,
+ * exceeds these shares of the energy and of b. It is a quarter of the energy if half of the groups found the class and
+ * have equal shares of it (sqrt((16 / 8 - 1) / 15) for 16 groups). With fewer than INCONSISTENT_GROUPS_MIN groups the
  * standard error itself is too uncertain. */
 #define INCONSISTENT_OF_CLASS 0.25
 #define INCONSISTENT_OF_B 0.03

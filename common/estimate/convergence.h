@@ -29,14 +29,14 @@ struct convergence {
 	double r_hat_median, max_r_hat; /* over tiles with light; NAN: none */
 	uint32_t worst_x, worst_y;	/* the tile of max_r_hat, in pixels of the full film */
 	uint32_t flagged_classes;	/* one bit per path class: chains and bootstrap differ */
-	uint32_t inconsistent_classes; /* one bit per path class: groups of chains differ, as if few had found the class
-					*/
-	double stuck_share;	       /* share of chain epochs without an accepted mutation */
+	/* one bit per path class: groups of chains differ, as if few had found the class */
+	uint32_t inconsistent_classes;
+	double stuck_share;		 /* share of chain epochs without an accepted mutation */
 	char text[CONVERGENCE_TEXT_MAX]; /* one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
 };
 
 /* Judges the chains of an image that canvas_image has made. */
-void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *out);
+void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *a);
 const char *convergence_name(enum convergence_verdict v); /* "agree", "too short", "disagree" */
 
 /* Appends a->text to the note on the image (strategy_print_note). */

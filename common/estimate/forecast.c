@@ -334,14 +334,14 @@ static double doubt_probability_at(const struct fit *f, double work)
 }
 
 /* Returns whether the look after this much work is in doubt. Of the variance that decides this, half (`lasting_luck`)
- * stays the same for a render, and half (`seen`) changes as fast as the deviations of looks. */
+ * stays the same for a render, and half (`look_luck`) changes as fast as the deviations of looks. */
 static bool scenario_is_in_doubt(const struct fit *f, const struct scenario *y, double work)
 {
 	return 0.5 * erfc(0.5 * (y->lasting_luck + y->look_luck)) < doubt_probability_at(f, work);
 }
 
-/* Draws `lasting_luck` and `seen` again until the scenario's current look is in doubt exactly if the render's last look
- * is. */
+/* Draws `lasting_luck` and `look_luck` again until the scenario's current look is in doubt exactly if the render's last
+ * look is. */
 static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct random_state *d)
 {
 	for (int i = 0; i < TRIES_MAX && scenario_is_in_doubt(f, y, f->work) != doubt; i++) {

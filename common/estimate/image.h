@@ -28,11 +28,11 @@ enum error_doubt {
 	ERROR_DOUBT_TAIL, /* the largest errors of pixels are so unequal that larger ones may still come:
 		     error_tail_index is not above error_tail_critical */
 	ERROR_DOUBT_FEW_GROUPS,	  /* too few groups, and too few pixels for a tail index, to tell whether larger errors
-			       may   still come */
+			       may still come */
 	ERROR_DOUBT_NO_SPREAD,	  /* a single group, which cannot be compared with others */
 	ERROR_DOUBT_SHORT_CHAINS, /* the chains are too short to be judged (convergence.h) */
-	ERROR_DOUBT_UNSEEN, /* light is missing that the samples so far are unlikely to have found (struct plan_unseen)
-			     */
+	/* light is missing that the samples so far are unlikely to have found (struct plan_unseen) */
+	ERROR_DOUBT_UNSEEN,
 };
 
 /* rel_mse_unseen may be too small by this factor, because pilots estimate it from few photons. */
@@ -53,8 +53,8 @@ struct canvas_image {
 	double rel_mse_95[2];	/* contains this image's relMSE in 95 % of all cases; NAN if rel_mse_doubt is set */
 	enum error_doubt rel_mse_doubt;
 	double doubtful_share; /* share of rel_mse from the doubtful pixels (ERROR_DOUBT_ONE_GROUP, ERROR_DOUBT_DARK) */
-	double rel_mse_unseen; /* relMSE due to light that the samples so far are unlikely to have found, by the pilot
-				*/
+	/* relMSE due to light that the samples so far are unlikely to have found, by the pilot */
+	double rel_mse_unseen;
 	double error_tail_index;    /* tail index (tail.h) of the groups' relative errors; INFINITY or 0: not known */
 	double error_tail_critical; /* above this the variance of errors is finite, with 95 % confidence */
 	uint64_t unvisited_count;   /* pixels that no chain visited; 0 for samples */

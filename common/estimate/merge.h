@@ -12,7 +12,7 @@
 
 struct bootstrap;
 
-int bootstrap_new(struct bootstrap **s, const struct plan *p, struct error *e);
+int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e);
 void bootstrap_free(struct bootstrap *s);
 /* Adds a batch of kind LEASE_BOOTSTRAP that has passed batch_check; the batch is not needed afterwards. Returns 0, or
  * -EEXIST if its lease has been added before. */

@@ -20,19 +20,20 @@
 #include <stddef.h>
 
 struct tail {
-	size_t count;	   /* numbers in y */
-	size_t kept_count; /* how many of the largest are kept; y has room for twice as many */
+	size_t count;	   /* numbers in `values` */
+	size_t kept_count; /* how many of the largest are kept; `values` has room for twice as many */
 	double threshold;  /* only numbers above this can be among the largest */
 	double *values;
 };
 
 /* Prepares to keep the `kept_count` largest numbers exactly. Returns 0 or -ENOMEM; tail_fini frees. */
-int tail_init(struct tail *t, size_t most);
+int tail_init(struct tail *t, size_t kept_count);
 void tail_fini(struct tail *t);
 /* Forgets all numbers. */
 void tail_clear(struct tail *t);
 void tail_add(struct tail *t, double y);
-/* Reduces y to the largest numbers, in descending order. Needed after the last tail_add, before the estimates below. */
+/* Reduces `values` to the largest numbers, in descending order. Needed after the last tail_add, before the estimates
+ * below. */
 void tail_select_largest(struct tail *t);
 /* Returns Hill's estimate from the k largest, k < kept_count: 1 if no more than k numbers were added or k is 0,
  * INFINITY if they are all equal. */

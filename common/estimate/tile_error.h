@@ -51,8 +51,8 @@ static inline float *tile_error_deviations(const struct tile_error *t, size_t pi
 	return t->deviations + pixel * 3 * t->groups;
 }
 
-/* Fills in apart, brightness, square, kurtosis, mean_variance and lit from the films of the tile at (x, y), and counts
- * unvisited pixels in the image. */
+/* Fills in deviations, brightness, variance, kurtosis, mean_variance and is_lit from the films of the tile at (x, y),
+ * and counts unvisited pixels in the image. */
 void tile_error_load(struct image_builder *m, struct tile_error *t);
 
 /* Fills in base, base_variance and base_power of all pixels: the mean, and its variance, without the eighth of the
