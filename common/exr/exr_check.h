@@ -9,7 +9,7 @@
 #include <stdbool.h>
 
 struct exr_limits {
-	int64_t max_bytes;     /* most bytes of all planes, as floats */
+	int64_t max_bytes;     /* of all planes, as floats */
 	int64_t max_inflation; /* most bytes of pixels that one byte of the file can represent */
 };
 
@@ -17,8 +17,8 @@ bool exr_is_dwa(exr_compression_t c);
 
 /* Accepts a file of one flat part within the limits, and long enough for its number of pixels. Stores sizes, channels
  * and primaries in img, whose planes stay NULL, and whether the part is tiled. Returns 0, -EFBIG if the planes would
- * exceed most->max_bytes, or -EBADMSG. */
-int exr_check_header(exr_context_t x, const struct exr_stream *s, const struct exr_limits *most, struct exr_image *img,
-		     bool *tiled, struct error *e);
+ * exceed limits->max_bytes, or -EBADMSG. */
+int exr_check_header(exr_context_t x, const struct exr_stream *s, const struct exr_limits *limits,
+		     struct exr_image *img, bool *tiled, struct error *e);
 
 #endif

@@ -13,6 +13,6 @@
 
 /* Like exr_read_limited, for a file that exr_read_limited refused with -ENOTSUP. The planes are R, G and B, or Y;
  * attributes are not read. */
-int exr_read_dwa(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e);
+int exr_read_dwa(const unsigned char *bytes, size_t size, int64_t max_bytes, struct exr_image *img, struct error *e);
 
 #endif

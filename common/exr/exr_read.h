@@ -9,8 +9,8 @@
 /* Reads an image, which exr_image_fini frees. Returns 0; -ENOTSUP for a file compressed by DWA (exr_dwa.h), -EBADMSG
  * for any other file that cannot be read, -ENOMEM. The image is empty after an error. */
 int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e);
-/* Like exr_read, but returns -EFBIG, before anything is decoded, if the planes would take more than bytes_most. */
-int exr_read_limited(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
+/* Like exr_read, but returns -EFBIG, before anything is decoded, if the planes would take more than max_bytes. */
+int exr_read_limited(const unsigned char *bytes, size_t size, int64_t max_bytes, struct exr_image *img,
 		     struct error *e);
 
 #endif

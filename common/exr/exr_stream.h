@@ -21,7 +21,7 @@ struct exr_stream {
 
 /* Open and close return 0, or -EBADMSG or -ENOMEM with a sentence. s must stay in place while x is open. */
 int exr_open_read(exr_context_t *x, struct exr_stream *s, const unsigned char *bytes, size_t size, struct error *e);
-int exr_open_write(exr_context_t *x, struct exr_stream *s, size_t room, struct error *e);
+int exr_open_write(exr_context_t *x, struct exr_stream *s, size_t capacity, struct error *e);
 /* Closes x. rc: the library's result so far; unless it is success, the bytes are freed and the error is set. */
 int exr_close_write(exr_context_t *x, struct exr_stream *s, exr_result_t rc, unsigned char **bytes, size_t *size,
 		    struct error *e);

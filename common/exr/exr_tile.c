@@ -46,7 +46,7 @@ static void pack_rows(const struct tile *t, float *to)
 	}
 }
 
-/* The inverse of pack. */
+/* The inverse of pack_rows. */
 static void unpack_rows(const unsigned char *from, const struct tile *t)
 {
 	float line[TILE_CHANNELS][TILE_SIZE];

@@ -39,8 +39,8 @@ struct header_extra {
 	const char *scene_notes;	 /* one per line, in at most HEADER_SCENE_NOTES_MAX bytes; NULL or "": none */
 	size_t effect_count;
 	const struct header_effect *effects;
-	bool mixed_fingerprints; /* workers of different numeric fingerprints took part: the bits are not reproducible
-				  */
+	/* workers of different numeric fingerprints took part: the bits are not reproducible */
+	bool mixed_fingerprints;
 	double wall_seconds, cpu_seconds;
 	uint32_t worker_count;
 	const char *date;     /* UTC; NULL: now */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * For each output, in order: its path is resolved through links to a device and inode or, if there is no such file yet,
- * to a path without links (find); it must differ from the inputs and from the outputs before it; an existing file must
- * have the output's format, judged by its first bytes; the extension must suit the format; and a file must be possible
- * to create there.
+ * to a path without links (identify_file); it must differ from the inputs and from the outputs before it; an existing
+ * file must have the output's format, judged by its first bytes; the extension must suit the format; and a file must be
+ * possible to create there.
  *
  * The first violation is the error. Nothing has been written by then.
  */
@@ -58,8 +58,8 @@ static bool is_json(const char *begin)
 
 static const struct {
 	const char *noun, *extension;
-	bool (*has_format)(
-		const char *begin); /* BEGINNING_SIZE bytes, zeros after the end of the file, and a final zero */
+	/* BEGINNING_SIZE bytes, zeros after the end of the file, and a final zero */
+	bool (*has_format)(const char *begin);
 } formats[] = {
 	[OUTPUT_EXR] = {"an OpenEXR file", ".exr", is_exr},
 	[OUTPUT_PNG] = {"a PNG file", ".png", is_png},
