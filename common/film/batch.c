@@ -135,7 +135,7 @@ uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count)
 	return sum;
 }
 
-/* *live: the number of chains that run, whose states are not empty. */
+/* *live_count: the number of chains that run, whose states are not empty. */
 static int check_states(const struct batch *b, const struct plan *p, uint64_t *live_count, struct error *e)
 {
 	struct plan_range chains = plan_chain_range(p, b->key.part);

@@ -32,7 +32,7 @@ struct bootstrap_result {
 int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest);
 
 /* Creates an empty canvas. Returns 0, -ENOMEM, or an error of creating or mapping the file in `folder`. */
-int canvas_new(struct canvas **c, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
+int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
 void canvas_free(struct canvas *c);
 size_t canvas_bytes(const struct plan *p); /* size of the films */
 /* Returns -ENOMEM if canvas_new would not get the memory for the films, without a folder; otherwise 0. Call it before a

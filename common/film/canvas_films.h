@@ -37,7 +37,7 @@ struct canvas {
 	uint8_t *flags;			     /* [film][tile] of enum tile_flag */
 	uint64_t *sum_bounds;		     /* [film]: at least the largest |sum| of the film */
 	uint64_t rounds;		     /* number of complete rounds */
-	uint32_t merged_counts[OPEN_ROUNDS]; /* number of merged leases of the open rounds, by parity */
+	uint32_t merged_counts[OPEN_ROUNDS]; /* merged leases of the open rounds, by parity */
 	uint8_t *is_merged;	  /* 1: merged; [bootstrap, open round of parity 0, of parity 1][group][part] */
 	uint32_t *missing_rounds; /* [group][part]: number of the last complete rounds whose batch was taken back */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;

@@ -24,7 +24,7 @@
 
 struct moments;
 
-int moments_new(struct moments **m, const struct plan *p, struct error *e);
+int moments_new(struct moments **out, const struct plan *p, struct error *e);
 void moments_free(struct moments *m);
 
 /* Returns -ERANGE if a sum could leave the grid after the lease's epoch. Call it before moments_add, which cannot fail.

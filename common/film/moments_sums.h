@@ -15,8 +15,9 @@ enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
 #define MOMENTS_GRID 0x1p20
 struct moments {
 	struct plan plan;
-	uint32_t sequences_per_lease, lease_count,
-		tile_count;		    /* sequences per lease, leases per round, tiles of the crop */
+	uint32_t sequences_per_lease;
+	uint32_t lease_count;		    /* per round */
+	uint32_t tile_count;		    /* of the crop */
 	int64_t *first_moments;		    /* [set][lease][sequence][tile] */
 	int64_t *second_moments;	    /* [set][lease][tile] */
 	struct exact_sum *class_time;	    /* [set][group][class] */
