@@ -33,11 +33,11 @@ enum { NET_HOST_MAX = 256 };
 int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **port, struct error *e);
 void net_addrs_set(struct net_addrs *l, const struct addrinfo *found);
 /* Drops the addresses that net_addr_check_allowed does not allow; -EPERM if none is left. */
-int net_addrs_filter_allowed(struct net_addrs *l, const char *host_port, bool safe, struct error *e);
+int net_addrs_filter_allowed(struct net_addrs *l, const char *host_port, bool allow_remote, struct error *e);
 bool net_addr_is_loopback(const struct net_addr *a);
-/* Returns 0 if the address is loopback or `safe` is set (TLS, or --insecure); otherwise -EPERM, with a sentence that
- * says what to do. */
-int net_addr_check_allowed(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
+/* Returns 0 if the address is loopback or `allow_remote` is set (TLS, or --insecure); otherwise -EPERM, with a sentence
+ * that says what to do. */
+int net_addr_check_allowed(const struct net_addr *a, const char *host_port, bool allow_remote, struct error *e);
 unsigned net_addr_port(const struct net_addr *a);
 void net_addr_set_port(struct net_addr *a, unsigned port);
 void net_addr_format(const struct net_addr *a, char *text, size_t size); /* numeric HOST:PORT */

@@ -503,8 +503,7 @@ struct revocation {
 	struct authority *a;
 	struct spelling suggestion;
 	const char *name_or_serial;
-	unsigned revoked_count,
-		already_revoked_count; /* numbers of certificates revoked now, and of those that were revoked before */
+	unsigned revoked_count, already_revoked_count; /* certificates revoked now, and those revoked before */
 };
 
 static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)

@@ -52,9 +52,10 @@ struct client {
 	size_t waiting_bytes;	  /* their memory */
 	struct tls *tls;	  /* NULL: plaintext */
 	bool is_open, timed_out;
-	int certificate_error;		   /* what conn_certificate_error returned for the connection */
-	char name[128], close_reason[256]; /* the program; why the connection was closed */
-	char warning[384], note[256];	   /* for client_print_notes */
+	int certificate_error; /* what conn_certificate_error returned for the connection */
+	char name[128];	       /* the program's name */
+	char close_reason[256];
+	char warning[384], note[256]; /* for client_print_notes */
 };
 
 static void on_opened(void *user)

@@ -23,7 +23,7 @@ struct client_message {
  * -ECONNREFUSED if no coordinator answers, -EPROTO if the coordinator refuses Hello, -EACCES if one side does not
  * accept the other's certificate or only one side uses TLS, -EKEYEXPIRED if the date of a certificate is the reason,
  * -EPERM or -EIO if the own folder is unusable. */
-int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name,
+int client_open(struct client **out, const char *host_port, const char *tls, bool insecure, const char *name,
 		struct error *e);
 void client_close(struct client *cl);
 /* Prints on stderr which of the own certificates expire soon, and the note that the coordinator sent with its answer to
@@ -35,8 +35,8 @@ int client_send(struct client *cl, const Farm__Envelope *m, const void *payload,
 /* Waits for the next message. Returns -ETIMEDOUT after `seconds` without any message, heartbeats included (negative:
  * waits for ever), -ECONNRESET if the connection is lost, -EPROTO if the coordinator reports a fault. */
 int client_receive(struct client *cl, double seconds, struct client_message *m, struct error *e);
-/* Sends a message and waits for an answer of the kind `want`; -EPROTO for any other answer. */
-int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want,
+/* Sends a message and waits for an answer of the kind `expected`; -EPROTO for any other answer. */
+int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase expected,
 		struct client_message *answer, struct error *e);
 void client_message_fini(struct client_message *m);
 
@@ -45,8 +45,8 @@ void client_message_fini(struct client_message *m);
  * an error of the local file, -EAGAIN if the fetch was dropped each time. */
 int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
 /* Like client_fetch, for a preview. The name of the job's final image stays free: if `path` has that name, or is a link
- * to it, the preview is written under client_preview_name() instead, and *kept is true. */
-int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *kept, struct error *e);
+ * to it, the preview is written under client_preview_name() instead, and *is_renamed is true. */
+int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *is_renamed, struct error *e);
 /* Makes room.preview.exr of room.exr; -ENAMETOOLONG if `size` is too small. */
 int client_preview_name(const char *path, char *name, size_t size, struct error *e);
 /* Like client_fetch, into the current folder under the last part of the name of the job's image, which is returned; a

@@ -43,10 +43,10 @@ struct conn_config {
 };
 
 /* Connects. Returns -errno if the attempt could not be made; otherwise `opened` or `closed` is called later. */
-int conn_connect(struct conn **c, uv_loop_t *loop, const struct net_addr *a, const struct conn_config *config,
+int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, const struct conn_config *config,
 		 const struct conn_events *events, void *user, struct error *e);
 /* Accepts a waiting connection. Returns -errno if none was accepted; further connections wait until the next call. */
-int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config *config,
+int conn_accept(struct conn **out, uv_stream_t *listener, const struct conn_config *config,
 		const struct conn_events *events, void *user, struct error *e);
 
 void conn_set_limits(struct conn *c, struct frame_limits limits);

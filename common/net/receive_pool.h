@@ -21,10 +21,10 @@ struct receive_turn {
 	void (*on_granted)(struct receive_turn *); /* called when bytes that were waited for have been taken */
 };
 
-/* Initially zeroed except for the limit. */
+/* Initially zeroed except for max_bytes. */
 struct receive_pool {
-	uint64_t max_bytes, used_bytes; /* bytes */
-	struct receive_turn *queue;	/* those that wait, in order of rounds */
+	uint64_t max_bytes, used_bytes;
+	struct receive_turn *queue; /* those that wait, in order of rounds */
 };
 
 /* Takes bytes from the pool. Returns false if the turn has to wait; `on_granted` is called later. */

@@ -17,16 +17,16 @@
 /* The share of one connection. Initially zeroed except for the first three members. */
 struct send_share {
 	struct send_pool *pool; /* NULL: no limit */
-	uint64_t (*unsent_bytes)(
-		const struct send_share *); /* bytes that the kernel has not taken; called at any time */
+	/* bytes that the kernel has not taken; called at any time */
+	uint64_t (*unsent_bytes)(const struct send_share *);
 	void (*evict)(struct send_share *); /* must close the connection */
 	LIST_ENTRY(send_share) next;	    /* in the list of shares that hold something */
 	uint64_t bytes, last_unsent_bytes;  /* bytes held; result of unsent_bytes() when it was last called */
-	uint64_t progress_ms;		    /* ms: when the peer last took something, or nothing waited */
+	uint64_t progress_ms;		    /* when the peer last took something, or nothing waited */
 	bool is_closing;		    /* the connection is being closed */
 };
 
-/* Initially zeroed except for the limit. */
+/* Initially zeroed except for max_bytes. */
 struct send_pool {
 	uint64_t max_bytes, used_bytes;	 /* bytes */
 	uint64_t closing_bytes;		 /* bytes of connections being closed, freed in the loop's next iteration */

@@ -34,7 +34,7 @@ struct send_frame {
 	struct sent_prefix prefix; /* empty once it has been encrypted */
 	unsigned char *bytes;
 	size_t size, offset;	/* of the bytes; offset of the next one to encrypt */
-	size_t plaintext_bytes; /* part of `unsent_bytes` that has not been passed on to a struct writing */
+	size_t plaintext_bytes; /* part of `unsent_bytes` that has not been passed on to a struct write_request */
 };
 
 /* A write of libuv. */
@@ -43,7 +43,7 @@ struct write_request {
 	struct send_queue *queue;
 	struct sent_prefix prefix;
 	unsigned char *bytes;
-	size_t size, plaintext_bytes; /* its parts of in_flight_bytes and of unsent */
+	size_t size, plaintext_bytes; /* its parts of in_flight_bytes and of unsent_bytes */
 };
 
 static uint64_t loop_ms(const struct send_queue *q)

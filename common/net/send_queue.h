@@ -40,7 +40,7 @@ struct send_queue {
 	STAILQ_HEAD(, send_frame) frames; /* frames waiting to be encrypted */
 	size_t unsent_bytes;		  /* bytes of frames that the kernel has not taken, and their overhead */
 	size_t copied_bytes;		  /* bytes of the first frame that libuv also has, encrypted */
-	struct send_share share;	  /* share of the pool: unsent_bytes + copied */
+	struct send_share share;	  /* share of the pool: unsent_bytes + copied_bytes */
 	size_t in_flight_bytes;		  /* bytes that libuv has to write; with TLS including its overhead */
 	bool first_frame_sent;		  /* the first frame has been given to the queue */
 	bool was_evicted;		  /* the queue failed because all queues together held too much */

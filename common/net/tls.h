@@ -49,7 +49,7 @@ struct tls;
 
 /* Reads a folder. Returns -EPERM if the key is readable for others than owner and group, or if there is no such folder;
  * -ENOENT or -EBADMSG for a missing or invalid file. */
-int tls_open(struct tls **t, const char *folder, struct error *e);
+int tls_open(struct tls **out, const char *folder, struct error *e);
 void tls_close(struct tls *t); /* links may be used further, except for tls_link_recheck */
 /* Reads the files again if they have changed. Returns 0 if they have not; 1 if new files have been read, which new
  * links then use and open links are checked against; -ENOENT if that is so, but crl.pem is missing, and the old list
@@ -72,7 +72,7 @@ double tls_recheck_seconds(const struct tls *t);
 
 struct tls_link;
 
-int tls_link_new(struct tls_link **l, struct tls *t, bool listening, struct error *e);
+int tls_link_new(struct tls_link **out, struct tls *t, bool is_server, struct error *e);
 void tls_link_free(struct tls_link *l);
 /* Takes bytes from the socket. Call tls_link_read until it returns 0 before the next call. */
 int tls_link_receive(struct tls_link *l, const void *bytes, size_t size, struct error *e);
