@@ -45,11 +45,11 @@ struct envelope {
  */
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e);
 void envelope_fini(struct envelope *env);
-/* Unpacks a stored frame that must contain the message `want`: a result in a journal, a submission or plan in the
+/* Unpacks a stored frame that must contain the message `expected`: a result in a journal, a submission or plan in the
  * database. The payload points into the frame. Returns 0, or an error of envelope_unpack; -EBADMSG also for another
  * length or another message. */
-int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
-			  const unsigned char **payload, size_t *payload_size, struct error *e);
+int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase expected, const unsigned char *frame,
+			  size_t size, const unsigned char **payload, size_t *payload_size, struct error *e);
 
 /* Packs a message into a frame in one piece, which is freed with mem_free: prefix, header, and room for the payload,
  * which is copied from `payload` unless that is NULL. Adds the checksum of Hello and its answer. Returns 0, -EMSGSIZE
