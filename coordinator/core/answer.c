@@ -5,7 +5,7 @@
  * Happy path: answer_batch judges a result (judge_result). If it is the next epoch of its slot it is merged: the
  * action tells the shell to add it to the films, the worker is acknowledged, other copies of the lease are revoked,
  * and job_merge_epoch reports whether the round is complete. If the lease is verified, the result counts only once a
- * second worker has sent an equal one (verify). answer_stored does the same for results read from a journal.
+ * second worker has sent an equal one (verify_result). answer_stored does the same for results read from a journal.
  *
  * Failures: a verdict of REPEAT means that the lease was merged before; REFUSE that the result does not count now,
  * through no fault of the worker; FAULT that no correct worker sends such content, which counts towards quarantine. A

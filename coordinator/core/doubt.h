@@ -30,14 +30,15 @@ struct slot;
 
 enum { DOUBT_ROLLBACKS_MAX = 4 };
 
-/* Handles a refusal of chain states by p, whose lease has already been dropped. can: the caller can take back the
- * previous epoch (its batch and the states before it are available). text: the worker's reason. */
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
+/* Handles a refusal of chain states by p, whose lease has already been dropped. can_roll_back: the caller can take back
+ * the previous epoch (its batch and the states before it are available). text: the worker's reason. */
+void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
+		   const char *text);
 /* Whether p may not get the slot's lease because it made or refused the states and another worker is available. */
 bool doubt_is_barred(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
-/* Call when a result of the slot's next epoch is merged, before job_merge_epoch: the sender `who` has accepted the
+/* Call when a result of the slot's next epoch is merged, before job_merge_epoch: the sender `identity` has accepted the
  * states. */
-void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
+void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *identity,
 		  const struct lease_key *k);
 /* Returns the name of the worker that made the chain states this lease begins with; "?" if it is not the next lease
  * of its group and part. */

@@ -15,11 +15,11 @@
 #include "coordinator/core/job_fields.h"
 
 enum event_kind {
-	EVENT_TICK,	    /* none: time has passed; due at update.wake at the latest */
+	EVENT_TICK,	    /* none: time has passed; due at update.wake_time at the latest */
 	EVENT_JOINED,	    /* join */
 	EVENT_LEFT,	    /* peer: its connection is closed */
 	EVENT_HEARTBEAT,    /* peer: every other event of a peer counts as a heartbeat, too */
-	EVENT_REQUEST,	    /* peer, want */
+	EVENT_REQUEST,	    /* peer, wanted_leases */
 	EVENT_BATCH,	    /* peer, key, valid, text: the result of a lease */
 	EVENT_STORED_BATCH, /* key, digest: a result stored by an earlier run, which may count now */
 	/* peer, key: a result has arrived and will be judged later (EVENT_BATCH); meanwhile the worker may get
@@ -32,8 +32,8 @@ enum event_kind {
 	EVENT_CANCEL,	       /* tag, job */
 	EVENT_PREPARED,	       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_ESTIMATED, /* error_estimated: the answer to ACTION_EVALUATE_ERROR */
-	EVENT_IMAGE_PUBLISHED, /* image_published: statistics of the final image after ACTION_PUBLISH; the job has ended
-				*/
+	/* image_published: statistics of the final image after ACTION_PUBLISH; the job has ended */
+	EVENT_IMAGE_PUBLISHED,
 	/* tag, restore: continues a job of an earlier run, or a job that has ended. With tag 0 max_jobs does not
 	 * apply, and only lack of memory can prevent it. */
 	EVENT_RESTORE,
@@ -126,11 +126,11 @@ struct event {
 			/* BATCH: the result passed batch_check and the checks of the frame; otherwise text says what
 			 * is wrong. */
 			bool valid;
-			/* BATCH, STORED: set for leases for which farm_lease_is_verified returns true. */
+			/* BATCH, STORED_BATCH: set for leases for which farm_lease_is_verified returns true. */
 			struct batch_digest digest;
 			bool worker_at_fault; /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
-			bool memory_full;     /* with own: temporary, because the worker's memory is in use */
-			bool bad_states;      /* LEASE_FAILED: the worker refuses the chain states of the grant */
+			bool memory_full; /* with worker_at_fault: temporary, because the worker's memory is in use */
+			bool bad_states;  /* LEASE_FAILED: the worker refuses the chain states of the grant */
 			/* With bad_states: the refused states are not the lease's current states but those of an
 			 * earlier grant. */
 			bool states_outdated;

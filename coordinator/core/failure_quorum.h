@@ -21,6 +21,6 @@ struct identity;
 uint32_t failure_quorum_required_certificates(const struct farm *f);
 
 /* Adds a worker. Returns true if the quorum is reached: the lease or job is at fault. */
-bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *who);
+bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *identity);
 
 #endif

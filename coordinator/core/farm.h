@@ -77,7 +77,7 @@
 #include "coordinator/core/update.h"
 
 struct farm;
-int farm_new(struct farm **f, const struct farm_config *c, struct error *e); /* -EINVAL, -ENOMEM */
+int farm_new(struct farm **out, const struct farm_config *c, struct error *e); /* -EINVAL, -ENOMEM */
 void farm_free(struct farm *f);
 /* Handles one event. *u lists what the caller has to do (update.h), and is valid until the next step. */
 void farm_step(struct farm *f, const struct event *ev, struct update *u);

@@ -12,7 +12,7 @@ double job_progress(const struct job *j, double now);
 struct forecast_range job_eta(const struct job *j, bool idle, double now);
 /* Adds an estimate of the error of the complete rounds to the job's history. Call it when the estimate is known. */
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds);
-void job_update_forecast(struct job *j); /* recomputes `stop` and `halving` from the history of estimates */
+void job_update_forecast(struct job *j); /* recomputes target_cost and halving_cost from the history of estimates */
 /* Seconds until the error is halved, at the present rate of the job; as last forecast if it has no rate. */
 struct forecast_range job_halving_seconds(const struct job *j, double now);
 

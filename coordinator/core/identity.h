@@ -22,14 +22,15 @@ struct backoff {
 	double until;
 	bool worker_at_fault; /* all failures since the last pause were faults of the worker's own machine */
 	bool memory_full;     /* no failure: its memory has room for one scene and holds another one */
-	bool held_leases;     /* with later: it held leases at that time. Once it holds none, the pause ends at once */
+	/* with memory_full: it held leases at that time. Once it holds none, the pause ends at once */
+	bool held_leases;
 };
 
 enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEY_COUNT };
 
 struct identity {
 	struct identity *next[IDENTITY_KEY_COUNT]; /* identity_index.h */
-	uint32_t registry_index;		   /* its index in farm.known */
+	uint32_t registry_index;		   /* its index in farm.registry */
 	uint64_t id;				   /* never reused */
 	uint64_t certificate_id;		   /* equal for all workers with the same certificate */
 	char certificate[IDENTITY_CERTIFICATE_SIZE], name[IDENTITY_NAME_SIZE], home[IDENTITY_HOME_SIZE];

@@ -10,8 +10,8 @@
 
 #include "coordinator/core/identity.h"
 
-/* buckets: as many as entries are expected. Returns -ENOMEM if out of memory. */
-int identity_index_init(struct identity_index *x, uint32_t buckets);
+/* bucket_count: as many as entries are expected. Returns -ENOMEM if out of memory. */
+int identity_index_init(struct identity_index *x, uint32_t bucket_count);
 void identity_index_fini(struct identity_index *x);
 void identity_index_add(struct identity_index *x, struct identity *k);
 void identity_index_remove(struct identity_index *x, struct identity *k);

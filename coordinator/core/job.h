@@ -6,8 +6,8 @@
 #include "coordinator/core/event.h"
 #include "coordinator/core/state.h"
 
-/* Returns NULL and sets *refused to a sentence if the job is refused. */
-struct job *job_new(struct farm *f, const struct event_submit *e, const char **refused);
+/* Returns NULL and sets *refusal to a sentence if the job is refused. */
+struct job *job_new(struct farm *f, const struct event_submit *e, const char **refusal);
 void job_free(struct job *j);
 
 bool job_is_live(const struct job *j);

@@ -82,7 +82,7 @@ typedef double field_real, field_positive, field_known;
 	NUMBER(real, verify, IN_RECORD, BY_CORE, "verify", "verify", AT(verify)) \
 	TEXT(mixture, PLAN_MUTATIONS_MAX, IN_RECORD, BY_JOBS, "mixture", "mixture", NOWHERE) \
 	TEXT(note, STRATEGY_NOTE_MAX, IN_RECORD, BY_JOBS, "note", "note", AT(note)) \
-	/* Notes about the scene, one per line (text_lines). */ \
+	/* Notes about the scene, one per line (text_join_lines). */ \
 	TEXT(scene_notes, HEADER_SCENE_NOTES_MAX, IN_RECORD, BY_JOBS, "sceneNotes", NULL, NOWHERE) \
 	NUMBER(positive, b, IN_RECORD, BY_JOBS, "b", "b", NOWHERE) /* of the last image */ \
 	/* Bootstrap samples or mutations merged per second, over the last half minute. */ \

@@ -23,8 +23,8 @@ struct lease;
  * list now reaches LOST_HOLDERS_FATAL with enough certificates. */
 void lost_holders_add(struct farm *f, struct lease *l);
 /* Whether the worker is in the list. */
-bool lost_holders_contain(const struct lost_holders *l, const struct identity *who);
+bool lost_holders_contain(const struct lost_holders *l, const struct identity *identity);
 /* Removes a worker from the list. Returns true if it was listed. */
-bool lost_holders_remove(struct lost_holders *l, const struct identity *who);
+bool lost_holders_remove(struct lost_holders *l, const struct identity *identity);
 
 #endif

@@ -14,8 +14,8 @@ void peer_requeue(struct farm *f, struct peer *p);
 /* Whether the worker wants a lease and may hold one more. */
 bool peer_wants_lease(const struct peer *p);
 
-/* Begins or extends the worker's pause with the job. own: a fault of the worker's own machine. */
-void peer_note_failure(const struct farm *f, struct peer *p, uint64_t job, bool own);
+/* Begins or extends the worker's pause with the job. worker_at_fault: a fault of the worker's own machine. */
+void peer_note_failure(const struct farm *f, struct peer *p, uint64_t job, bool worker_at_fault);
 /* The worker returned a lease because another scene is in its memory: begins a pause of constant length. */
 void peer_note_memory_full(const struct farm *f, struct peer *p, uint64_t job);
 /* A result of the worker was merged: ends its pause with the job and doubles its limit of leases. */
@@ -28,7 +28,7 @@ double peer_backoff_end(const struct peer *p, uint64_t job); /* end of its pause
 double peer_pause_end(const struct peer *p, const struct job *j);
 /* Whether the worker returned its last lease of the job because its memory was full. */
 bool peer_waits_for_memory(const struct peer *p, uint64_t job);
-bool peer_is_at_fault(const struct peer *p,
-		      uint64_t job); /* its last failure with the job was its own machine's fault */
+/* Whether its last failure with the job was its own machine's fault. */
+bool peer_is_at_fault(const struct peer *p, uint64_t job);
 
 #endif

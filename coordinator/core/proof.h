@@ -39,7 +39,8 @@ enum verify_outcome {
 	VERIFY_HOPELESS,    /* VERIFY_ANSWERS_MAX workers gave as many different answers */
 };
 /* Compares an answer with the noted ones, and notes it if it is the worker's first and equals none of them. */
-enum verify_outcome proof_add_answer(struct job *j, struct slot *s, struct identity *who, const struct batch_digest *d);
+enum verify_outcome proof_add_answer(struct job *j, struct slot *s, struct identity *identity,
+				     const struct batch_digest *d);
 /* Writes the names of the workers that have answered, as in "a, b, c". */
 void proof_format_names(const struct job *j, const struct slot *s, char *text, size_t size);
 

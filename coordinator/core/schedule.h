@@ -7,8 +7,8 @@ struct farm;
 
 /* Hands out leases while workers wait. Call after every event. */
 void schedule_leases(struct farm *f);
-/* Expires leases past their deadline and disconnects silent workers. `read`: everything that arrived before this time
- * has been handled. */
-void schedule_expire(struct farm *f, double read);
+/* Expires leases past their deadline and disconnects silent workers. `read_until`: everything that arrived before this
+ * time has been handled. */
+void schedule_expire(struct farm *f, double read_until);
 
 #endif

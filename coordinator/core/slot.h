@@ -31,7 +31,7 @@ enum { FAILURE_QUORUM_SIZE = 3 };
 struct failure_quorum {
 	uint32_t count;
 	struct {
-		uint64_t identity_id, certificate_id; /* numbers in struct identity: id, certificate_id */
+		uint64_t identity_id, certificate_id; /* `id` and `certificate_id` of struct identity */
 	} workers[FAILURE_QUORUM_SIZE];
 };
 
@@ -53,9 +53,9 @@ enum { LOST_HOLDERS_FATAL = 8 };
 struct lost_holders {
 	uint32_t count;
 	struct lost_worker {
-		const struct identity *identity; /* valid only while who->id equals id */
-		uint64_t id, certificate_id,
-			contact_count; /* contact_count: who->contact_count when the worker was lost */
+		const struct identity *identity; /* valid only while identity->id equals id */
+		/* contact_count: identity->contact_count when the worker was lost */
+		uint64_t id, certificate_id, contact_count;
 	} workers[LOST_HOLDERS_FATAL];
 };
 

@@ -91,7 +91,7 @@ struct peer {
 	uint32_t delivered_leases;
 	enum peer_state state;
 	struct link waiting_link;
-	uint64_t queue_position; /* place in the order of waiting, see farm.queued */
+	uint64_t queue_position; /* place in the order of waiting, see farm.next_queue_position */
 	double joined_at, last_seen;
 	bool is_superseded; /* the worker has reconnected, and this connection is closing */
 	uint64_t merged, repeats, refused, faults, failures;
@@ -141,8 +141,8 @@ static inline struct lease_key slot_lease_key(const struct job *j, const struct 
 /* Each returns NULL if there is none of this id. */
 struct job *farm_find_job(const struct farm *f, uint64_t id);
 struct peer *farm_find_peer(const struct farm *f, uint64_t id);
-uint32_t farm_peer_lower_bound(const struct farm *f,
-			       uint64_t id); /* index of the first peer whose id is not below `id` */
+/* Returns the index of the first peer whose id is not below `id`. */
+uint32_t farm_peer_lower_bound(const struct farm *f, uint64_t id);
 
 /* Reserves room for the actions of an update; called when workers join and jobs are submitted, so that update_add
  * cannot fail. more_leases: lease limit of the worker that joins. Returns -ENOMEM if out of memory. */

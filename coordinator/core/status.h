@@ -64,14 +64,14 @@ bool farm_lease_is_verified(const struct farm *f, const struct lease_key *k);
 struct worker_status {
 	uint64_t worker_id, restarts;
 	const char *certificate, *name, *home, *last_fault;
-	uint32_t wrong_results; /* number of wrong results */
+	uint32_t wrong_results;
 	bool quarantined;
 };
 /* Returns the smallest id of a quarantined worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
-bool farm_worker_status(const struct farm *f, uint64_t who, struct worker_status *s);	   /* false: unknown id */
-bool farm_job_status(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown id */
-bool farm_job_counts(const struct farm *f, uint64_t id, struct job_counts *c);		   /* false: unknown id */
+bool farm_worker_status(const struct farm *f, uint64_t worker_id, struct worker_status *s); /* false: unknown id */
+bool farm_job_status(const struct farm *f, uint64_t id, double now, struct job_status *s);  /* false: unknown id */
+bool farm_job_counts(const struct farm *f, uint64_t id, struct job_counts *c);		    /* false: unknown id */
 /* Seconds since the job's first lease, not counting the time it was held; NAN: no lease was sent yet, or unknown id. */
 double farm_job_elapsed(const struct farm *f, uint64_t id, double now);
 /* Whether results of this job may arrive: it is neither held by a user nor for its files, and has leases out or is

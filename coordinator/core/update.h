@@ -61,15 +61,15 @@ enum action_kind {
 	ACTION_PUBLISH,	      /* job, rounds: write the image of these rounds; the job is done */
 	ACTION_JOB_CHANGED,   /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many jobs have ended; the core no longer knows this one */
-	/* who, job, key, text: take the batch of this lease, the last of its (group, part), out of the films. The
+	/* worker_id, job, key, text: take the batch of this lease, the last of its (group, part), out of the films. The
 	 * earlier states are current again, and the lease goes out once more. Occurs only if the event had
 	 * can_roll_back set. */
 	ACTION_ROLL_BACK,
 	ACTION_RESTART_CHAINS, /* job, key, text: the chains of this lease start from their seeds (doubt.h) */
-	/* who, job, key, text: a worker has given a wrong result: its noted answer differs from one that two others
-	 * agree on, or it made wrong chain states or refused good ones (doubt.h). */
+	/* worker_id, job, key, text: a worker has given a wrong result: its noted answer differs from one that two
+	 * others agree on, or it made wrong chain states or refused good ones (doubt.h). */
 	ACTION_WRONG_RESULT,
-	ACTION_QUARANTINE, /* who, text: a worker is quarantined permanently */
+	ACTION_QUARANTINE, /* worker_id, text: a worker is quarantined permanently */
 	ACTION_CLOSE_PEER, /* peer, text: disconnect; the core has already forgotten the peer */
 };
 
@@ -83,8 +83,8 @@ struct action {
 	bool verified;	 /* MERGE: two workers have sent equal results, or a journal contained it */
 	bool from_seeds; /* SEND_LEASE: send seeds, whatever the epoch */
 	uint64_t tag, peer;
-	/* MERGE, TAKE_BACK (0: not known), WRONG, QUARANTINE: the identity of the worker, whatever its connection
-	 * (see struct peer_status). */
+	/* MERGE, ROLL_BACK (0: not known), WRONG_RESULT, QUARANTINE: the identity of the worker, whatever its
+	 * connection (see struct peer_status). */
 	uint64_t worker_id;
 	uint64_t job; /* also set if the action has a key */
 	uint64_t rounds;

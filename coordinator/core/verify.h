@@ -15,10 +15,10 @@
 struct job;
 struct peer_class;
 
-void verify_forget_slot(struct farm *f, struct job *j,
-			const struct slot *s); /* forgets the answers noted for the slot */
+/* Forgets the answers noted for the slot. */
+void verify_forget_slot(struct farm *f, struct job *j, const struct slot *s);
 void verify_forget_job(struct farm *f, struct job *j);
-void verify_forget_worker(struct farm *f, const struct identity *who);
+void verify_forget_worker(struct farm *f, const struct identity *identity);
 /* Unpins each job of which nothing is merged yet if its class has at most one active worker and another class has
  * more: workers of that other class can then start it again. */
 void verify_unpin_stranded_jobs(struct farm *f);

@@ -16,10 +16,10 @@
 #include "coordinator/core/state.h"
 
 /* Returns the existing entry, updated from the event, or a new one, with a reference for the caller. Returns NULL and
- * sets *refused to a sentence if there is no room. */
-struct identity *worker_registry_acquire(struct farm *f, const struct event_join *e, const char **refused);
+ * sets *refusal to a sentence if there is no room. */
+struct identity *worker_registry_acquire(struct farm *f, const struct event_join *e, const char **refusal);
 /* Ends a reference. */
-void worker_registry_release(struct farm *f, struct identity *who);
+void worker_registry_release(struct farm *f, struct identity *identity);
 /* Returns the id of a worker that made a stored result in an earlier run, adding it if it is not known; 0: no room.
  * Does not add a reference. What a worker has reported since it connected is not changed. */
 uint64_t worker_registry_recall(struct farm *f, const struct event_join *e);
@@ -28,7 +28,7 @@ void worker_registry_free(struct farm *f);
 /* Finds a worker by its home or, failing that, by its name; NULL: none. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e);
 /* Marks the worker; quarantine.h does the rest. */
-void worker_registry_quarantine(struct farm *f, struct identity *who);
+void worker_registry_quarantine(struct farm *f, struct identity *identity);
 /* Restores a worker that was quarantined in an earlier run of the coordinator. */
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text);
 
