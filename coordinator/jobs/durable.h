@@ -31,17 +31,17 @@ void durable_restore_end(struct jobs *jobs, const struct job_record *r);
 /* Call before the core sees a batch: makes the frame for the journal in `in`, and reserves memory and disk space.
  * Returns -ENOMEM, -ENOSPC or -EFBIG if there is none; the job is then held until there is. */
 int durable_reserve_result(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e);
-/* Call when the core merges the batch: appends it to the journal. *at: its offset. Returns -ENOMEM if it is not in
+/* Call when the core merges the batch: appends it to the journal. *offset: where it is. Returns -ENOMEM if it is not in
  * the journal; it must then not be acknowledged. */
-int durable_append_result(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *at,
+int durable_append_result(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *offset,
 			  struct error *e);
 /* Acknowledges a batch that is merged, now or earlier, once the job's journal is on disk. */
 void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack);
 /* Stores the last estimate of the job's error, if it is new. */
-void durable_store_look(struct jobs *jobs, uint64_t job);
+void durable_store_look(struct jobs *jobs, uint64_t id);
 
-/* Holds the job because the disk refuses its data. what: the consequence; why: the error. */
-void durable_hold_job(struct jobs *jobs, struct live_job *job, const char *what, const char *why);
+/* Holds the job because the disk refuses its data. cause: the error. */
+void durable_hold_job(struct jobs *jobs, struct live_job *job, const char *consequence, const char *cause);
 /* Tries again to store the job's results. Returns 0 if nothing prevents that any more; the job is then released. */
 int durable_retry_job(struct jobs *jobs, struct live_job *job);
 /* Call regularly: stores counters that have changed, and whatever could not be stored before. */

@@ -22,8 +22,8 @@ bool files_update_hold(struct jobs *jobs, struct live_job *job);
 /* Call when a worker complains: has all files of the job read again, except those that were read after their last
  * chunk was sent. The job may be gone afterwards. */
 void files_reread(struct jobs *jobs, struct live_job *job);
-bool files_are_being_read(const struct jobs *jobs,
-			  const struct live_job *job); /* whether some of its files are being read */
+/* Whether some of its files are being read. */
+bool files_are_being_read(const struct jobs *jobs, const struct live_job *job);
 /* Whether all files of the job were right when last read. */
 bool files_are_intact(const struct jobs *jobs, const struct live_job *job);
 void files_tick(struct jobs *jobs); /* releases jobs whose missing files exist now */

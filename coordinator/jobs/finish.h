@@ -10,6 +10,6 @@
 void finish_ended(struct jobs *jobs);
 /* Call after a job was cancelled. Returns 0 if it would stay cancelled after a crash of the coordinator, even if a
  * thread still reads its films; otherwise an error that says why not. */
-int finish_check_cancelled(struct jobs *jobs, uint64_t job, struct error *e);
+int finish_check_cancelled(struct jobs *jobs, uint64_t id, struct error *e);
 
 #endif

@@ -56,8 +56,8 @@ static int import_counter(struct jobs *jobs, struct error *e)
 }
 
 struct old_job {
-	char *record_text;	  /* text of the record; NULL: none, or damaged */
-	bool record_damaged;	  /* the record is damaged */
+	char *record_text; /* NULL: none, or damaged */
+	bool record_damaged;
 	struct job_record record; /* valid if there is a text */
 	struct old_row row;	  /* copy of the row; its id is 0 if there is none, or it is damaged */
 };

@@ -7,7 +7,7 @@
 
 /* Drops the waiting results of a job, which are computed again instead. Returns false if the job has ended meanwhile
  * and is gone. */
-bool late_drop_all(struct jobs *jobs, uint64_t job);
+bool late_drop_all(struct jobs *jobs, uint64_t id);
 /* Gives the core all waiting results that can be merged now. Call after every step, and when films are free again. */
 void late_feed(struct jobs *jobs);
 

@@ -9,6 +9,6 @@
 
 #include "coordinator/live_job/jobs.h"
 
-void publish_start(struct jobs *jobs, struct live_job *job, enum publish_kind what, uint64_t rounds);
+void publish_start(struct jobs *jobs, struct live_job *job, enum publish_kind kind, uint64_t rounds);
 
 #endif

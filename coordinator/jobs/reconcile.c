@@ -24,8 +24,8 @@ enum { LOST_NAMES_MAX = 8 /* lost jobs that the error names */ };
 
 struct reconciliation {
 	struct jobs *jobs;
-	uint64_t lost_count; /* number of lost jobs */
-	char text[600];	     /* their names */
+	uint64_t lost_count;
+	char text[600]; /* their names */
 	struct text names;
 };
 

@@ -28,8 +28,8 @@
 struct recovery {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct recovering_job **tail,
-		*current; /* tail: end of the list jobs.found; current: the job being read, NULL: none */
+	/* end of the list jobs.recovering_jobs; the job being read, NULL: none */
+	struct recovering_job **tail, *current;
 	uint64_t total_bytes, bytes_read; /* bytes to read for all jobs; bytes of the jobs that have been read */
 	bool is_reading;
 	int rc; /* result for the job just read */

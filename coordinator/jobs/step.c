@@ -4,8 +4,8 @@
  *
  * jobs_step gives the event to the core (core/farm.h), which changes its state and answers with a list of actions.
  * The table `step_handlers` carries these out. Events that arise meanwhile are queued and handled before jobs_step
- * returns; then the table is told that the step is over. The timer `wake` sends the event that the core needs when
- * only time has passed.
+ * returns; then the table is told that the step is over. The timer `wake_timer` sends the event that the core needs
+ * when only time has passed.
  *
  * A step does not fail. If there is no memory for a queued event (300 bytes), the process ends.
  */
