@@ -13,7 +13,7 @@ struct server_config {
 	const char *status_group;    /* group that may connect to it; NULL: only the coordinator's own user */
 	const char *partials_folder; /* folder for partial tiles; NULL: none */
 	const char *port_file;	     /* file to which the port is written; NULL: none */
-	const char *tls_folder;	     /* folder (common/net/tls.h); NULL or "": plaintext */
+	const char *tls_folder;	     /* see common/net/tls.h; NULL or "": plaintext */
 	double tls_check_seconds;    /* seconds between checks of the certificates of open connections */
 	bool insecure;
 	struct quota quota;	      /* of each owner */

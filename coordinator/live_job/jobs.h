@@ -65,8 +65,8 @@ struct jobs {
 	struct ledger *ledger;
 	STAILQ_HEAD(, file_check) file_checks; /* files being read (coordinator/jobs/files.c) */
 	struct live_job *live_jobs;	       /* live jobs */
-	struct job_record
-		*ended_jobs; /* the jobs that ended last, at most ENDED_JOBS_MAX, in the order of their ends */
+	/* the jobs that ended last, at most ENDED_JOBS_MAX, in the order of their ends */
+	struct job_record *ended_jobs;
 	size_t ended_job_count;
 	STAILQ_HEAD(, deferred_event) deferred;
 	struct recovering_job *recovering_jobs; /* sorted by id */
@@ -104,7 +104,7 @@ struct live_job *jobs_find_live(const struct jobs *jobs, uint64_t id); /* NULL: 
  * disk. */
 const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p);
 /* Whether the job is being read from the spool, after a restart or for an extension. */
-bool jobs_is_reading(const struct jobs *jobs, uint64_t id);
+bool jobs_is_reading(const struct jobs *jobs, uint64_t job);
 /* Returns -EDQUOT if the job would exceed its owner's quota. id: 0 for a new job, or the id of an existing one;
  * uploading: bytes of scene files that the owner is sending. */
 int jobs_check_quota(const struct jobs *jobs, const char *owner, uint64_t id, uint64_t uploading,

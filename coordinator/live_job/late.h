@@ -9,8 +9,8 @@
 
 #include "coordinator/live_job/live_job.h"
 
-/* at: offset in the journal. -ENOMEM. */
-int late_add(struct live_job *job, const struct lease_key *k, uint64_t at, struct error *e);
+/* offset: in the journal. -ENOMEM. */
+int late_add(struct live_job *job, const struct lease_key *k, uint64_t offset, struct error *e);
 /* Drops the results of this (group, part) from this epoch on. */
 void late_remove_from_epoch(struct live_job *job, const struct lease_key *k);
 void late_sort(struct live_job *job); /* sorts them by the order in which they can be merged */

@@ -103,13 +103,13 @@ struct live_job {
 	uint64_t state_bytes;	       /* memory that `states` takes */
 	struct live_job_maker *makers; /* [groups x parts]: workers that made `states` */
 	bool *is_replacement;	       /* [groups x parts]: the next batch replaces one that was taken back */
-	struct merged_record
-		*merged_records; /* journal records of batches that can be taken back, in order of merging */
+	/* journal records of batches that can be taken back, in order of merging */
+	struct merged_record *merged_records;
 	size_t merged_record_count;
 	/* Bytes of JOURNAL_MERGED_BATCH records in the journal; their batches are also in the checkpoint. */
 	uint64_t kept_record_bytes;
 	uint32_t chains_per_lease;
-	int log_fd; /* file descriptor of the log */
+	int log_fd;
 	uint64_t log_bytes;
 	struct journal *journal;
 	bool fingerprint_journaled; /* the journal has a record of the fingerprint */
@@ -152,7 +152,7 @@ struct live_job {
 /* Makes a live job and takes over the submission. The job's folder must exist. owner: name in the certificate, or "".
  * submitted: s since 1970 for a job of an earlier run; 0: now. After an error the submission still belongs to the
  * caller. */
-int live_job_new(struct live_job **job, uint64_t id, struct envelope *submit, const struct plan *plan,
+int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan,
 		 const char *owner, double submitted, struct spool *s, struct error *e);
 /* Frees the memory of a job that is not busy; scene files and the job's folder stay. */
 void live_job_free(struct live_job *job);
@@ -168,13 +168,13 @@ int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
 void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state *states);
 /* Call after a batch was merged. elapsed: seconds after the first lease; rounds: complete rounds before the merge. */
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
-uint64_t live_job_complete_rounds(const struct live_job *job); /* complete rounds */
+uint64_t live_job_complete_rounds(const struct live_job *job);
 /* Computes b, seeds and canvas when the bootstrap is complete. */
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e);
 /* Whether a lease starts from chain states (those after the previous epoch) and they have this digest. */
 bool live_job_states_match(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
-/* Packs a lease as a frame for a worker. anew: with seeds instead of states, whatever its epoch. */
-int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
+/* Packs a lease as a frame for a worker. from_seeds: with seeds instead of states, whatever its epoch. */
+int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool from_seeds, unsigned char **frame,
 			size_t *size, struct error *e);
 /* Counts the worker in worker_count, unless it is among the last 64 different ones. */
 void live_job_count_worker(struct live_job *job, uint64_t peer);
@@ -182,7 +182,7 @@ void live_job_count_worker(struct live_job *job, uint64_t peer);
 /* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload. files_checked:
  * as in struct waiting_message. Returns false if out of memory. */
 bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
-			      struct buf *payload, bool checked);
+			      struct buf *payload, bool files_checked);
 /* Returns a waiting message about this lease; NULL: none. */
 const struct waiting_message *live_job_find_waiting(const struct live_job *job, const struct lease_key *k);
 /* The first one, which then belongs to the caller; NULL: none. */

@@ -18,15 +18,15 @@ struct peer_calls {
 	struct peers *user;					     /* the first argument of every function */
 	const char *(*peer_name)(struct peers *user, uint64_t peer); /* the peer's own name; NULL: it is gone */
 
-	/* Messages to a worker. send_lease: anew: with seeds, whatever the epoch. */
+	/* Messages to a worker. send_lease: from_seeds: with seeds, whatever the epoch. */
 	void (*send_lease)(struct peers *user, uint64_t peer, const struct live_job *job, const struct lease_key *k,
-			   bool anew);
+			   bool from_seeds);
 	void (*revoke_lease)(struct peers *user, uint64_t peer, const struct lease_key *k);
 	void (*acknowledge_result)(struct peers *user, uint64_t peer, const struct lease_key *k, enum ack ack,
 				   const char *text);
 
-	/* Disconnect any peer. fault_peer: it has sent something invalid; dismiss_peer: like fault, but the core has
-	 * already forgotten the peer. */
+	/* Disconnect any peer. fault_peer: it has sent something invalid; dismiss_peer: like fault_peer, but the core
+	 * has already forgotten the peer. */
 	void (*fault_peer)(struct peers *user, uint64_t peer, const char *text);
 	void (*dismiss_peer)(struct peers *user, uint64_t peer, const char *text);
 	/* The answer to extend_job. refusal: the reason; NULL: the job was extended, and text says how. */
@@ -35,8 +35,8 @@ struct peer_calls {
 	/* Calls that concern several peers: */
 	void (*announce_job_end)(struct peers *user, uint64_t job); /* tells workers that a job has ended */
 	void (*release_watchers)(struct peers *user); /* lets clients go that watch a job that has ended */
-	void (*serve_previews)(struct peers *user,
-			       uint64_t job); /* serves clients that wait for a preview of this job */
+	/* serves clients that wait for a preview of this job */
+	void (*serve_previews)(struct peers *user, uint64_t job);
 	/* A file that files_check was asked for has been read. rc: 0, or an error, described by text. */
 	void (*announce_file_checked)(struct peers *user, const struct blob_hash *h, int rc, const char *text);
 	/* The jobs of the last run have been read; handles the requests that waited for that. */

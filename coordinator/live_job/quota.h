@@ -25,7 +25,7 @@ struct quota_usage {
 };
 
 /* Returns -EDQUOT with a sentence for the client if the new job would exceed a limit. */
-int quota_check(const struct quota *q, const struct quota_usage *has, const struct plan *p, uint64_t asset_bytes,
+int quota_check(const struct quota *q, const struct quota_usage *usage, const struct plan *p, uint64_t asset_bytes,
 		struct error *e);
 
 #endif

@@ -14,7 +14,7 @@
 
 /* Progress of a replay, for another thread to watch. */
 struct replay_progress {
-	_Atomic uint64_t bytes_read; /* bytes read so far; journals are read once, the checkpoint twice */
+	_Atomic uint64_t bytes_read; /* journals are read once, the checkpoint twice */
 	atomic_bool stop_requested;  /* set by the watching thread: stop soon, with -ECANCELED */
 };
 

@@ -22,9 +22,9 @@ struct rollback {
 	struct live_job_maker maker; /* the worker that made `states` */
 };
 
-/* Notes that a batch was merged whose record is at offset `at` of the journal. If out of memory it is not noted, and
+/* Notes that a batch was merged whose record is at `offset` in the journal. If out of memory it is not noted, and
  * cannot be taken back. maker NULL: not known. */
-void rollback_note_batch(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
+void rollback_note_batch(struct live_job *job, const struct lease_key *k, uint64_t offset, const Farm__Maker *maker);
 /* Reads the last merged batch of the (group, part) of k, which must be the next lease. Returns -ENOENT if k is not,
  * or if the batch is not in the journal. */
 int rollback_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct rollback *b,
@@ -37,9 +37,9 @@ void rollback_fini(struct rollback *b);
  * (group, part) back. */
 int rollback_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e);
 
-/* Copies the last batches into another journal, `most` bytes at most; the others are left out. *list: their offsets
- * in the other journal, mem_alloc'd. */
-void rollback_copy_records(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
-			   size_t *count);
+/* Copies the last batches into another journal, at most `max_bytes` bytes; the others are left out. *list: their
+ * offsets in the other journal, mem_alloc'd. */
+void rollback_copy_records(const struct live_job *job, struct journal *to, uint64_t max_bytes,
+			   struct merged_record **list, size_t *count);
 
 #endif
