@@ -11,7 +11,7 @@ void fetch_begin(struct session *p, const Farm__Fetch *f);
 void fetch_end(struct session *p);
 /* Call when the live job's canvas is free, or the job has ended: sends the preview to the clients that wait for it,
  * or starts making it. */
-void fetch_serve_previews(struct peers *s, uint64_t job);
+void fetch_serve_previews(struct peers *s, uint64_t id);
 /* Whether a client is fetching the job's result, or waits for it. */
 bool fetch_uses_result(const struct peers *s, uint64_t job);
 

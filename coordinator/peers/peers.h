@@ -10,8 +10,8 @@
 
 /* jobs, tls and the jobs' loop must be set. Fills in jobs->peers. */
 void peers_init(struct peers *s);
-void peers_accept(struct peers *s, struct listener *at); /* accepts a new connection */
-void peers_tick(struct peers *s);			 /* call every TICK_MS */
-void peers_stop(struct peers *s);			 /* closes the listeners and all connections */
+void peers_accept(struct peers *s, struct listener *source); /* accepts a new connection */
+void peers_tick(struct peers *s);			     /* call every TICK_MS */
+void peers_stop(struct peers *s);			     /* closes the listeners and all connections */
 
 #endif

@@ -82,7 +82,7 @@ struct peers {
 	LIST_HEAD(, session) buckets[SESSION_BUCKETS];
 	uv_idle_t lookup_idle; /* runs while submissions look for their files */
 	unsigned session_count, fetch_count;
-	size_t queued_request_bytes; /* bytes of waiting requests */
+	size_t queued_request_bytes;
 	uint64_t request_total;	     /* number of requests of clients so far */
 	double request_ms;	     /* ms that requests of clients have taken since the last tick */
 	size_t submit_message_bytes; /* bytes of the messages of all submissions being received */

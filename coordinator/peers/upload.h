@@ -41,9 +41,10 @@ struct upload {
 
 /* Checks a Submit and takes over its envelope. bandwidth: as in struct plan_request. Returns -EINVAL with a sentence
  * for the client. */
-int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
-uint64_t
-upload_file_bytes(const struct upload *u); /* bytes of its files; several files with the same content count once */
+int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, double bandwidth,
+	       struct error *e);
+/* Returns the bytes of its files; several files with the same content count once. */
+uint64_t upload_file_bytes(const struct upload *u);
 /* Looks for the files in the store, some per call, since each costs two system calls. Returns -EAGAIN: call again in
  * another turn of the loop; -EINPROGRESS: a file is being read, call again when upload_file_checked has returned true;
  * 0: all files have been looked for; -EINVAL with a sentence. */
@@ -51,7 +52,7 @@ int upload_look_up_files(struct upload *u, struct jobs *jobs, struct error *e);
 /* Whether files are left to be looked for. */
 bool upload_is_looking_up(const struct upload *u);
 /* A file has been read. Returns true if the upload was waiting for it. */
-bool upload_file_checked(struct upload *u, const struct blob_hash *h, bool right);
+bool upload_file_checked(struct upload *u, const struct blob_hash *h, bool is_intact);
 void upload_free(struct upload *u); /* releases the blobs that it holds */
 
 /* Takes one chunk from the client. Returns 1 if a blob is complete, and waits for upload_flush; 0 if not; -EFBIG if

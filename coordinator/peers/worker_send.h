@@ -12,9 +12,9 @@
 /* Allows the worker to send results of this job, up to its largest size. */
 void worker_raise_payload_limit(struct session *p, const struct live_job *job);
 
-/* Each does nothing if the peer is gone. anew: send seeds instead of chain states. */
+/* Each does nothing if the peer is gone. from_seeds: send seeds instead of chain states. */
 void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k,
-		       bool anew);
+		       bool from_seeds);
 void worker_send_revoke(struct peers *s, uint64_t peer, const struct lease_key *k);
 void worker_send_ack(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text);
 void worker_send_job_end(struct session *p, uint64_t job);
