@@ -12,7 +12,7 @@
 
 struct age_job {
 	uint64_t id;
-	double end_order; /* order of the ends; unlike `ended`, it is right even if observed time has started again */
+	double end_order; /* unlike `ended`, it is right even if observed time has started again */
 	double ended;	  /* observed time of the end in s (age_clock.h) */
 	/* Bytes of the films, which only serve extensions, and of result, preview and log together. */
 	uint64_t film_bytes, result_bytes;
@@ -28,7 +28,7 @@ struct age_limits {
 };
 enum { AGE_RECORD_FACTOR = 10 };
 
-/* Sorts the jobs by their order, the one that ended first in front, and chooses. now: observed time in s. */
+/* Sorts the jobs by end_order, the one that ended first in front, and chooses. now: observed time in s. */
 void age_choose_deletions(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

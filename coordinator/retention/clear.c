@@ -34,12 +34,12 @@ struct clearing {
 	/* Ids of the jobs to look at next; in the last phase ids of the records to be dropped. */
 	uint64_t ids[ROW_BATCH];
 	size_t id_count, examined;
-	uint64_t last_id;	/* id of the job looked at last */
+	uint64_t last_id;	/* id of the job examined last */
 	struct list candidates; /* struct age_job: the ended jobs looked at */
 	size_t cleared_count, record_count;
-	double chosen_at;  /* s since 1970, when the choice was made; 0: not yet */
-	bool all_examined; /* all jobs have been looked at */
-	bool repeat_soon;  /* the result of a job that ended just now is being fetched: start another round soon */
+	double chosen_at; /* s since 1970, when the choice was made; 0: not yet */
+	bool all_examined;
+	bool repeat_soon; /* the result of a job that ended just now is being fetched: start another round soon */
 	struct job_record record; /* record of the current job */
 };
 

@@ -21,18 +21,17 @@ struct extension_basis {
 	uint64_t rounds;		 /* complete rounds */
 	double seconds;			 /* s of the job's time used so far */
 	double error;			 /* relative error as last estimated; NAN: none */
-	bool ended, extension_cancelled; /* extension_cancelled: an extension was cancelled, so its bounds no longer
-					    apply */
+	bool ended, extension_cancelled; /* extension_cancelled: so its bounds no longer apply */
 };
 
 /* Returns -EINVAL with a sentence if no bound is named or a number is invalid. */
 int extend_check(const struct extension *x, struct error *e);
 /*
- * Makes the new plan from p. asked: the request that p was made from; on return the request that *out was made from.
+ * Makes the new plan from p. request: the one that p was made from; on return the request that *out was made from.
  * Returns -EINVAL with a sentence if extend_check fails, if the job would end at once, or if it would have no bound
  * where one is required. Pure.
  */
-int extend_plan(const struct plan *p, const struct extension *x, const struct extension_basis *from,
-		struct plan_request *asked, struct plan *out, struct error *e);
+int extend_plan(const struct plan *p, const struct extension *x, const struct extension_basis *basis,
+		struct plan_request *request, struct plan *out, struct error *e);
 
 #endif

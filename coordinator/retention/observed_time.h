@@ -12,7 +12,7 @@
  * jobs count as new. Never fails. */
 void observed_time_open(struct jobs *jobs);
 double observed_time_now(const struct jobs *jobs); /* observed time in s */
-void observed_time_store(
-	const struct jobs *jobs); /* stores it in the note; if the disk refuses, the next call tries again */
+/* Stores it in the note; if the disk refuses, the next call tries again. */
+void observed_time_store(const struct jobs *jobs);
 
 #endif
