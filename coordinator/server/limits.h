@@ -9,8 +9,8 @@
 enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MAX = 1000000, FETCHES_MAX = 128 };
 
 /* Raises the process's limit on file descriptors as far as needed and possible, and returns the number of connections
- * in *connections. asked: the number requested; 0: the default, or fewer if there are not enough descriptors. Returns
+ * in *connections. requested 0: the default, or fewer if there are not enough descriptors. Returns
  * -EINVAL if the descriptors do not suffice for the requested number. */
-int limits_reserve_connections(unsigned asked, unsigned *connections, struct error *e);
+int limits_reserve_connections(unsigned requested, unsigned *connections, struct error *e);
 
 #endif

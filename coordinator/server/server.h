@@ -27,13 +27,12 @@ struct server {
 	struct peers peers;
 	struct status_socket *status;
 	double next_tls_check; /* next check of the TLS files */
-	double watchdog_seconds,
-		/* Interval in s of the service manager's watchdog (0: none), and when to notify it next. */
-		next_watchdog;
+	/* Interval of the service manager's watchdog (0: none), and when to notify it next. */
+	double watchdog_seconds, next_watchdog;
 };
 
 /* Starts to listen, and to read the jobs of an earlier run, which the loop continues (recovery.h). */
-int server_open(struct server **s, const struct server_config *c, struct error *e);
+int server_open(struct server **out, const struct server_config *c, struct error *e);
 int server_await_jobs(struct server *s, struct error *e); /* runs the loop until those jobs have been read */
 void server_close(struct server *s); /* stops the coordinator, unless a signal has done so, and frees it */
 
