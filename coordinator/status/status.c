@@ -80,7 +80,7 @@ struct status_socket {
 	bool tick_pending;
 	struct job_view *shown_jobs; /* jobs as last sent to subscribers */
 	size_t shown_count;
-	uint64_t shown_changes; /* jobs.changes at the last tick that published */
+	uint64_t shown_changes; /* jobs.change_count at the last tick that published */
 	char *path;		/* NULL: the socket was inherited */
 	char *group;		/* group that may connect; NULL: none */
 	struct socket_file file;
