@@ -24,12 +24,12 @@ struct age_clock {
 	char boot_id[AGE_CLOCK_BOOT_ID_SIZE]; /* the kernel's identifier of this boot */
 };
 
-/* Sets now->observed_seconds; the other members of `now` have been set by the caller. last: the clock as stored last;
- * NULL: none, and observed time starts at 0. credit: maximum in s to be added across a reboot. */
-void age_clock_advance(struct age_clock *now, const struct age_clock *last, double credit);
+/* Sets now->observed_seconds; the other members of `now` have been set by the caller. previous: the clock as stored
+ * last; NULL: none, and observed time starts at 0. max_credit: limit in s on what is added across a reboot. */
+void age_clock_advance(struct age_clock *now, const struct age_clock *previous, double max_credit);
 /* Returns a thirtieth of the time that results are kept, but at most a day, so that no jump of the wall clock can
- * remove a result that is not nearly that old already. keep: s; 0: results are kept forever. */
-double age_clock_max_credit(double keep);
+ * remove a result that is not nearly that old already. retention_seconds: 0: results are kept forever. */
+double age_clock_max_credit(double retention_seconds);
 
 /* Writes the clock as one line with a checksum. Returns the length of the line. */
 size_t age_clock_to_text(const struct age_clock *s, char text[AGE_CLOCK_TEXT_MAX]);

@@ -34,7 +34,7 @@ static _Atomic uint64_t unwritten_bytes;
 struct queued_record {
 	struct queued_record *next;
 	struct journal_record record;
-	struct buf copied, owned; /* the body of the record is a followed by b */
+	struct buf copied, owned; /* the body of the record is `copied` followed by `owned` */
 };
 
 struct journal {
@@ -42,14 +42,13 @@ struct journal {
 	uint64_t job, generation, salt;
 	atomic_uint reference_count;
 	pthread_mutex_t write_lock; /* held while the file is written or truncated; taken before `queue_lock` */
-	pthread_mutex_t queue_lock; /* held briefly; protects the queue: first, last, waiting, number */
+	pthread_mutex_t queue_lock; /* held briefly; protects queue_head, queue_tail, queued_bytes and next_number */
 	struct queued_record *queue_head, **queue_tail;
-	uint64_t queued_bytes; /* bytes in the queue; with `written_bytes`, the size of the file once the queue is empty
-				*/
-	uint64_t next_number;  /* number of the next record */
+	/* bytes in the queue; with `written_bytes`, the size of the file once the queue is empty */
+	uint64_t queued_bytes;
+	uint64_t next_number;				   /* number of the next record */
 	uint64_t damaged_count;				   /* records of the file that were damaged when it was read */
-	_Atomic uint64_t written_records, durable_records; /* written_records: records written to the file;
-							      durable_records: records that are durable */
+	_Atomic uint64_t written_records, durable_records; /* records in the file, and those that are durable */
 	_Atomic uint64_t written_bytes, synced_bytes; /* bytes of the file that are written, and that are flushed */
 	_Atomic uint64_t reserved_end;		      /* space is reserved up to this offset */
 	_Atomic uint64_t reserved_record_bytes;	      /* bytes of the record last reserved */
@@ -298,8 +297,8 @@ static int read_records(struct journal *j, uint64_t end, struct journal_gaps *ga
 	return rc;
 }
 
-/* Reads the head of the file. If the head is damaged, takes the salt from the first record instead and sets *anew, so
- * that the head is written again. */
+/* Reads the head of the file. If the head is damaged, takes the salt from the first record instead and sets
+ * *rewrite_head, so that the head is written again. */
 static int read_file_head(struct journal *j, uint64_t end, bool *rewrite_head, struct error *e)
 {
 	unsigned char head[JOURNAL_HEAD_SIZE];

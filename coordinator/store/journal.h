@@ -42,7 +42,7 @@ enum journal_kind {
 struct journal;
 
 /* Creates a new journal. File and name are durable when this returns. The folder must exist. */
-int journal_create(struct journal **j, const char *folder, uint64_t job, uint64_t generation, struct error *e);
+int journal_create(struct journal **out, const char *folder, uint64_t job, uint64_t generation, struct error *e);
 
 /* A record, or a place where records are missing. */
 struct journal_item {
@@ -61,20 +61,20 @@ struct journal_item {
 typedef int journal_visitor(void *user, const struct journal_item *item, struct error *e);
 
 struct journal_damage {
-	uint64_t cut_bytes;	/* bytes of incomplete records at the end */
-	uint64_t damaged_count; /* number of damaged records in the middle */
-	uint64_t
-		lost_count; /* number of these records that had been durable; the others may never have been complete */
+	uint64_t cut_bytes;	/* of incomplete records at the end */
+	uint64_t damaged_count; /* records in the middle */
+	/* number of these records that had been durable; the others may never have been complete */
+	uint64_t lost_count;
 };
 
 /* Opens an existing journal: visits its valid records, cuts off incomplete ones at the end, and appends behind them.
  * Returns -ENOENT if there is no file; -EBADMSG if it belongs to another job or generation; -EPROTO if it is of
  * another version. After any error, including a read error, the file is unchanged. */
-int journal_open(struct journal **j, const char *folder, uint64_t job, uint64_t generation, journal_visitor *visit,
-		 void *user, struct journal_damage *found, struct error *e);
+int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visitor *visit,
+		 void *user, struct journal_damage *damage, struct error *e);
 /* Reads the body of a visited record again; *body is mem_alloc'd. Returns -EBADMSG if it has been damaged since. The
  * loop's thread, or any thread that owns the journal. */
-int journal_read_body(struct journal *j, uint64_t at, unsigned char **body, size_t *size, struct error *e);
+int journal_read_body(struct journal *j, uint64_t offset, unsigned char **body, size_t *size, struct error *e);
 /* Adds a reference. */
 void journal_hold(struct journal *j);
 void journal_release(struct journal *j); /* ends a reference; j may be NULL */
@@ -83,12 +83,12 @@ void journal_release(struct journal *j); /* ends a reference; j may be NULL */
  * Returns -ENOSPC if the disk is full; -EIO if the journal is bad, since freeing space would not help: the sentence
  * says what made it bad. */
 int journal_reserve(struct journal *j, size_t body, struct error *e);
-/* Appends a record. lease: NULL: it belongs to none. The body is `a`, which is copied, followed by `b` (may be NULL),
- * which is taken over on success. Returns -ENOMEM, or -EFBIG if the body is too large. Records that are neither
+/* Appends a record. lease: NULL: it belongs to none. The body is a copy of `copied`, followed by `owned` (may be
+ * NULL), which is taken over on success. Returns -ENOMEM, or -EFBIG if the body is too large. Records that are neither
  * results nor fingerprints (estimates, counters) are refused with -ENOSPC if the disk is full. While the journal is
  * bad, records are not written but kept in memory for journal_renew, so the disk's space does not matter. */
 int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed,
-		   const void *a, size_t a_size, struct buf *b, struct error *e);
+		   const void *copied, size_t copied_size, struct buf *owned, struct error *e);
 uint64_t journal_bytes(struct journal *j); /* size of the file including queued records */
 uint64_t journal_generation(const struct journal *j);
 /* Writes the queued records, so that everything appended before the call can be read from the file. A crash may still

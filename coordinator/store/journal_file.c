@@ -131,7 +131,7 @@ static int read_body(const struct journal_scan *s, uint64_t offset, const struct
 	return rc == -ENODATA ? 0 : rc;
 }
 
-/* Moves *at to the first mark at or after it. Returns 1, 0 if there is none, or -errno. */
+/* Moves *offset to the first mark at or after it. Returns 1, 0 if there is none, or -errno. */
 static int find_mark(const struct journal_scan *s, uint64_t *offset)
 {
 	unsigned char *window = mem_alloc(WINDOW_SIZE, 1);

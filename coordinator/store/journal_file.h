@@ -81,7 +81,7 @@ struct journal_segment {
 	uint64_t begin, end;
 	uint64_t record_count;	      /* number of records, according to the numbers in heads */
 	struct journal_record record; /* not set for UNKNOWN */
-	unsigned char *body;	      /* WHOLE: the body, mem_alloc'd */
+	unsigned char *body;	      /* VALID: the body, mem_alloc'd */
 };
 
 struct journal_scan {
@@ -99,13 +99,13 @@ void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t s
 int journal_scan_next(struct journal_scan *s, struct journal_segment *p);
 void journal_scan_end(struct journal_scan *s);
 /* Reads the record at this offset. Returns 1 if it is valid (*body is mem_alloc'd), 0 if not, or -errno. */
-int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
+int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t offset, struct journal_record *r,
 			unsigned char **body);
 /* Finds the salt of a file whose head is damaged, from its first record. Returns -EBADMSG if that is damaged, too. */
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 
 /* Gaps in the numbers of records, collected until it is known whether the missing records were durable. {NULL, 0} is
- * empty; free with mem_free(first). */
+ * empty; free with mem_free(items). */
 struct journal_gaps {
 	struct journal_gap {
 		uint64_t number, count;
@@ -117,8 +117,8 @@ int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, st
  * that were durable. */
 void journal_gaps_count_records(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost);
 
-/* Reads exactly `body_size` bytes. Returns -ENODATA if the file ends before that; other errors are I/O errors. */
-int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
+/* Reads exactly `size` bytes. Returns -ENODATA if the file ends before that; other errors are I/O errors. */
+int journal_read_at(int fd, void *bytes, size_t size, uint64_t offset);
 
 /* Deletes the journals in the folder except that of generation `keep`; UINT64_MAX: all. If the folder cannot be
  * listed to its end, some may be left, and that is logged. */

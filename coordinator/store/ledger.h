@@ -25,7 +25,7 @@ struct ledger;
 
 /* Opens the database in `folder`, the spool. A file that is not a database, or is damaged, is renamed to *.damaged
  * and restored from the other one. Returns -EPROTO if a later version wrote it. */
-int ledger_open(struct ledger **l, const char *folder, struct error *e);
+int ledger_open(struct ledger **out, const char *folder, struct error *e);
 void ledger_close(struct ledger *l); /* l may be NULL */
 /* Whether the database had no job when it was opened and never had one: the spool is new, or has lost both files. */
 bool ledger_is_new(const struct ledger *l);
@@ -43,27 +43,28 @@ int ledger_write_row(struct ledger *l, const struct ledger_job *j, struct error 
 int ledger_delete(struct ledger *l, uint64_t id, struct error *e); /* deletes a row, whether its job has ended or not */
 /* Deletes the rows of ended jobs, all at once. Sets the ids of live jobs in the list to 0 and keeps their rows. */
 int ledger_delete_ended(struct ledger *l, uint64_t *ids, size_t count, struct error *e);
-/* who: the user who holds the job; "": released. */
-int ledger_set_holder(struct ledger *l, uint64_t id, const char *who, struct error *e);
+/* holder: the user who holds the job; "": released. */
+int ledger_set_holder(struct ledger *l, uint64_t id, const char *holder, struct error *e);
 int ledger_set_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
 /* Records that the job has ended, with record r; ignored if the job has been extended since (r->extended differs).
  * extendable: the row keeps its submission and plan. */
 int ledger_end_job(struct ledger *l, const struct job_record *r, bool extendable, struct error *e);
 /* Sets another submission, plan and number of extensions; a job that has ended becomes live again. Returns -ENOENT if
  * there is no such job. */
-int ledger_extend_job(struct ledger *l, const struct ledger_job *j, struct error *e);
+int ledger_extend_job(struct ledger *l, const struct ledger_job *extension, struct error *e);
 /* Deletes the submission and plan in the row of an ended job. */
 int ledger_delete_submission(struct ledger *l, uint64_t id, struct error *e);
 
 enum ledger_selection { LEDGER_ALL, LEDGER_LIVE };
 /* Returns the ids, ascending; *ids is mem_alloc'd, NULL if there are none. Reads the whole table, which takes long if
  * it is large. */
-int ledger_list_ids(struct ledger *l, enum ledger_selection which, uint64_t **ids, size_t *count, struct error *e);
+int ledger_list_ids(struct ledger *l, enum ledger_selection selection, uint64_t **ids, size_t *count, struct error *e);
 enum ledger_range { LEDGER_ABOVE, LEDGER_BELOW, LEDGER_LATEST };
-/* Returns the ids of at most `most` ended jobs: those nearest above `id`, ascending; nearest below `id`, descending;
- * or, with LEDGER_LATEST, those below `id` that ended last, the latest first, which reads the whole table. */
-int ledger_list_ended(struct ledger *l, enum ledger_range from, uint64_t id, uint64_t *ids, size_t most, size_t *count,
-		      struct error *e);
+/* Returns the ids of at most `max_count` ended jobs: those nearest above `id`, ascending; nearest below `id`,
+ * descending; or, with LEDGER_LATEST, those below `id` that ended last, the latest first, which reads the whole table.
+ */
+int ledger_list_ended(struct ledger *l, enum ledger_range range, uint64_t id, uint64_t *ids, size_t max_count,
+		      size_t *count, struct error *e);
 /* Counted once, then kept up to date; 0 also if the table cannot be read. */
 uint64_t ledger_ended_count(struct ledger *l);
 /* Reads a row. Its texts and bytes are valid until the next call. Returns 1, 0 if there is none, or an error. */

@@ -36,11 +36,11 @@ void ledger_replica_release(struct ledger_replica *s);
 
 /* Writes a row in two steps. ledger_replica_bind copies the row, so it may be a row that was read and is released
  * before ledger_replica_put. Returns -ENOMEM if out of memory. */
-int ledger_replica_bind(struct ledger_replica *s, const struct ledger_job *j, struct error *e);
+int ledger_replica_bind(struct ledger_replica *side, const struct ledger_job *j, struct error *e);
 int ledger_replica_put(struct ledger_replica *s, struct error *e);
 int ledger_replica_remove(struct ledger_replica *s, uint64_t id, struct error *e);
 int ledger_replica_set_note(struct ledger_replica *s, const char *name, const char *text, struct error *e);
 /* Reads a note; *text is mem_alloc'd. Returns -ENOENT if there is none, -EBADMSG if its checksum does not match. */
-int ledger_replica_get_note(struct ledger_replica *s, const char *name, char **text, struct error *e);
+int ledger_replica_get_note(struct ledger_replica *side, const char *name, char **text, struct error *e);
 
 #endif

@@ -18,9 +18,9 @@ struct old_row {
 	struct ProtobufCMessage *message;
 };
 
-/* Reads a file of less than `most` bytes and adds a final 0; *text is mem_alloc'd. Returns -ENOENT if there is none,
- * -EFBIG if it is longer. */
-int old_spool_read_text(const char *path, size_t most, char **text, size_t *size, struct error *e);
+/* Reads a file of less than `max_size` bytes and adds a final 0; *text is mem_alloc'd. Returns -ENOENT if there is
+ * none, -EFBIG if it is longer. */
+int old_spool_read_text(const char *path, size_t max_size, char **text, size_t *size, struct error *e);
 /* Reads the copy of a job's row. Returns -ENOENT if there is no file, -EBADMSG if it is damaged or another job's,
  * -EPROTO if it is of another version. */
 int old_spool_read_row(const struct spool *s, uint64_t job, struct old_row *out, struct error *e);

@@ -57,8 +57,8 @@ void record_set_effects(struct job_record *r, json_t *list);   /* takes over the
 json_t *record_effects_to_json(const struct job_record *r);    /* a new array */
 json_t *record_counts_to_json(const struct job_record *r);     /* a new object "counts" */
 json_t *record_strategies_to_json(const struct job_record *r); /* a new array, see strategy_to_json */
-int record_to_json(const struct job_record *r, char **text,
-		   struct error *e); /* *text is mem_alloc'd; -ENOMEM, -EINVAL: a text is not UTF-8 */
+/* *out is mem_alloc'd. Returns -ENOMEM, or -EINVAL if a text is not UTF-8. */
+int record_to_json(const struct job_record *r, char **out, struct error *e);
 /* Returns -EBADMSG if the text is damaged or no record, -EPROTO if it is of another version. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);
 bool record_is_ended(const struct job_record *r);

@@ -18,7 +18,7 @@
 struct spool;
 
 /* Creates the folder if necessary. Returns -EBUSY if another coordinator uses it. */
-int spool_open(struct spool **s, const char *folder, struct error *e);
+int spool_open(struct spool **out, const char *folder, struct error *e);
 void spool_close(struct spool *s);
 
 /* A file of SPOOL_RESERVE_BYTES bytes that occupies disk space. spool_create_reserve creates it while four times as
@@ -46,7 +46,7 @@ int spool_write_job_file(const struct spool *s, uint64_t id, const char *file, c
 			 struct error *e);
 /* Checks the first bytes of a file, which in all versions are a name of five bytes and a version of three digits.
  * Returns -EBADMSG if the name differs, -EPROTO with a sentence if the version does. Any thread. */
-int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e);
+int spool_check_version(const char actual[8], const char expected[8], const char *path, struct error *e);
 /* Returns the ids of all jobs that have a folder, ascending; *ids is mem_alloc'd, NULL if there are none. */
 int spool_list_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e);
 /* Returns in *bytes the size of a job's merged results: its journals, plus `checkpoints` times its checkpoint; 0
