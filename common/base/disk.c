@@ -141,8 +141,8 @@ int disk_sync_folder(const char *path, struct error *e)
 int disk_make_folder(const char *path, struct error *e)
 {
 	char parent[4096];
-	bool existed =
-		disk_mkdir(path, 0700) != 0; /* flushed again: an interrupted start may have left it not durable */
+	/* Flushed again: an interrupted start may have left it not durable. */
+	bool existed = disk_mkdir(path, 0700) != 0;
 	if (existed && errno != EEXIST)
 		return error_file(e, errno, path);
 	int n = snprintf(parent, sizeof parent, "%s", path);

@@ -27,16 +27,16 @@ enum {
 static const double min_work_share =
 	1.0 / 16;		     /* looks at less than this share of the work say little about the future */
 static const double burst_sd = 0.15; /* spread of a look in addition to chi-square: rare bursts of light */
-static const double trend_prior_sd =
-	0.2; /* prior standard deviation of the trend: rare bursts of light, and chains that remember their seeds */
-static const double trend_memory = 2,
-		    trend_memory_sd = 0.8; /* e-folds of work over which a trend decays; the spread of its logarithm */
-static const double drift_sd = 0.08;	   /* standard deviation of unforeseen changes of x per e-fold of work */
-static const double min_price_sd = 0.03;   /* least relative spread of the time per sample over time */
-static const double other_render_price_sd =
-	0.08; /* the same from one render to another: leases of other lengths cost up to 6 % more or less per sample */
-static const double max_work_ratio =
-	4; /* looks at up to so many times the work that a target takes tell what it takes */
+/* Prior standard deviation of the trend: rare bursts of light, and chains that remember their seeds. */
+static const double trend_prior_sd = 0.2;
+/* E-folds of work over which a trend decays; the spread of its logarithm. */
+static const double trend_memory = 2, trend_memory_sd = 0.8;
+static const double drift_sd = 0.08;	 /* standard deviation of unforeseen changes of x per e-fold of work */
+static const double min_price_sd = 0.03; /* least relative spread of the time per sample over time */
+/* The same from one render to another: leases of other lengths cost up to 6 % more or less per sample. */
+static const double other_render_price_sd = 0.08;
+/* Looks at up to so many times the work that a target takes tell what it takes. */
+static const double max_work_ratio = 4;
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */

@@ -28,8 +28,8 @@ static const char no_spread_text[] =
  * was true. */
 static void append_error_as_measured(const struct canvas_image *img, struct text *t)
 {
-	double as_measured =
-		img->rel_mse_as_measured + img->rel_mse_unseen; /* unseen light is missing in either case */
+	/* Unseen light is missing in either case. */
+	double as_measured = img->rel_mse_as_measured + img->rel_mse_unseen;
 	if (as_measured < 0.25 * img->rel_mse)
 		text_appendf(t, "; if the bright ones are highlights and not fireflies, the error is about %.3g %%",
 			     100 * sqrt(as_measured));

@@ -56,9 +56,9 @@ struct conn {
 	size_t backlog_offset;
 	bool has_backlog;     /* there is such a rest; the socket is not read until it is used up */
 	unsigned frame_count; /* frames delivered since other connections could be read */
-	bool is_accepted, first_byte_checked,
-		had_bad_checksum; /* by a listener; the first bytes have been looked at; see conn_had_bad_checksum */
-	int certificate_error;	  /* what conn_certificate_error returns */
+	/* is_accepted: by a listener */
+	bool is_accepted, first_byte_checked, had_bad_checksum;
+	int certificate_error; /* what conn_certificate_error returns */
 	char close_reason[256];
 };
 
@@ -235,8 +235,8 @@ static size_t handle_frames(struct conn *c, const unsigned char *bytes, size_t s
 		} else if (rc) {
 			c->frame_count++;
 			deliver_frame(c);
-			frame_reader_reset(
-				&c->reader); /* now: the next frame, which would do it, may be long in coming */
+			/* now: the next frame, which would do it, may be long in coming. */
+			frame_reader_reset(&c->reader);
 			release_turn(c);
 		}
 	}

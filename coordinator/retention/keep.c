@@ -69,8 +69,8 @@ void keep_trim_films(const struct jobs *jobs)
 void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 {
 	if (jobs->ended_job_count == ENDED_JOBS_MAX) {
-		keep_drop_films(jobs,
-				jobs->ended_jobs[0].id); /* films are counted by this list, which the job leaves */
+		/* Films are counted by this list, which the job leaves. */
+		keep_drop_films(jobs, jobs->ended_jobs[0].id);
 		memmove(jobs->ended_jobs, jobs->ended_jobs + 1, --jobs->ended_job_count * sizeof *jobs->ended_jobs);
 	}
 	jobs->ended_jobs[jobs->ended_job_count++] = *r;

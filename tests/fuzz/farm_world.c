@@ -75,8 +75,8 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.status_socket = socket_path;
 	c.max_journal_bytes = 1 << 12; /* so that there are checkpoints */
 	c.max_connections = 16;
-	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds =
-		3600; /* findings must not depend on the machine's load */
+	/* Findings must not depend on the machine's load. */
+	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds = 3600;
 	for (unsigned i = 0; i < FARM_WORLD_PEERS; i++)
 		w->peers[i].fd = -1;
 	int rc = server_open(&w->server, &c, e);

@@ -35,8 +35,8 @@ struct farm_world {
 struct farm_world *farm_world_new(void);    /* starts on a copy of the prepared spool */
 void farm_world_free(struct farm_world *w); /* removes its folder as well */
 void farm_world_copy_spool(const char *to); /* copies the prepared spool only, for callers that damage it first */
-int farm_world_open(struct farm_world *w,
-		    struct error *e); /* server_open on w->spool as it is; returns once its jobs are read */
+/* server_open on w->spool as it is; returns once its jobs are read. */
+int farm_world_open(struct farm_world *w, struct error *e);
 void farm_world_close(struct farm_world *w);
 
 void farm_world_run_once(struct farm_world *w); /* does all that can be done at once */

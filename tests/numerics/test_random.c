@@ -31,8 +31,8 @@ static uint64_t sample_factor_of_run(void)
 struct trial {
 	char name[32];
 	struct random_scene scene;
-	struct agreement_image reference,
-		precise_reference; /* precise_reference: with 16 times the samples; groups = 0: not rendered yet */
+	/* precise_reference: with 16 times the samples; groups = 0: not rendered yet. */
+	struct agreement_image reference, precise_reference;
 };
 
 /* side: name of the image; each has random numbers of its own. */

@@ -28,8 +28,8 @@ struct balance_trial {
 	bool is_broken; /* a deliberately broken mutation: paths are not checked */
 	uint64_t pairs, accepted, counters[STRATEGY_COUNTERS];
 	double acceptance_sum; /* sum of the acceptance probabilities a */
-	double phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS],
-		abs_phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS]; /* of a phi, a |phi| */
+	/* sums of a phi and a |phi| */
+	double phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS], abs_phi_sum[BALANCE_GROUPS][BALANCE_FUNCTIONS];
 };
 
 struct balance_verdict {
@@ -48,8 +48,8 @@ void balance_format_name(const struct balance_trial *t, char text[48]);
 /* Combines the same strategy's results in several worlds: a relative fault that all worlds share is found from all
  * of them together, each weighted by its precision. Initialize with zeros. */
 struct balance_pool {
-	double precision[BALANCE_FUNCTIONS],
-		weighted_fault[BALANCE_FUNCTIONS]; /* sums of 1 / error^2, and of the faults times that */
+	/* Sums of 1 / error^2, and of the faults times that. */
+	double precision[BALANCE_FUNCTIONS], weighted_fault[BALANCE_FUNCTIONS];
 };
 void balance_pool_add(struct balance_pool *p, const struct balance_trial *t);
 struct balance_verdict balance_pool_judge(const struct balance_pool *p);

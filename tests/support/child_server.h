@@ -16,8 +16,8 @@
  * Returns 0 once it listens. Timeouts that a test does not wait for should exceed the pauses of a busy machine. */
 int child_server_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
 int child_server_stop(void **state); /* a teardown: fails if the server did not end well */
-void child_server_set_spool_maker(
-	void (*spool)(const char *path)); /* makes the spool of the next start; NULL: nothing */
+/* Makes the spool of the next start; NULL: nothing. */
+void child_server_set_spool_maker(void (*spool)(const char *path));
 /* Contains the spool and the status socket, `status`. If the test creates a file `nomem` there, the next connection
  * gets no memory. */
 const char *child_server_folder(void);
@@ -57,8 +57,8 @@ struct pending_leases {
 
 /* Handles one message. Returns its verdict, or VERDICT_NONE if it was not one. */
 Farm__Verdict child_server_handle_message(struct scripted_peer *p, struct pending_leases *pending);
-Farm__Verdict child_server_await_verdict(struct scripted_peer *p,
-					 struct pending_leases *pending); /* waits for the next one */
+/* Waits for the next one. */
+Farm__Verdict child_server_await_verdict(struct scripted_peer *p, struct pending_leases *pending);
 void child_server_send_batch(struct scripted_peer *p, const struct batch *b, const struct plan *plan);
 
 #endif

@@ -46,8 +46,8 @@ void coord_expect_built_jobs(
 void coord_expect_silence(void); /* checks that no message is on its way: the answer to another message comes first */
 
 void coord_send_grant(uint64_t job);
-void coord_grant_new_job(
-	uint64_t job); /* a lease of a job that the worker does not know, so that it asks for the job */
+/* A lease of a job that the worker does not know, so that it asks for the job. */
+void coord_grant_new_job(uint64_t job);
 void coord_send_revoke(uint64_t job);
 void coord_send_job_info(uint64_t job);
 void coord_send_job_end(uint64_t job);

@@ -26,13 +26,13 @@ const Farm__HelloAck *scripted_peer_exchange_hello(struct scripted_peer *p, uint
 						   Farm__Role role);		/* NULL: no such answer */
 struct scripted_peer *scripted_peer_connect_as(uint16_t port, Farm__Role role); /* NULL: nobody answers */
 void scripted_peer_disconnect(struct scripted_peer *p);				/* NULL: nothing */
-bool scripted_peer_send(const struct scripted_peer *p, const Farm__Envelope *m, const void *payload,
-			size_t size); /* false: it hung up */
+/* false: it hung up. */
+bool scripted_peer_send(const struct scripted_peer *p, const Farm__Envelope *m, const void *payload, size_t size);
 /* Returns the next message that is not a heartbeat, valid until the next call; the payload is in p->reader. */
 const Farm__Envelope *scripted_peer_receive(struct scripted_peer *p);
 bool scripted_peer_is_merge_ack(const Farm__Envelope *m); /* m says that a result is merged and stored; not NULL */
-bool scripted_peer_is_readable(struct scripted_peer *p,
-			       int milliseconds); /* there is a message, or the connection has ended */
+/* There is a message, or the connection has ended. */
+bool scripted_peer_is_readable(struct scripted_peer *p, int milliseconds);
 
 /* Two groups of eight chains on a film of 20 x 10. */
 extern const struct plan_request scripted_peer_plan_request;

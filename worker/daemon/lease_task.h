@@ -33,8 +33,8 @@ struct lease_task {
 	int rc;
 	struct error error;
 	void *owner;
-	void (*on_finished)(
-		struct lease_task *); /* called on the loop's thread when the render thread returns the lease */
+	/* Called on the loop's thread when the render thread returns the lease. */
+	void (*on_finished)(struct lease_task *);
 };
 
 /* Creates a lease, which then owns the contents of *g. Returns 0 or -ENOMEM. */

@@ -43,8 +43,8 @@ static void full_disk_behind_stdout_is_an_error(void **state)
 	(void)state;
 	for (int flush = 0; flush < 2; flush++) {
 		assert_int_equal(exit_code_after_printing("/dev/full", 1, flush, 0), 1);
-		assert_int_equal(exit_code_after_printing("/dev/full", 100000, flush, 0),
-				 1); /* more than the buffer holds */
+		/* More than the buffer holds. */
+		assert_int_equal(exit_code_after_printing("/dev/full", 100000, flush, 0), 1);
 		assert_int_equal(exit_code_after_printing("/dev/full", 1, flush, 75), 75);
 		assert_int_equal(exit_code_after_printing("/dev/full", 0, flush, 0), 0);
 		assert_int_equal(exit_code_after_printing("/dev/null", 100000, flush, 0), 0);

@@ -282,8 +282,8 @@ static void values_are_rounded_to_the_grid(void **unused)
 static void blocks_of_groups_average_to_the_image(void **unused)
 {
 	(void)unused;
-	static const double weight[3] = {0.644463186, 1.191920259,
-					 1.202916555}; /* X+Y+Z of Rec. 709's red, green, blue */
+	/* X+Y+Z of Rec. 709's red, green, blue. */
+	static const double weight[3] = {0.644463186, 1.191920259, 1.202916555};
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
 		struct plan p = canvas_test_plan((enum plan_kind)kind, 100, 70, 4, 1);
 		struct canvas *c;
@@ -387,8 +387,8 @@ static void a_pixel_of_one_lease_is_bounded(void **unused)
 				  .tiles = &tile,
 				  .counters = {[COUNT_SAMPLES] = 10}};
 		assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
-		float limit =
-			chains ? 0x1p14f * 10 : 0x1p29f; /* the quantum is 2^-30, and sums stay below 2^62 quanta */
+		/* The quantum is 2^-30, and sums stay below 2^62 quanta. */
+		float limit = chains ? 0x1p14f * 10 : 0x1p29f;
 		xyz[77] = limit;
 		assert_int_equal(canvas_check_range(c, &b, &e), 0);
 		xyz[77] = -limit;

@@ -44,8 +44,8 @@ struct coordinator {
 	uint64_t sizes[2];   /* size of the file in the first and second answer */
 	bool answers_once;   /* stops answering after the first answer */
 	int dropped_fetches; /* number of fetches that are dropped */
-	size_t flood_count,
-		flood_payload; /* number and payload of unrequested messages, sent before the coordinator reads on */
+	/* Number and payload of unrequested messages, sent before the coordinator reads on. */
+	size_t flood_count, flood_payload;
 	atomic_bool is_flood_held; /* delays the flood */
 	atomic_bool is_deaf;	   /* the coordinator does not read while this is set */
 	atomic_bool is_flood_sent;

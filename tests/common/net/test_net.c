@@ -215,8 +215,8 @@ static void peer_that_does_not_read_is_cut_off_at_the_shared_limit(void **state)
 	}
 	for (; !pool.closing_bytes && unread_count < 32; unread_count++)
 		send_bye(&listener_end, 1 << 20);
-	const uint64_t copied =
-		caller_tls ? 1 << 20 : 0; /* of a frame whose room was reserved before TLS encrypts it */
+	/* Of a frame whose room was reserved before TLS encrypts it. */
+	const uint64_t copied = caller_tls ? 1 << 20 : 0;
 	assert_true(unread_count > 1 && unread_count < 32 && pool.used_bytes == 0 && pool.closing_bytes > 1 << 20 &&
 		    pool.closing_bytes <= pool.max_bytes + copied);
 	while (!listener_end.close_count || !caller_end.close_count)

@@ -237,8 +237,8 @@ static void expect_raw_caller(const char *folder, int version, const char *liste
 static void certificates_need_one_role_and_a_name(void **state)
 {
 	(void)state;
-	expect_raw_caller(tls_pair_path(tls_pair_ours, "node"), TLS1_3_VERSION,
-			  ""); /* the caller of this test can succeed */
+	/* The caller of this test can succeed. */
+	expect_raw_caller(tls_pair_path(tls_pair_ours, "node"), TLS1_3_VERSION, "");
 	expect_raw_caller(NULL, TLS1_3_VERSION, "the peer has no certificate");
 	expect_raw_caller(tls_pair_path(tls_pair_ours, "node"), TLS1_2_VERSION, "unsupported protocol");
 	expect_raw_caller(forge_certificate("good", "good", "URI:hslt:role:client"), TLS1_3_VERSION, "");
@@ -252,8 +252,8 @@ static void certificates_need_one_role_and_a_name(void **state)
 	expect_raw_caller(forge_certificate("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	/* A certificate whose purpose would do, but whose name is not the coordinator's, cannot be used to pose as one.
 	 */
-	const char *farm =
-		forge_certificate("false", "farm", "URI:hslt:role:worker"); /* uses what tls_pair_path returns */
+	/* Uses what tls_pair_path returns. */
+	const char *farm = forge_certificate("false", "farm", "URI:hslt:role:worker");
 	expect_refused(tls_pair_path(tls_pair_ours, "node"), farm, "certificate of a worker, not of a coordinator",
 		       "does not accept this certificate");
 }

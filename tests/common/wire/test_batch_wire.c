@@ -409,8 +409,8 @@ static void grants_are_unpacked_as_they_were_packed(void **state)
 	assert_true(g.chain_count == 2 && g.seeds == NULL && g.states[0].size == 0 && g.states[1].size == 3);
 	assert_memory_equal(g.states[1].bytes, "abc", 3);
 	grant_fini(&g);
-	g = pack_and_unpack_grant(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}},
-				  2); /* of the first frame on a connection, and of a frame without payload */
+	/* Of the first frame on a connection, and of a frame without payload. */
+	g = pack_and_unpack_grant(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}}, 2);
 	assert_true(g.chain_count == 2 && g.states[0].size == 0 && g.states[1].size == 0);
 	grant_fini(&g);
 	g = pack_and_unpack_grant(&k, NULL, NULL, 0);

@@ -137,8 +137,8 @@ static void waiting_job_names_the_jobs_before_it(void **state)
 				   NULL,
 			   });
 	assert_string_equal(read_job_status(f, 1).waiting, "waits for j2 of higher priority (7)");
-	assert_string_equal(read_job_status(f, 1).owners_waiting,
-			    read_job_status(f, 1).waiting); /* j2 has the same owner */
+	/* j2 has the same owner. */
+	assert_string_equal(read_job_status(f, 1).owners_waiting, read_job_status(f, 1).waiting);
 	assert_int_equal(read_job_status(f, 2).workers, 1); /* one machine, two leases */
 	assert_string_equal(read_job_status(f, 2).place, "1 of 1 machine");
 	play_line(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");

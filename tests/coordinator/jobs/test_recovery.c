@@ -229,8 +229,8 @@ static int set_up(void **state)
 static void check_answers_while_reading(uint64_t job)
 {
 	int seen_midway = 0, last = 0;
-	heartbeat_seconds =
-		2; /* s; not less: on a busy machine this process may be unable to send anything for seconds */
+	/* s; not less: on a busy machine this process may be unable to send anything for seconds. */
+	heartbeat_seconds = 2;
 	start_coordinator(0);
 	connect_while_reading(&client, FARM__ROLE__ROLE_CLIENT);
 	connect_while_reading(&worker, FARM__ROLE__ROLE_WORKER);

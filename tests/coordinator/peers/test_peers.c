@@ -252,8 +252,8 @@ static void peers_that_do_not_read_cost_little_memory(void **state)
 		    500 * 1024); /* of 2,000 MB that were asked for; a sanitizer keeps up to 256 MB of freed memory */
 	for (int i = 0; i < 4; i++) {
 		const Farm__Envelope *m;
-		send_blob_gets(deaf[i], &h,
-			       1000); /* too many requests, though the system may buffer 100 MB of answers */
+		/* Too many requests, though the system may buffer 100 MB of answers. */
+		send_blob_gets(deaf[i], &h, 1000);
 		while ((m = scripted_peer_receive(deaf[i])) && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK)
 			continue;
 		assert_true(!m || strstr(m->fault->text, "no worker needs so many"));

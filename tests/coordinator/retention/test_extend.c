@@ -174,8 +174,8 @@ static void extension_without_a_usable_bound_is_refused(void **state)
 	r.seconds = 10;
 	make_job(&j, &r, 7, true);
 	uint64_t epoch = j.plan.epoch;
-	assert_int_equal(try_extension(&j, (struct extension){.mutations = 1}),
-			 0); /* beyond the mutations that are done */
+	/* Beyond the mutations that are done. */
+	assert_int_equal(try_extension(&j, (struct extension){.mutations = 1}), 0);
 	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
 	make_job(&j, &r, 7, false);
 	expect_refusal(&j, (struct extension){.spp = 8}, "no bound on samples");

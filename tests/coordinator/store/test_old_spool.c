@@ -130,8 +130,8 @@ static void row_is_read_back(void **state)
 		assert_true(rc == -ENOMEM || rc == 0);
 		old_spool_row_free(&f);
 	}
-	assert_int_equal(spool_create_job_folder(spool, 2, &e),
-			 0); /* the file of one job does not restore another job's row */
+	/* The file of one job does not restore another job's row. */
+	assert_int_equal(spool_create_job_folder(spool, 2, &e), 0);
 	spool_job_path(spool, 2, "order", path);
 	write_file(bytes, size);
 	assert_int_equal(old_spool_read_row(spool, 2, &f, &e), -EBADMSG);

@@ -284,8 +284,8 @@ static void job_cache_asks_for_each_missing_file(void **state)
 	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_MISSING);
 	assert_false(blob_hash_equal(&b->wanted_file, &first));
 	store_text(&cache, texts[1]);
-	assert_int_equal(job_cache_check_files(b, &loop),
-			 JOB_CACHE_FILE_MISSING); /* the third equals the first; the empty one is missing */
+	/* The third equals the first; the empty one is missing. */
+	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILE_MISSING);
 	store_text(&cache, texts[3]);
 	assert_int_equal(job_cache_check_files(b, &loop), JOB_CACHE_FILES_COMPLETE);
 	/* The scene is invalid: building it fails with a message. */

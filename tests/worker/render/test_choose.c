@@ -381,8 +381,8 @@ static void the_pilot_of_hours_is_bounded(void **state)
 		struct plan_request r;
 		struct render_choice c;
 		choose_for(w, 0, of[i].spp, &r, &c);
-		assert_int_equal(c.sample_count,
-				 4 * of[i].samples); /* two maps, as the first is black, path, and bdpt */
+		/* Two maps, as the first is black, path, and bdpt. */
+		assert_int_equal(c.sample_count, 4 * of[i].samples);
 	}
 	world_free(w);
 }

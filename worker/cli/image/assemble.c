@@ -44,8 +44,8 @@ struct sums {
 	uint64_t totals[SUMMED_COUNT];
 	bool in_all[SUMMED_COUNT]; /* the attribute is present in every crop */
 	double mse;		   /* sum of relMSE times pixels */
-	double squares_below,
-		squares_above; /* sums of squares: distance of relMSE from the ends of its interval, times pixels */
+	/* Sums of squares: distance of relMSE from the ends of its interval, times pixels. */
+	double squares_below, squares_above;
 	double pixels;
 	bool has_mse; /* every crop has a relMSE and its interval */
 	double cpu_seconds, wall_seconds;

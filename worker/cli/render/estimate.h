@@ -25,10 +25,10 @@ struct estimate {
 	const struct plan *pilot;
 	const struct forecast_history *looks; /* the pilot's estimates of its error */
 	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */
-	double bootstrap_cpu_seconds,
-		bootstrap_seconds; /* the same for its bootstrap; scaled to the samples of the render's */
-	double target;		   /* an error that is predicted in addition to the usual ones; 0: none */
-	double speed; /* mutations or samples a second of one thread, for plans that depend on it; 0: none does */
+	/* The same for its bootstrap; scaled to the samples of the render's. */
+	double bootstrap_cpu_seconds, bootstrap_seconds;
+	double target; /* an error that is predicted in addition to the usual ones; 0: none */
+	double speed;  /* mutations or samples a second of one thread, for plans that depend on it; 0: none does */
 };
 
 /* Prints the table or JSON to stdout, and draws a plot if a path is given. Returns -EAGAIN if the pilot has too few

@@ -34,8 +34,8 @@ struct local_run {
 	const struct plan *plan;
 	unsigned threads;
 	const atomic_bool *stop; /* may become true at any time; complete rounds are kept */
-	void (*on_progress)(void *user,
-			    const struct local_progress *p); /* under the lock, from any thread; may be NULL */
+	/* Under the lock, from any thread; may be NULL. */
+	void (*on_progress)(void *user, const struct local_progress *p);
 	/* Called after each complete round, from the calling thread while no lease runs. May set *stop: then the rounds
 	 * end, and `end` stays MERGE_CONTINUES. Its CPU time is not counted. May be NULL. */
 	void (*on_round)(void *user, const struct local_round *r);

@@ -78,7 +78,7 @@ void pilot_request(const struct plan_request *request, const struct plan *render
 		pilot->bootstrap = (uint64_t)fmax((double)probe->bootstrap, max_bootstrap);
 	double remaining = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
 	double epochs = remaining / PILOT_ROUNDS / cost->round_seconds;
-	double max_epochs =
-		(double)render->epoch / (double)probe->epoch; /* the pilot's epoch is at most the render's */
+	/* The pilot's epoch is at most the render's. */
+	double max_epochs = (double)render->epoch / (double)probe->epoch;
 	pilot->epoch = (uint64_t)fmax(1, (double)probe->epoch * fmin(epochs, max_epochs));
 }

@@ -50,9 +50,9 @@ static double clamped_ratio(double x, double y)
 static void compute_factors(const struct grooves *r, vec3 wo, vec3 wi, double *direct, double *interreflected)
 {
 	double so = sqrt(fmax(1 - wo.z * wo.z, 0)), si = sqrt(fmax(1 - wi.z * wi.z, 0)), s = so * si;
-	double cos_azimuth =
-		s > 0 ? fmin(fmax((wo.x * wi.x + wo.y * wi.y) / s, -1), 1) : 0; /* cosine of the azimuths' difference */
-	bool wo_is_lower = wo.z < wi.z;						/* wo has the larger angle */
+	/* Cosine of the azimuths' difference. */
+	double cos_azimuth = s > 0 ? fmin(fmax((wo.x * wi.x + wo.y * wi.y) / s, -1), 1) : 0;
+	bool wo_is_lower = wo.z < wi.z; /* wo has the larger angle */
 	double sine = wo_is_lower ? so : si, tangent = wo_is_lower ? clamped_ratio(si, wi.z) : clamped_ratio(so, wo.z);
 	if (r->c3 == 0) {
 		*direct = r->c1 + r->c2 * fmax(cos_azimuth, 0) * sine * tangent;

@@ -52,8 +52,8 @@ void chain_count_decision(struct chain *c, bool accepted);
 /* The head of a state's bytes, in little endian: id, step, run of rejections. */
 enum { CHAIN_STATE_HEADER_BYTES = 24 };
 void chain_write_header(const struct chain *c, uint8_t *bytes);
-bool chain_read_header(struct chain *c, const uint8_t *bytes,
-		       size_t size); /* false: belongs to another chain or step */
+/* false: belongs to another chain or step. */
+bool chain_read_header(struct chain *c, const uint8_t *bytes, size_t size);
 /* Copies bytes into newly allocated memory that belongs to the batch. Returns -ENOMEM if out of memory. */
 int chain_state_copy_bytes(const uint8_t *bytes, size_t size, struct chain_state *out);
 

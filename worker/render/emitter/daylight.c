@@ -131,8 +131,8 @@ vec3 daylight_sun_direction(const struct daylight_time *t)
 	double obliquity = 0.4090928 - 6.2140e-9 * n + 0.0000396 * cos(omega);
 	double right_ascension = atan2(cos(obliquity) * sin(ecliptic_longitude), cos(ecliptic_longitude)),
 	       declination = asin(sin(obliquity) * sin(ecliptic_longitude));
-	double sidereal =
-		6.6974243242 + 0.0657098283 * n + t->hour - t->utc_offset; /* sidereal time at Greenwich, hours */
+	/* Sidereal time at Greenwich, hours. */
+	double sidereal = 6.6974243242 + 0.0657098283 * n + t->hour - t->utc_offset;
 	double hour_angle = (sidereal * 15 + t->longitude) * M_PI / 180 - right_ascension, l = t->latitude * M_PI / 180;
 	double zenith =
 		acos(fmax(fmin(cos(l) * cos(hour_angle) * cos(declination) + sin(declination) * sin(l), 1), -1));

@@ -146,8 +146,8 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 		return false;
 	double across = (target - cells[column]) / width, down = (u[1] - m->row_cdf[row]) / height;
 	double phi = 2 * M_PI * ((column + 0.5 + across) / m->columns);
-	double from_pole =
-		2 * pow(sin(0.5 * row_edge_angle(m, row)), 2) + down * row_cosine_height(m, row); /* 1 - cosine */
+	/* 1 - the cosine of the angle from the pole */
+	double from_pole = 2 * pow(sin(0.5 * row_edge_angle(m, row)), 2) + down * row_cosine_height(m, row);
 	double sine = sqrt(fmax(0, from_pole * (2 - from_pole)));
 	vec3 d = to_world(m, (vec3){sine * sin(phi), 1 - from_pole, -sine * cos(phi)});
 	*x = (struct emitter_point){.p = vec3_normalize(d), .is_infinite = true};

@@ -94,8 +94,8 @@ struct gltf {
 	double *mesh_use_counts;		   /* by mesh: number of nodes that use it */
 	bool *meshes_made;			   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
-	size_t scaled_away_count,
-		first_scaled_away; /* nodes whose meshes a scale of 0 makes lines or points; index of the first */
+	/* Nodes whose meshes a scale of 0 makes lines or points; index of the first. */
+	size_t scaled_away_count, first_scaled_away;
 	bool has_camera, has_light;
 	bool is_from_blender;	  /* Blender's exporter wrote the file */
 	bool uses_burley_diffuse; /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */
@@ -127,8 +127,8 @@ const char *gltf_string(struct gltf *g, const struct gltf_entry *entry, const js
 /* Stores `count` numbers in x, which keeps its values if the member is missing. */
 void gltf_numbers(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key, double *x,
 		  size_t count);
-const json_t *gltf_object(struct gltf *g, const struct gltf_entry *entry, const json_t *o,
-			  const char *key); /* or NULL */
+/* Or NULL. */
+const json_t *gltf_object(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *key);
 const json_t *gltf_extension(struct gltf *g, const struct gltf_entry *entry, const json_t *o, const char *name);
 
 /* Make elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */

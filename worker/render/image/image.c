@@ -38,8 +38,8 @@ void image_convert_to_grey(struct image *i, enum image_channel channel)
 	for (size_t k = 0; k < count; k++) {
 		const float *p = i->pixels + 3 * k;
 		const double rgb[3] = {(double)p[0], (double)p[1], (double)p[2]};
-		bool is_grey =
-			p[0] == p[1] && p[0] == p[2]; /* equal channels keep their exact value, free of rounding */
+		/* Equal channels keep their exact value, free of rounding. */
+		bool is_grey = p[0] == p[1] && p[0] == p[2];
 		i->pixels[k] = is_grey		       ? p[0]
 			       : channel == IMAGE_MEAN ? (float)((rgb[0] + rgb[1] + rgb[2]) / 3)
 						       : (float)rec709_luminance(rgb);

@@ -215,8 +215,8 @@ spectrum medium_extinction(const struct medium *m, vec3 p, vec3 d, const struct 
 struct medium_lanes medium_lanes_along(const struct medium *m, vec3 d, const struct wavelengths *w)
 {
 	static const vec3 origin = {0, 0, 0};
-	bool has_area_grid =
-		m->first.grid && m->first.grid->area_matrix; /* then the grid itself multiplies by the area */
+	/* Then the grid itself multiplies by the area. */
+	bool has_area_grid = m->first.grid && m->first.grid->area_matrix;
 	spectrum unit = spectrum_scale(has_area_grid ? 1 : phase_area(&m->phase, origin, d),
 				       eval_extinction(m, color_eval(&m->first.color, w), w));
 	struct medium_lanes l = {.grid = m->first.grid, .channels = 1, .sigma_t = {unit}};

@@ -30,8 +30,8 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
 	for (uint32_t k = 0; k < m->count; k++)
 		m->weight[k] /= sum;
-	p->absorbed_share =
-		1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not if only rounding errors are missing */
+	/* Not if only rounding errors are missing. */
+	p->absorbed_share = 1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0;
 	return 0;
 }
 

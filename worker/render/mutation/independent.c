@@ -58,8 +58,8 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 	unsigned k = into->edges;
 	double log_pdf[FULL_PATH_VERTICES_MAX];
 	const bool opaque = m->path->opaque_joints;
-	m->path->opaque_joints =
-		true; /* propose() draws the length first; a joint that passes surfaces would change it */
+	/* propose() draws the length first; a joint that passes surfaces would change it. */
+	m->path->opaque_joints = true;
 	full_path_log_technique_pdfs(m->path, into, log_pdf);
 	m->path->opaque_joints = opaque;
 	double log_t = log_edge_count_probability(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);

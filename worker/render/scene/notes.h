@@ -33,8 +33,8 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 /* Notes that a name of 0.6 in a file of 3.x is read as a name of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
-int note_guide(const struct notes *t,
-	       const struct xml_element *el); /* an object for which plugin_is_sampling_hint() is true */
+/* An object for which plugin_is_sampling_hint() is true. */
+int note_guide(const struct notes *t, const struct xml_element *el);
 /* The first is for an element that is ignored with everything inside it, the second for an object of which only the
  * parameters in its table are used. */
 int note_ignored_element(const struct notes *t, const struct xml_element *el);

@@ -22,8 +22,8 @@ struct wireframe {
 	struct texture edge, interior;
 	struct attribute_table mesh; /* only its triangles are used */
 	bool shows_lines;
-	double inner_distance,
-		outer_distance; /* distances at which the transition from edge to interior begins and ends */
+	/* Distances at which the transition from edge to interior begins and ends. */
+	double inner_distance, outer_distance;
 };
 
 static bool is_wired_shape(const struct attribute_table *mesh)

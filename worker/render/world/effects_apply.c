@@ -58,8 +58,8 @@ static int apply_to_medium(struct medium *m, const struct effects *fx, const str
 	m->is_emissive = m->is_emissive && fx->medium_light;
 	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
 		return 0;
-	m->absorbs = m->scatters =
-		false; /* Either no path reaches the medium, or the user switched one of the effects off. */
+	/* Either no path reaches the medium, or the user switched one of the effects off. */
+	m->absorbs = m->scatters = false;
 	return forced->state[EFFECT_ABSORPTION] < 0 || forced->state[EFFECT_SCATTERING] < 0
 		       ? error_set(
 				 e, EINVAL,

@@ -278,8 +278,8 @@ static bool upgrade_lookat(struct xml_element *el, struct arena *arena)
 	*mirror = (struct xml_attribute){"x", "-1"};
 	for (struct xml_element *c = lookat->first_child; c; c = c->next_sibling)
 		c->parent = lookat;
-	el->first_child = el->last_child =
-		NULL; /* otherwise a walk over the elements would return to the wrong one and never end */
+	/* Otherwise a walk over the elements would return to the wrong one and never end. */
+	el->first_child = el->last_child = NULL;
 	el->name = "scale";
 	el->attributes = mirror;
 	el->attribute_count = 1;

@@ -70,8 +70,8 @@ static void pilot_of_samples_needs_no_probe(void **state)
 	struct error e;
 	assert_int_equal(pilot_render_plan(&request, &render, &e), 0);
 	assert_true(render.target_error > 0);
-	assert_false(pilot_probe_request(&request, &render,
-					 &probe)); /* one sample per pixel and group is a round and long enough */
+	/* One sample per pixel and group is a round and long enough. */
+	assert_false(pilot_probe_request(&request, &render, &probe));
 	pilot_request(&request, &render, &probe, NULL, 60, &pilot);
 	assert_int_equal(plan_make(&pilot, &plan, &e), 0);
 	assert_true(plan.epoch == 1 && plan.groups == render.groups && plan.seconds == 60 && plan.rounds == UINT64_MAX);

@@ -292,8 +292,8 @@ static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to
 }
 
 struct extreme {
-	double calm,
-		unrest; /* largest error: relative, of well-conditioned pairs; in units of unrest + rounding, of all */
+	/* Largest error: relative, of well-conditioned pairs; in units of unrest + rounding, of all. */
+	double calm, unrest;
 	size_t calm_count, count;
 };
 

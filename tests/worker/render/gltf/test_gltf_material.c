@@ -236,8 +236,8 @@ static void test_materials(void **state)
 	scene_fini(&s);
 
 	s = gltf_files_read_changed(", \"material\": 0}", "}", false);
-	scene_find_object(&s,
-			  "bsdf of materials[4]"); /* the format's default material, after the last one of the file */
+	/* The format's default material, after the last one of the file. */
+	scene_find_object(&s, "bsdf of materials[4]");
 	scene_fini(&s);
 }
 

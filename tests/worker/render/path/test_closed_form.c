@@ -328,8 +328,8 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 		for (uint32_t g = 0; g < image.groups; g++)
 			for (int c = 0; c <= AGREEMENT_CELLS; c++)
 				image.mean[g][c] = image.mean[g][AGREEMENT_CELLS] / (share * sum3(w->grey_xyz));
-		known_radiance_round(&image, 1,
-				     1e-4); /* the amount that one sample of the film would add if it met the lamp */
+		/* The amount that one sample of the film would add if it met the lamp. */
+		known_radiance_round(&image, 1, 1e-4);
 		agreement_check_constant(test, &image, 1);
 	}
 	world_free(w);

@@ -53,8 +53,8 @@ static void test_stand_ins(void **state)
 		const struct plugin_decl *d = plugin_find(render_plugins(), expected[i].cls, stand_in);
 		assert_non_null(d);
 		assert_string_equal(d->type, stand_in);
-		assert_null(plugin_find(render_plugins(), expected[i].cls,
-					expected[i].type)); /* or the type needs no stand-in */
+		/* Or the type needs no stand-in. */
+		assert_null(plugin_find(render_plugins(), expected[i].cls, expected[i].type));
 	}
 }
 

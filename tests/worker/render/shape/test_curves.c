@@ -341,8 +341,8 @@ static void test_hair(void **state)
 			    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
 	assert_memory_equal(a.geometry.mesh.position, c.geometry.mesh.position,
 			    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
-	assert_true(near(built_shape_area(&d.geometry.mesh) / built_shape_area(&a.geometry.mesh), 0.25,
-			 0.1)); /* 0.025 is the default radius */
+	/* 0.025 is the default radius. */
+	assert_true(near(built_shape_area(&d.geometry.mesh) / built_shape_area(&a.geometry.mesh), 0.25, 0.1));
 	built_shape_fini(&a);
 	built_shape_fini(&b);
 	built_shape_fini(&c);
