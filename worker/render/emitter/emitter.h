@@ -87,8 +87,7 @@ struct emitter {
 	bool is_beam; /* a delta emitter of one direction: nothing connects to it, and all its light sub-paths begin
 		       * alike
 		       */
-	uint64_t negative_pixel_count; /* of its image; negative values count as 0 */
-	enum color_kind color_kind;    /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
+	enum color_kind color_kind; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
 	double brightness_bound; /* upper bound of the radiance over positions, directions and wavelengths; for delta

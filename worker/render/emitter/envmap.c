@@ -313,7 +313,6 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	if (!code)
 		code = raster_read(&picture, n, build->assets, &(struct raster_options){0, HUGE_VAL, false, IMAGE_ALL},
 				   build->arena, e);
-	em->negative_pixel_count = picture.raised_pixel_count;
 	return code ? code : envmap_init(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 

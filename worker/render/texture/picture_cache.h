@@ -10,11 +10,20 @@
 #include "worker/render/texture/indexed_image.h"
 
 struct picture_entry;
+struct scene_node;
+
+/* The images with a pixel below the range to which they were clamped. */
+struct pictures_raised {
+	const struct scene_node *first; /* the object that read the first of them; NULL: there is none */
+	uint64_t pixels;		/* such pixels of the first image */
+	bool others;			/* there are more images */
+};
 
 /* A hash table by key: a scene may read one image in 10^5 different ways. */
 enum { PICTURE_BUCKETS = 1 << 10 };
 struct picture_cache {
 	const struct arena *arena; /* images in other arenas are not shared */
+	struct pictures_raised raised;
 	struct picture_entry *bucket[PICTURE_BUCKETS];
 };
 
@@ -29,7 +38,6 @@ struct picture_key {
 
 struct picture {
 	struct indexed_image image;
-	uint64_t raised_pixel_count; /* number of pixels with a value that was raised to the least of the range */
 	/* Computed by users of the picture; negative: not known yet. */
 	double max_value;      /* at least 0 */
 	double spectrum_bound; /* upper bound of the spectra of all pixels */

@@ -7,6 +7,8 @@
  */
 #include "worker/render/texture/raster.h"
 
+#include <string.h>
+
 static int decode_image(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 			const struct picture_key *k, struct arena *arena, struct error *e)
 {
@@ -46,6 +48,19 @@ static uint64_t count_pixels_below(const struct indexed_image *i, double min)
 		count += below;
 	}
 	return count;
+}
+
+/* Notes that node n has read an image with so many pixels below its range. One file may be read in several ways. */
+static void note_raised(struct pictures_raised *all, const struct scene_node *n, uint64_t pixels)
+{
+	if (pixels == 0)
+		return;
+	if (!all->first) {
+		all->first = n;
+		all->pixels = pixels;
+		return;
+	}
+	all->others |= strcmp(node_string(all->first, "filename", ""), node_string(n, "filename", "")) != 0;
 }
 
 /* Applies the threshold, if there is one, and clamps to the range. Returns whether a pixel was outside the range. */
@@ -93,18 +108,16 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	r->shared = cache ? picture_find(cache, &key, options->min, options->max) : NULL;
 	if (r->shared) {
 		r->image = r->shared->image;
-		r->raised_pixel_count = r->shared->raised_pixel_count;
 		return 0;
 	}
 	int code = decode_image(r, n, assets, &key, arena, e);
 	if (code)
 		return code;
-	r->raised_pixel_count = key.threshold >= 0 ? 0 : count_pixels_below(&r->image, options->min);
+	if (cache && !(key.threshold >= 0))
+		note_raised(&cache->raised, n, count_pixels_below(&r->image, options->min));
 	bool was_clamped = clamp_to_range(&r->image, key.threshold, options);
 	if (cache)
 		r->shared = picture_add(cache, &key, &r->image, options->min, options->max, was_clamped, arena);
-	if (r->shared)
-		r->shared->raised_pixel_count = r->raised_pixel_count;
 	return 0;
 }
 

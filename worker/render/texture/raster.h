@@ -18,9 +18,8 @@ enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP, RASTER_BLACK, RAS
 struct raster {
 	struct indexed_image image;
 	enum raster_wrap wrap_u, wrap_v;
-	bool is_nearest;	     /* otherwise bilinear */
-	struct picture *shared;	     /* NULL: the pixels are not shared */
-	uint64_t raised_pixel_count; /* number of pixels with a value below the range given */
+	bool is_nearest;	/* otherwise bilinear */
+	struct picture *shared; /* NULL: the pixels are not shared */
 };
 
 struct raster_options {

@@ -231,7 +231,6 @@ static int create_emitters(struct builder *b)
 			rc = node_error(n, b->e, EINVAL,
 					"a scene may have one environment only; remove this one or the one before");
 		if (!rc) {
-			world_note_negative_pixels(w, em, n);
 			rc = moving_emitter(b, em, n);
 		}
 		if (em->is_infinite)
@@ -441,6 +440,7 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	keeping_source.obj_cache = &parsed;
 	crash_set_context("building the scene", NULL, 0);
 	int rc = build_all_but_accel(&b, o);
+	world_note_negative_pixels(b.w, &decoded.raised);
 	obj_cache_fini(&parsed);
 	asset_keeper_fini(&keeper);
 	crash_set_context("building Embree's tree", NULL, 0);

@@ -47,7 +47,7 @@ struct world_notes {
 	char tiny_shapes[256];	    /* how many shapes are too small for the scene */
 	char unread_materials[384]; /* how many shape files name materials that are not read */
 	char nothing_visible[192];  /* that the camera sees no shape */
-	char negative_pixels[384];  /* how many pixels of an emitter's image are negative */
+	char negative_pixels[384];  /* how many pixels of an image are negative where none may be */
 	char no_light[128];	    /* that the emitters give no light */
 	char black_backs[192];	    /* that the camera sees backs that are black */
 	char endless_medium[256];   /* that the camera stands in a medium that no light from infinity gets through */

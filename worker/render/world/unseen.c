@@ -87,16 +87,16 @@ void world_note_nothing_visible(struct world *w, const struct box *boxes)
 						    : "all are beside the image or behind it");
 }
 
-void world_note_negative_pixels(struct world *w, const struct emitter *em, const struct scene_node *n)
+void world_note_negative_pixels(struct world *w, const struct pictures_raised *images)
 {
 	char place[NODE_PLACE_MAX], file[129];
-	if (em->negative_pixel_count == 0)
+	if (!images->first)
 		return;
 	snprintf(w->notes.negative_pixels, sizeof w->notes.negative_pixels,
-		 "%s: %llu pixel%s of %s ha%s a negative value, which counts as 0", node_place(n, place),
-		 (unsigned long long)em->negative_pixel_count, em->negative_pixel_count == 1 ? "" : "s",
-		 asset_name_display(node_string(n, "filename", ""), file, sizeof file),
-		 em->negative_pixel_count == 1 ? "s" : "ve");
+		 "%s: %llu pixel%s of %s ha%s a negative value, which counts as 0%s", node_place(images->first, place),
+		 (unsigned long long)images->pixels, images->pixels == 1 ? "" : "s",
+		 asset_name_display(node_string(images->first, "filename", ""), file, sizeof file),
+		 images->pixels == 1 ? "s" : "ve", images->others ? "; and of other images, too" : "");
 }
 
 void world_note_no_light(struct world *w, bool dropped_emitter)

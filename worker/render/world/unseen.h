@@ -4,6 +4,7 @@
 #ifndef WORKER_RENDER_WORLD_UNSEEN_H
 #define WORKER_RENDER_WORLD_UNSEEN_H
 
+#include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/origin.h"
 #include "worker/render/world/world.h"
 
@@ -16,8 +17,8 @@ void world_note_nothing_visible(struct world *w, const struct box *boxes);
  * rendered. dropped_emitter: emitters on shapes have been left out, so that no emitter at all is left. */
 void world_note_no_light(struct world *w, bool dropped_emitter);
 
-/* Sets w->notes.negative_pixels if the image of the emitter em, made from n, has negative pixels. */
-void world_note_negative_pixels(struct world *w, const struct emitter *em, const struct scene_node *n);
+/* Sets w->notes.negative_pixels if an image has pixels with a value that is negative where none may be. */
+void world_note_negative_pixels(struct world *w, const struct pictures_raised *images);
 
 /* Sets w->notes.black_backs if at least one in twenty of the camera rays that meet a surface meets the back of an
  * opaque material without `twosided`. black: the scene's dialect makes backs black, a surprise where a mesh is inside

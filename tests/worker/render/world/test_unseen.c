@@ -202,12 +202,57 @@ static void test_negative_pixels(void **state)
 	}
 }
 
+/* So do those of a texture, and of several images, but not those of a map of heights. */
+static void test_negative_texels(void **state)
+{
+	(void)state;
+#define PICTURE(name, file) \
+	"\n<texture type='bitmap' name='" name "'><string name='filename' value='" file ".pfm'/></texture>"
+#define SCENE(of_plane, of_sphere)                                                                   \
+	"<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "<shape type='rectangle'>" of_plane       \
+							   "</shape><shape type='sphere'>" of_sphere \
+							   "</shape><emitter type='constant'/></scene>"
+#define DIFFUSE(file) "<bsdf type='diffuse'>" PICTURE("reflectance", file) "</bsdf>"
+	static const struct {
+		const char *xml, *said;
+	} cases[] = {
+		{SCENE(DIFFUSE("bad"), DIFFUSE("good")),
+		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0"},
+		{SCENE(DIFFUSE("good"), DIFFUSE("good")), ""},
+		{SCENE(DIFFUSE("bad"), DIFFUSE("bad")),
+		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0"},
+		{SCENE(DIFFUSE("bad"),
+		       "<bsdf type='roughconductor'>" PICTURE("alpha", "worse") PICTURE("k", "bad") "</bsdf>"),
+		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0; and of other images, too"},
+		{SCENE("<bsdf type='bumpmap'>" PICTURE("height", "bad") "<bsdf type='diffuse'/></bsdf>", ""), ""},
+	};
+	static const float pixels[3][6] = {{0, 0.5f, 0, 1, 1, 1}, {0, 0.5f, 0, 1, -2, 1}, {-1, -1, -1, 1, -2, 1}};
+	char pfm[3][64];
+	int head = 0;
+	for (int i = 0; i < 3; i++) {
+		head = snprintf(pfm[i], sizeof pfm[i], "PF\n2 1\n-1\n");
+		memcpy(pfm[i] + head, pixels[i], sizeof pixels[i]);
+	}
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const struct memory_file files[] = {{"scene.xml", cases[i].xml, strlen(cases[i].xml)},
+						    {"good.pfm", pfm[0], (size_t)head + sizeof *pixels},
+						    {"bad.pfm", pfm[1], (size_t)head + sizeof *pixels},
+						    {"worse.pfm", pfm[2], (size_t)head + sizeof *pixels},
+						    {NULL, NULL, 0}};
+		struct world *w = world_from_files(32, 32, files);
+		char note[1024];
+		note_of(w, "negative", note);
+		assert_string_equal(note, cases[i].said);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sentences), cmocka_unit_test(test_against_rays),
 		cmocka_unit_test(test_dark),	  cmocka_unit_test(test_negative_pixels),
-		cmocka_unit_test(test_too_close),
+		cmocka_unit_test(test_too_close), cmocka_unit_test(test_negative_texels),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
