@@ -225,8 +225,8 @@ static void print_unsupported(FILE *out)
 		"\n## Mitsuba's plug-ins that are not supported\n\n"
 		"Refused, with file, line and the nearest name; with `--lenient` replaced. Light is unpolarised here, and\n"
 		"what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps of "
-		"materials with a specular lobe or a mask do without\n`flip_invalid_normals`, which is on in Mitsuba since "
-		"3.7.\n\n"
+		"materials with a specular lobe or a mask,\nand maps inside others, do without `flip_invalid_normals`, "
+		"which is on in Mitsuba since 3.7.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;
 	for (size_t i = 0; (type = plugin_mitsuba_at(i, &cls)); i++) {

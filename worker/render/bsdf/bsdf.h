@@ -61,6 +61,7 @@ struct bsdf_build {
 	struct boundary_table *
 		*boundary_tables;	    /* list of the tables that the scene's materials share; NULL: no sharing */
 	struct relief_map **relief_maps;    /* likewise, the bump and normal maps of one material */
+	const struct relief *under;	    /* of the bump or normal map around this BSDF; NULL: none */
 	const struct volume_build *volumes; /* NULL: none */
 };
 

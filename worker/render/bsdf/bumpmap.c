@@ -4,13 +4,17 @@
  * colour (`normalmap`). The BSDF that results is the nested one: the geometry bends the normals
  * (worker/render/geom/relief.h), so that half vectors and their derivatives take them into account.
  *
- * Creation fails unless one texture (for `normalmap`, a texture or a colour) and one BSDF are nested, and if one such
- * map is nested in another.
+ * A map inside another bends the normals that the outer one gives.
+ *
+ * Creation fails unless one texture (for `normalmap`, a texture or a colour) and one BSDF are nested, and if more than
+ * NESTED_MAX maps are nested in each other.
  */
 #include "common/base/color.h"
 #include "worker/render/bsdf/create.h"
 
 #include <string.h>
+
+enum { NESTED_MAX = 8 };
 
 /* ---- shadows of bumps */
 
@@ -23,6 +27,12 @@
  * Shadowing Function to Solve the Bump Terminator Problem. Ray Tracing Gems, ch. 12, 2019). Not reciprocal. Densities
  * stay as they are, since G lies between 0 and 1.
  */
+struct shadowed {
+	struct bsdf inner;
+	const struct relief *low,
+		*high; /* before and after bending; low NULL: no relief, high NULL: the inner BSDF's */
+};
+
 static double tangent_squared(double cosine)
 {
 	double c2 = cosine * cosine;
@@ -30,50 +40,53 @@ static double tangent_squared(double cosine)
 }
 
 /* Returns G. At 90 degrees to the unbent normal G is 0, or 1 if the normal is not bent. */
-static double shadowing_factor(const struct bsdf_point *p, vec3 wo, vec3 wi)
+static double shadowing_factor(const struct shadowed *s, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	if (!p->relief_frames.get_frame)
+	const struct relief_frames *at = &p->relief_frames;
+	if (!at->get_frame)
 		return 1;
-	vec3 light = p->transport == TRANSPORT_RADIANCE ? wi : wo,
-	     n = p->relief_frames.get_frame(p->relief_frames.context, NULL).n;
-	double a2 = fmin(tangent_squared(n.z) / 8, 1);
+	vec3 light = p->transport == TRANSPORT_RADIANCE ? wi : wo, n = at->get_frame(at->context, s->low).n;
+	double bend = s->high ? vec3_dot(n, at->get_frame(at->context, s->high).n) : n.z;
+	double a2 = fmin(tangent_squared(bend) / 8, 1);
 	return a2 > 0 ? 2 / (1 + sqrt(1 + a2 * tangent_squared(vec3_dot(n, light)))) : 1;
 }
 
 static spectrum shadowed_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct bsdf *inner = b->data;
-	return spectrum_scale(shadowing_factor(p, wo, wi), inner->ops->eval(inner, p, wo, wi));
+	const struct shadowed *s = b->data;
+	return spectrum_scale(shadowing_factor(s, p, wo, wi), s->inner.ops->eval(&s->inner, p, wo, wi));
 }
 
 static double shadowed_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct bsdf *inner = b->data;
-	return inner->ops->pdf_solid(inner, p, wo, wi);
+	const struct shadowed *s = b->data;
+	return s->inner.ops->pdf_solid(&s->inner, p, wo, wi);
 }
 
 /* The value is that of radiance, with wi towards the light. */
 static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
+	const struct shadowed *s = b->data;
 	struct bsdf_point radiance = *p;
 	radiance.transport = TRANSPORT_RADIANCE;
-	return spectrum_scale(shadowing_factor(&radiance, wo, wi), bsdf_eval_halfvec(b->data, p, wo, wi));
+	return spectrum_scale(shadowing_factor(s, &radiance, wo, wi), bsdf_eval_halfvec(&s->inner, p, wo, wi));
 }
 
 static spectrum shadowed_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				    double *chance)
 {
-	spectrum weight = bsdf_eval_delta(b->data, p, wo, mode, wi, chance);
-	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadowing_factor(p, wo, *wi), weight);
+	const struct shadowed *s = b->data;
+	spectrum weight = bsdf_eval_delta(&s->inner, p, wo, mode, wi, chance);
+	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadowing_factor(s, p, wo, *wi), weight);
 }
 
 static bool shadowed_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			    struct bsdf_sample *out)
 {
-	const struct bsdf *inner = b->data;
-	if (!inner->ops->sample(inner, p, wo, u, out))
+	const struct shadowed *s = b->data;
+	if (!s->inner.ops->sample(&s->inner, p, wo, u, out))
 		return false;
-	out->f = spectrum_scale(shadowing_factor(p, wo, out->wi), out->f);
+	out->f = spectrum_scale(shadowing_factor(s, p, wo, out->wi), out->f);
 	return true;
 }
 
@@ -86,11 +99,18 @@ static const struct bsdf_ops shadowed_ops = {
 	.sample = shadowed_sample,
 };
 
-/* Wraps b, whose relief is known, so that f of all its lobes is scaled by G. */
-static int add_shadowing(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+/* Wraps b, which has the relief r or one inside it, so that f of all its lobes is scaled by G. */
+static int add_shadowing(struct bsdf *b, const struct relief *r, const struct scene_node *n,
+			 const struct bsdf_build *build, struct error *e)
 {
+	struct shadowed *s = arena_alloc(build->arena, 1, sizeof *s);
+	if (!s)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*s = (struct shadowed){.inner = *b, .low = r->under, .high = b->relief == r ? NULL : r};
 	b->uses_relief_frames = true;
-	return bsdf_wrap(b, &shadowed_ops, n, build, e);
+	b->ops = &shadowed_ops;
+	b->data = s;
+	return 0;
 }
 
 /* ---- bent normals */
@@ -147,7 +167,7 @@ static const struct relief_map *find_relief_map(const struct relief_map *wanted,
 		if (b->relief.kind == wanted->relief.kind &&
 		    b->relief.uses_handedness == wanted->relief.uses_handedness &&
 		    b->relief.flips_invalid_normals == wanted->relief.flips_invalid_normals &&
-		    b->scale == wanted->scale && has_same_texture(b, wanted))
+		    b->relief.under == wanted->relief.under && b->scale == wanted->scale && has_same_texture(b, wanted))
 			return b;
 	return NULL;
 }
@@ -160,8 +180,10 @@ static int get_relief_map(const struct scene_node *n, const struct scene_node *t
 	struct relief_map wanted = {
 		.relief = {.kind = kind,
 			   .eval = kind == RELIEF_HEIGHT ? eval_height : eval_normal,
-			   .flips_invalid_normals = node_bool(n, "flip_invalid_normals", build->dialect_3),
-			   .uses_handedness = node_bool(n, "handedness", false)},
+			   .flips_invalid_normals =
+				   !build->under && node_bool(n, "flip_invalid_normals", build->dialect_3),
+			   .uses_handedness = node_bool(n, "handedness", false),
+			   .under = build->under},
 		.node = texture,
 		.scale = node_float(n, "scale", 1),
 		.next = build->relief_maps ? *build->relief_maps : NULL};
@@ -184,6 +206,14 @@ static int get_relief_map(const struct scene_node *n, const struct scene_node *t
 	return code;
 }
 
+static unsigned nesting_of(const struct relief *r)
+{
+	unsigned depth = 0;
+	for (; r; r = r->under)
+		depth++;
+	return depth;
+}
+
 static int create_relief_bsdf(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			      enum relief_kind kind, struct error *e)
 {
@@ -193,17 +223,22 @@ static int create_relief_bsdf(struct bsdf *b, const struct scene_node *n, const 
 		texture = node_ref(n, "normalmap");
 	if (!inner || !(texture || node_find_property(n, "normalmap")) || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
+	if (nesting_of(build->under) == NESTED_MAX)
+		return node_error(n, e, ENOTSUP, "more than %d bump or normal maps in each other", NESTED_MAX);
 	int code = get_relief_map(n, texture, kind, build, &map, e);
-	if (!code)
-		code = bsdf_create(b, inner, build, e);
-	if (!code && (b->relief || b->uses_relief_frames))
-		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
 	if (code)
 		return code;
-	b->relief = &map->relief;
+	struct bsdf_build inside = *build;
+	inside.under = &map->relief;
+	code = bsdf_create(b, inner, &inside, e);
+	if (code)
+		return code;
+	if (!b->relief)
+		b->relief = &map->relief;
 	b->is_textured = true;
 	b->uses_tangents |= kind == RELIEF_NORMAL;
-	return node_bool(n, "use_shadowing_function", build->dialect_3) ? add_shadowing(b, n, build, e) : 0;
+	return node_bool(n, "use_shadowing_function", build->dialect_3) ? add_shadowing(b, &map->relief, n, build, e)
+									: 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -114,8 +114,11 @@ static const struct bsdf *narrowest_part(const struct bsdf *part, uint32_t count
 int bsdf_share_relief(struct bsdf *b, struct bsdf *part, uint32_t count, const struct scene_node *n,
 		      const struct bsdf_build *build, struct error *e)
 {
+	for (uint32_t k = 0; k < count; k++)
+		if (!part[k].relief)
+			part[k].relief = build->under;
 	const struct bsdf *first = narrowest_part(part, count);
-	b->relief = first ? first->relief : NULL;
+	b->relief = first ? first->relief : build->under;
 	for (uint32_t k = 0; k < count; k++) {
 		b->uses_relief_frames |= part[k].uses_relief_frames;
 		if (part[k].relief == b->relief || !needs_normal(&part[k]))

@@ -79,19 +79,34 @@ static bool apply_relief(const struct relief *r, const struct relief_site *s, co
 	return vec3_dot(out->m, s->ng) > 0 && length2 > 0x1p-900 && isfinite(length2);
 }
 
+/* Returns the point with the normal that it has before r bends it, and changes the step, if there is one, to match. */
+static struct relief_site site_under(const struct relief *r, const struct relief_site *s, struct relief_derivatives *d)
+{
+	struct relief_site raised = *s;
+	if (!r->under)
+		return raised;
+	raised.n = relief_normal(r->under, s);
+	if (d)
+		d->dn = relief_normal_derivative(r->under, s, d);
+	return raised;
+}
+
 vec3 relief_normal(const struct relief *r, const struct relief_site *s)
 {
 	struct bent_normal b;
-	vec3 n = apply_relief(r, s, NULL, &b) ? vec3_normalize(b.m) : s->n;
-	return vec3_is_finite(n) ? n : s->n;
+	const struct relief_site from = site_under(r, s, NULL);
+	vec3 n = apply_relief(r, &from, NULL, &b) ? vec3_normalize(b.m) : from.n;
+	return vec3_is_finite(n) ? n : from.n;
 }
 
 vec3 relief_normal_derivative(const struct relief *r, const struct relief_site *s, const struct relief_derivatives *d)
 {
 	struct bent_normal b;
-	if (!apply_relief(r, s, d, &b))
-		return d->dn;
+	struct relief_derivatives step = *d;
+	const struct relief_site from = site_under(r, s, &step);
+	if (!apply_relief(r, &from, &step, &b))
+		return step.dn;
 	vec3 n = vec3_normalize(b.m);
 	vec3 turn = vec3_scale(1 / vec3_length(b.m), vec3_madd(b.dm, -vec3_dot(n, b.dm), n));
-	return vec3_is_finite(turn) ? turn : d->dn;
+	return vec3_is_finite(turn) ? turn : step.dn;
 }

@@ -3,7 +3,8 @@
  * Shading normals bent by a bump map or a normal map (worker/render/math/relief.h). A height h(u,v) gives the normal of
  * the surface p + h n as if n were constant and all heights small: it is perpendicular to dp/du + n (dh/du - n.dp/du)
  * and to the corresponding vector for v (Blinn 1978, with the tangents made orthogonal to n first). A bent normal that
- * points to the back of the triangle is ignored. Pure; any thread; allocates nothing.
+ * points to the back of the triangle is ignored. A relief over another one starts from the normal that this gives.
+ * Pure; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_GEOM_RELIEF_H
 #define WORKER_RENDER_GEOM_RELIEF_H

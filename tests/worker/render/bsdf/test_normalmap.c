@@ -4,6 +4,7 @@
 #include "tests/support/pictures.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
+#include <errno.h>
 #include <math.h>
 
 static struct relief_value value_of(const char *map, struct asset_source *assets, struct arena *a)
@@ -145,20 +146,46 @@ static void test_parts_that_bend_alike(void **state)
 	assert_true(b.uses_relief_frames && !b.relief);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
 	assert_true(!b.uses_relief_frames && b.relief);
-	struct scene_node *twice = node_make(&a, PLUGIN_BSDF, map),
-			  *both = node_make_bsdf(&a, "blendbsdf weight=0.5 | diffuse");
-	node_add_child(&a, both, first);
-	node_add_child(&a, twice, node_make(&a, PLUGIN_TEXTURE, tiles));
-	node_add_child(&a, twice, both);
-	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
-	assert_true(bsdf_create(&b, twice, &build, &e) < 0);
-	assert_non_null(strstr(e.text, "one bump or normal map in another"));
+	arena_fini(&a);
+}
+
+/* A map in a map starts from its normal, whatever is between them; equal maps in different ones are different maps. */
+static void test_nesting(void **state)
+{
+	(void)state;
+	static const char map[] = "bumpmap scale=0.5 flip_invalid_normals=true", tiles[] = "checkerboard color0=0.1";
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	struct scene_node *inner = bent(&a, map, tiles, "conductor"), *both = node_make_bsdf(&a, "twosided");
+	struct scene_node *outer = node_make(&a, PLUGIN_BSDF, map);
+	node_add_child(&a, both, inner);
+	node_add_child(&a, outer, node_make(&a, PLUGIN_TEXTURE, tiles));
+	node_add_child(&a, outer, both);
+	const struct bsdf_build build = {.arena = &a};
+	assert_int_equal(bsdf_create(&b, outer, &build, &e), 0);
+	assert_non_null(b.relief->under);
+	assert_null(b.relief->under->under);
+	assert_true(b.relief->under->flips_invalid_normals && !b.relief->flips_invalid_normals);
+	assert_int_equal(blend_of(inner, outer, &a, &b, &e), -ENOTSUP);
+	assert_non_null(strstr(e.text, "bend normals differently"));
+	assert_int_equal(blend_of(outer, outer, &a, &b, &e), 0);
+	assert_false(b.uses_relief_frames);
+	for (int depth = 2; depth <= 9; depth++) {
+		struct scene_node *around = node_make(&a, PLUGIN_BSDF, map);
+		node_add_child(&a, around, node_make(&a, PLUGIN_TEXTURE, tiles));
+		node_add_child(&a, around, inner);
+		inner = around;
+		assert_int_equal(bsdf_create(&b, inner, &build, &e), depth <= 8 ? 0 : -ENOTSUP);
+	}
+	assert_non_null(strstr(e.text, "more than 8 bump or normal maps"));
 	arena_fini(&a);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale), cmocka_unit_test(test_one_color),
-					   cmocka_unit_test(test_parts_that_bend_alike)};
+					   cmocka_unit_test(test_parts_that_bend_alike),
+					   cmocka_unit_test(test_nesting)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -214,12 +214,17 @@ static void test_sampling(void **state)
 	check_sampling(TWOSIDED(SLOPE(METAL), DENTS(CHALK)));
 }
 
-/* Smith's masking for the direction of the light, from the function Lambda. */
-static double smith(const struct surface_point *x, vec3 light)
+/* Smith's masking for the direction of the light, from the function Lambda, with a normal bent from n0 to n. */
+static double smith_between(vec3 n0, vec3 n, vec3 light)
 {
-	double bent = acos(fmin(vec3_dot(x->sh.n, x->ng), 1)), angle = acos(fabs(vec3_dot(x->ng, light))),
+	double bent = acos(fmin(vec3_dot(n, n0), 1)), angle = acos(fabs(vec3_dot(n0, light))),
 	       a = fmin(tan(bent) / sqrt(8), 1);
 	return 1 / (1 + (sqrt(1 + pow(a * tan(angle), 2)) - 1) / 2);
+}
+
+static double smith(const struct surface_point *x, vec3 light)
+{
+	return smith_between(x->ng, x->sh.n, light);
 }
 
 static void assert_scaled(const char *what, spectrum got, double k, spectrum plain)
@@ -296,11 +301,53 @@ static void test_shadow(void **state)
 	BOTH("rectangle", DENTS, "<bsdf type='dielectric'/>");
 }
 
+/* A material in two maps is in the shadows of both. */
+static void check_two_shadows(const char *shape, const char *outer, const char *both, const char *without)
+{
+	enum { POINTS = 2000 };
+	struct world *one = world_of(shape, outer), *two = world_of(shape, both), *lit = world_of(shape, without);
+	int smooth = 0;
+	for (uint64_t i = 0; i < POINTS; i++) {
+		double u[4];
+		struct surface_point x1, x2;
+		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+		point_on(one, i, &x1);
+		point_on(two, i, &x2);
+		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
+		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2),
+		     light = t == TRANSPORT_RADIANCE ? wi : wo;
+		bool side;
+		spectrum plain = scattered_at(lit, i, wo, wi, t, &side), got = scattered_at(two, i, wo, wi, t, &side);
+		double k = smith_between(x1.ng, x1.sh.n, light) * smith_between(x1.sh.n, x2.sh.n, light);
+		assert_scaled("two maps", got, k, plain);
+		smooth += !spectrum_is_zero(plain) && vec3_length(vec3_sub(x1.sh.n, x2.sh.n)) > 0.1;
+	}
+	print_message("%d of %d pairs are lit\n", smooth, POINTS);
+	assert_true(smooth > POINTS / 10);
+	world_free(one);
+	world_free(two);
+	world_free(lit);
+}
+
+static void test_maps_in_maps(void **state)
+{
+	(void)state;
+	check_two_shadows("rectangle", SLOPE(PLASTIC), SLOPE(DENTS(PLASTIC)), SLOPE(LIT DENTS(LIT PLASTIC)));
+	check_two_shadows("sphere", DENTS(METAL), DENTS(SLOPE(METAL)), DENTS(LIT SLOPE(LIT METAL)));
+	/* Parts in a map: one has another map inside it, the other is plain, and either may be the narrower one. */
+	both_shapes(SLOPE(BLEND("0.3", DENTS(PLASTIC), METAL)),
+		    (const char *const[]){SLOPE(DENTS(PLASTIC)), SLOPE(METAL)}, (const double[]){0.7, 0.3}, 2, 0);
+	both_shapes(SLOPE(BLEND("0.3", CHALK, DENTS(METAL))), (const char *const[]){SLOPE(CHALK), SLOPE(DENTS(METAL))},
+		    (const double[]){0.7, 0.3}, 2, 0);
+	check_sampling(DENTS(SLOPE(METAL)));
+	check_sampling(SLOPE(BLEND("0.3", CHALK, DENTS(METAL))));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_two_normals), cmocka_unit_test(test_nested), cmocka_unit_test(test_two_sides),
-		cmocka_unit_test(test_sampling),    cmocka_unit_test(test_shadow),
+		cmocka_unit_test(test_sampling),    cmocka_unit_test(test_shadow), cmocka_unit_test(test_maps_in_maps),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
