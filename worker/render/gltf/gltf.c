@@ -119,7 +119,19 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
-/* Notes the extensions that the file uses and the reader does not know: their effect is missing. */
+static bool is_required(const struct gltf *g, const char *extension)
+{
+	const json_t *required = json_object_get(g->root, "extensionsRequired");
+	for (size_t i = 0; i < json_array_size(required); i++) {
+		const char *name = json_string_value(json_array_get(required, i));
+		if (name && strcmp(name, extension) == 0)
+			return true;
+	}
+	return false;
+}
+
+/* Notes the extensions that the file uses but does not require, and that the reader does not know: their effect is
+ * missing. */
 static void note_unknown_extensions(struct gltf *g)
 {
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
@@ -127,7 +139,7 @@ static void note_unknown_extensions(struct gltf *g)
 	struct text t = {text, sizeof text};
 	for (size_t i = 0; i < json_array_size(used); i++) {
 		const char *name = json_string_value(json_array_get(used, i));
-		if (name && !gltf_is_known_extension(name))
+		if (name && !gltf_is_known_extension(name) && !is_required(g, name))
 			text_appendf(&t, "%s%.64s",
 				     *text ? ", " : "these extensions are not supported and ignored: ", name);
 	}

@@ -61,11 +61,14 @@ void gltf_add_camera(struct gltf *g, const struct gltf_entry *camera, const mat4
 		gltf_fail(g, camera, EINVAL, "a camera that is neither perspective nor orthographic");
 		return;
 	}
-	double x = gltf_number(g, camera, orthographic, "xmag", 1), y = gltf_number(g, camera, orthographic, "ymag", 1);
+	double xmag = gltf_number(g, camera, orthographic, "xmag", 1),
+	       ymag = gltf_number(g, camera, orthographic, "ymag", 1), x = fabs(xmag), y = fabs(ymag);
 	if (!(x > 0 && y > 0)) {
-		gltf_fail(g, camera, EINVAL, "xmag and ymag are not above 0");
+		gltf_fail(g, camera, EINVAL, "xmag and ymag must not be 0");
 		return;
 	}
+	if (xmag < 0 || ymag < 0)
+		gltf_note(g, "the signs of xmag and ymag are ignored: cameras do not mirror the image");
 	struct xml_element *sensor = gltf_add_plugin(g, g->scene, camera, "sensor", "orthographic", NULL);
 	mat4 m = mat4_mul(turn_to_look_along_z(to_world), mat4_scale((vec3){x, x, 1}));
 	gltf_put_matrix(g, sensor, camera, "to_world", &m);

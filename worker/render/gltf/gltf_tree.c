@@ -291,8 +291,9 @@ bool gltf_is_known_extension(const char *extension)
 		"KHR_materials_transmission", "KHR_materials_unlit", "KHR_materials_volume", "KHR_mesh_quantization",
 		"KHR_meshopt_compression", "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform",
 		"MSFT_texture_dds",
-		/* These do not change light: polygons of triangles, alternative looks, metadata. */
-		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"};
+		/* These do not change light: polygons of triangles, alternative looks, metadata, and levels of less
+		   detail, which are not in the scene. */
+		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld", "MSFT_lod"};
 	return text_is_among(extension, known_extensions, sizeof known_extensions / sizeof *known_extensions);
 }
 

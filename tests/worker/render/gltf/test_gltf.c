@@ -290,6 +290,16 @@ static void test_lights_and_cameras(void **state)
 	m = node_transform(sensor, "to_world");
 	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
 	assert_int_equal(node_int(node_child(sensor, PLUGIN_FILM, 0), "height", 0), 384);
+	assert_false(scene_has_note(&s, "xmag"));
+	scene_fini(&s);
+	/* The format advises against negative factors, but does not forbid them. */
+	s = gltf_files_read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": -2, \"ymag\": -1}, \"x\": {",
+				    false);
+	sensor = find(&s, PLUGIN_SENSOR, "orthographic");
+	m = node_transform(sensor, "to_world");
+	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
+	assert_int_equal(node_int(node_child(sensor, PLUGIN_FILM, 0), "height", 0), 384);
+	assert_true(scene_has_note(&s, "the signs of xmag and ymag are ignored"));
 	scene_fini(&s);
 }
 
@@ -414,6 +424,26 @@ static void test_notes(void **state)
 	struct scene s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
+	scene_fini(&s);
+	/* Levels of less detail are not in the scene. What is required, and therefore refused, is not said to be
+	 * ignored. */
+	gltf_files_make(&changed);
+	gltf_files_replace(&changed, "\"extensionsUsed\": [",
+			   "\"extensionsRequired\": [\"MSFT_lod\"], \"extensionsUsed\": [\"MSFT_lod\", ");
+	s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
+	assert_false(scene_has_note(&s, "not supported"));
+	scene_fini(&s);
+	gltf_files_make(&changed);
+	gltf_files_replace(
+		&changed, "\"extensionsUsed\": [",
+		"\"extensionsRequired\": [\"ACME_fog\"], \"extensionsUsed\": [\"ACME_fog\", \"ACME_wind\", ");
+	gltf_files_pack(&changed, GLTF_EXTERNAL);
+	struct asset_source assets = memory_assets(changed.files);
+	struct error e;
+	assert_int_equal(scene_read_all(&s, &assets, "s.gltf", render_plugins(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 1);
+	assert_non_null(strstr(s.problems[0], "requires the extension ACME_fog"));
+	assert_true(scene_has_note(&s, "not supported and ignored: ACME_wind"));
 	scene_fini(&s);
 }
 
