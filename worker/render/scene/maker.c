@@ -266,8 +266,7 @@ static int add_child(struct maker *m, struct draft *d, const struct xml_element 
 	return 0;
 }
 
-/* Reads an object that is nested in another or referred to there: as a parameter if the table has its name,
- * otherwise as a child of its class. */
+/* Reads an object nested in another or referred to there: a parameter if the table has its name, or else a child. */
 static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
 		       struct xml_element *target)
 {
@@ -294,6 +293,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!p && !is_nested) {
 		if (d->decl->status == PARAM_IGNORED)
 			return 0;
+		if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_SHAPE && m->tree->is_dialect_3)
+			return note_unused_medium(&m->notes, el);
 		if (m->is_lenient)
 			return note_left_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",

@@ -116,6 +116,14 @@ int note_ignored_element(const struct notes *t, const struct xml_element *el)
 	return note_add(t, el, "", "", "%s:%d: <%.64s> is ignored with its contents", el->file, el->line, el->name);
 }
 
+int note_unused_medium(const struct notes *t, const struct xml_element *el)
+{
+	return note_add(
+		t, el, "medium", "",
+		"%s:%d: a medium in a shape is ignored, as by Mitsuba 3, unless its name is `interior` or `exterior`",
+		el->file, el->line);
+}
+
 /* Leaves out an element that is not supported, with a note. */
 int note_left_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
 		  const char *what)

@@ -39,6 +39,7 @@ int note_guide(const struct notes *t, const struct xml_element *el);
  * parameters in its table are used. */
 int note_ignored_element(const struct notes *t, const struct xml_element *el);
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);
+int note_unused_medium(const struct notes *t, const struct xml_element *el); /* in a shape, without a name */
 /* Leaves out an element that is not supported, with a note. */
 int note_left_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
 		  const char *what);

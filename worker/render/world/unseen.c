@@ -117,7 +117,7 @@ void world_note_no_light(struct world *w, bool dropped_emitter)
 
 /* ---- backs ---- */
 
-enum { GRID_SIDE = 32, BACKS_ONE_IN = 20 }; /* the note appears from a fraction of 1 / BACKS_ONE_IN on */
+enum { GRID_SIDE = 32, BACKS_ONE_IN = 20 }; /* the note appears from a fraction of 1 / LEAST on */
 
 /* Whether a ray meets the back of an opaque material that `twosided` does not cover, black or lit by the setting
  * `backs`. */

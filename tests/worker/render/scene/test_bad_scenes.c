@@ -408,8 +408,10 @@ static void test_media(void **state)
 	scene_fini(&s);
 	refuses(S TEA "</medium><sensor type='perspective'><ref id='tea'/><ref id='tea'/></sensor>" END,
 		"a second medium in <sensor type=\"perspective\">, which may have one");
-	refuses(S "<shape type='cube'>" TEA "</medium></shape>" END,
+	refuses("<scene version='0.6.0'><shape type='cube'>" TEA "</medium></shape>" END,
 		"a medium without a name has no place in <shape type=\"cube\">");
+	refuses(S "<bsdf type='diffuse'>" TEA "</medium></bsdf>" END,
+		"a medium without a name has no place in <bsdf type=\"diffuse\">");
 	refuses(S TEA "<float name='sigma' value='1'/></medium>" END,
 		"<medium type=\"homogeneous\"> has no `sigma`; did you mean `sigma_");
 	refuses(S "<medium type='homogeneous'><phase type='hg'/><phase type='hg'/></medium>" END,

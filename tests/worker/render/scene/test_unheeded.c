@@ -49,6 +49,9 @@ static void test_notes(void **state)
 	check("<emitter type='directional'><float name='angle' value='0.53'/></emitter>",
 	      "`angle` is not supported: the image differs a little from Mitsuba's");
 	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
+	check("<shape type='sphere'><medium type='homogeneous'/></shape>", "s.xml:1: a medium in a shape is ignored");
+	check("<medium type='homogeneous' id='m'/><shape type='sphere'><ref id='m'/></shape>",
+	      "s.xml:1: a medium in a shape is ignored");
 }
 
 /* The ignored parameters of an object share a note, one for each kind; a second film's note adds those that the first
