@@ -152,8 +152,7 @@ static int look_up_param(struct maker *m, const struct draft *d, const struct xm
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return *p || !value_is_element(el->name) ? 0 : note_similar_name(m, d, owner, el, name);
 	}
-	if (!found && m->is_lenient && !el->is_camel_case &&
-	    (found = lenient_old_param(d->decl, d->is_stand_in, el, name)))
+	if (!found && m->is_lenient && (found = lenient_old_param(d->decl, d->is_stand_in, el, name)))
 		r = note_old_name(&m->notes, owner, el, found->name);
 	/* In 0.6 every BSDF has this parameter; those whose reflectances can add up to more than 1 have it in their
 	 * tables. */

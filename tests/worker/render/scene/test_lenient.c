@@ -443,6 +443,35 @@ static void test_names_and_values_of_others(void **state)
 	scene_fini(&s);
 }
 
+/* The picture of a fork's projector, unless it has one under Mitsuba's name. */
+static void test_picture_of_projector(void **state)
+{
+	(void)state;
+#define PICTURE(name) "<texture type='checkerboard' name='" name "'/>"
+	static const char xml[] = "<scene version='0.6.0'><emitter type='projector' id='fork'>" PICTURE(
+		"texture") "</emitter>\n<emitter type='projector' id='both'>"
+			   "<rgb name='irradiance' value='3'/>" PICTURE(
+				   "texture") "</emitter>\n"
+					      "<emitter type='directional' id='other'>" PICTURE(
+						      "texture") "</emitter></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "has no `texture`"));
+	if (scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	const struct scene_node *picture = node_ref(scene_find_object(&s, "fork"), "irradiance");
+	assert_true(picture && strcmp(picture->type, "checkerboard") == 0);
+	assert_null(node_ref(scene_find_object(&s, "both"), "irradiance"));
+	assert_false(scene_has_note(&s, "<emitter type=\"directional\">: `texture` is read as"));
+	assert_true(scene_has_note(
+		&s, "s.xml:1: <emitter type=\"projector\">: `texture` is read as `irradiance` (lenient)"));
+	assert_true(scene_has_note(&s, "s.xml:2: <texture>: the parameter `texture` is not supported and left out"));
+	scene_fini(&s);
+}
+
 /* A parameter or object given twice to an unsupported plug-in is no mistake; of several layers, the stand-in is not
  * the glass. */
 static void test_more_than_the_stand_in_has(void **state)
@@ -495,6 +524,7 @@ int main(void)
 		cmocka_unit_test(test_lights_in_shapes),
 		cmocka_unit_test(test_volumes_without_a_value),
 		cmocka_unit_test(test_names_and_values_of_others),
+		cmocka_unit_test(test_picture_of_projector),
 		cmocka_unit_test(test_more_than_the_stand_in_has),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
