@@ -171,6 +171,11 @@ static void test_nesting(void **state)
 	assert_non_null(strstr(e.text, "bend normals differently"));
 	assert_int_equal(blend_of(outer, outer, &a, &b, &e), 0);
 	assert_false(b.uses_relief_frames);
+	struct scene_node *same = node_make(&a, PLUGIN_BSDF, "bumpmap scale=0.5");
+	node_add_child(&a, same, node_make(&a, PLUGIN_TEXTURE, tiles));
+	node_add_child(&a, same, bent(&a, "bumpmap scale=0.5", tiles, "conductor"));
+	assert_int_equal(blend_of(same, same, &a, &b, &e), 0);
+	assert_non_null(b.relief->under);
 	for (int depth = 2; depth <= 9; depth++) {
 		struct scene_node *around = node_make(&a, PLUGIN_BSDF, map);
 		node_add_child(&a, around, node_make(&a, PLUGIN_TEXTURE, tiles));
