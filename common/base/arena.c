@@ -63,103 +63,104 @@ char *arena_strdup(struct arena *a, const char *s)
 	return p;
 }
 
-struct share_slot {
+struct intern_slot {
 	size_t hash;
-	struct arena_share *share; /* NULL: free */
+	struct arena_interned *interned; /* NULL: free */
 };
 
 /* A hash table with open addressing, in the arena; it doubles when it is half full. It may miss some of what is
- * shared: a search takes at most SHARE_PROBES_MAX steps and compares the bytes of SHARE_COMPARES_MAX entries, so that
+ * shared: a search takes at most INTERN_PROBES_MAX steps and compares the bytes of INTERN_COMPARES_MAX entries, so that
  * bytes chosen to have one hash take no time that grows with their number. */
-struct arena_shares {
+struct arena_intern_table {
 	size_t capacity, count; /* capacity: a power of two */
-	struct share_slot *slots;
+	struct intern_slot *slots;
 };
 
-enum { SHARE_SLOTS_INITIAL = 64, SHARE_SAMPLES = 32, SHARE_COMPARES_MAX = 8, SHARE_PROBES_MAX = 256 };
+enum { INTERN_SLOTS_INITIAL = 64, INTERN_SAMPLES = 32, INTERN_COMPARES_MAX = 8, INTERN_PROBES_MAX = 256 };
 
 /* Of the size and of parts of the bytes: whether they are equal is compared, but for few. */
-static size_t share_hash(const void *bytes, size_t size)
+static size_t intern_hash(const void *bytes, size_t size)
 {
 	const char *p = bytes;
 	uint64_t h = fnv_add(FNV_OFFSET_BASIS, &size, sizeof size);
-	if (size <= SHARE_SAMPLES * sizeof h)
+	if (size <= INTERN_SAMPLES * sizeof h)
 		return (size_t)fnv_add(h, p, size);
-	for (size_t i = 0; i < SHARE_SAMPLES; i++)
-		h = fnv_add(h, p + (size - sizeof h) / (SHARE_SAMPLES - 1) * i, sizeof h);
+	for (size_t i = 0; i < INTERN_SAMPLES; i++)
+		h = fnv_add(h, p + (size - sizeof h) / (INTERN_SAMPLES - 1) * i, sizeof h);
 	return (size_t)fnv_add(h, p + size - sizeof h, sizeof h);
 }
 
 /* Adds an entry, unless the place where it would be searched is full. */
-static void insert_share(struct arena_shares *s, size_t hash, struct arena_share *share)
+static void insert_interned(struct arena_intern_table *s, size_t hash, struct arena_interned *share)
 {
-	for (size_t k = 0; k < SHARE_PROBES_MAX; k++) {
-		struct share_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
-		if (slot->share)
+	for (size_t k = 0; k < INTERN_PROBES_MAX; k++) {
+		struct intern_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
+		if (slot->interned)
 			continue;
-		*slot = (struct share_slot){hash, share};
+		*slot = (struct intern_slot){hash, share};
 		s->count++;
 		return;
 	}
 }
 
 /* Returns the entry with these bytes, or NULL. *full: so many entries have this hash that another is not added. */
-static struct arena_share *find_share(const struct arena_shares *s, size_t hash, const void *bytes, size_t size,
-				      bool *full)
+static struct arena_interned *find_interned(const struct arena_intern_table *s, size_t hash, const void *bytes,
+					    size_t size, bool *full)
 {
 	size_t equal_hashes = 0;
-	for (size_t k = 0; k < SHARE_PROBES_MAX && equal_hashes < SHARE_COMPARES_MAX; k++) {
-		const struct share_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
-		if (!slot->share)
+	for (size_t k = 0; k < INTERN_PROBES_MAX && equal_hashes < INTERN_COMPARES_MAX; k++) {
+		const struct intern_slot *slot = &s->slots[(hash + k) & (s->capacity - 1)];
+		if (!slot->interned)
 			break;
 		if (slot->hash != hash)
 			continue;
-		if (slot->share->size == size && (size == 0 || memcmp(slot->share->bytes, bytes, size) == 0))
-			return slot->share;
+		if (slot->interned->size == size && (size == 0 || memcmp(slot->interned->bytes, bytes, size) == 0))
+			return slot->interned;
 		equal_hashes++;
 	}
-	*full = equal_hashes == SHARE_COMPARES_MAX;
+	*full = equal_hashes == INTERN_COMPARES_MAX;
 	return NULL;
 }
 
-static bool grow_share_table(struct arena *a)
+static bool grow_intern_table(struct arena *a)
 {
-	struct arena_shares *old = a->shares;
+	struct arena_intern_table *old = a->intern_table;
 	if (old && 2 * old->count < old->capacity)
 		return true;
-	struct arena_shares *s = arena_alloc(a, 1, sizeof *s);
+	struct arena_intern_table *s = arena_alloc(a, 1, sizeof *s);
 	if (!s)
 		return false;
-	s->capacity = old ? 2 * old->capacity : SHARE_SLOTS_INITIAL;
+	s->capacity = old ? 2 * old->capacity : INTERN_SLOTS_INITIAL;
 	s->count = 0;
 	s->slots = arena_alloc(a, s->capacity, sizeof *s->slots);
 	if (!s->slots)
 		return false;
 	for (size_t i = 0; old && i < old->capacity; i++)
-		if (old->slots[i].share)
-			insert_share(s, old->slots[i].hash, old->slots[i].share);
-	a->shares = s;
+		if (old->slots[i].interned)
+			insert_interned(s, old->slots[i].hash, old->slots[i].interned);
+	a->intern_table = s;
 	return true;
 }
 
-struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size)
+struct arena_interned *arena_intern(struct arena *a, const void *bytes, size_t size)
 {
-	size_t hash = share_hash(bytes, size);
+	size_t hash = intern_hash(bytes, size);
 	bool full = false;
-	struct arena_share *existing = a->shares ? find_share(a->shares, hash, bytes, size, &full) : NULL;
+	struct arena_interned *existing =
+		a->intern_table ? find_interned(a->intern_table, hash, bytes, size, &full) : NULL;
 	if (existing)
 		return existing;
-	if (!grow_share_table(a))
+	if (!grow_intern_table(a))
 		return NULL;
-	struct arena_share *new = arena_alloc(a, 1, sizeof *new);
+	struct arena_interned *new = arena_alloc(a, 1, sizeof *new);
 	void *copy = new ? arena_alloc(a, size, 1) : NULL;
 	if (!copy)
 		return NULL;
 	if (size)
 		memcpy(copy, bytes, size);
-	*new = (struct arena_share){.bytes = copy, .size = size};
+	*new = (struct arena_interned){.bytes = copy, .size = size};
 	if (!full)
-		insert_share(a->shares, hash, new);
+		insert_interned(a->intern_table, hash, new);
 	return new;
 }
 

@@ -9,12 +9,12 @@
 #include <stddef.h>
 
 struct arena_block;
-struct arena_shares;
+struct arena_intern_table;
 struct arena {
 	struct arena_block *blocks;
-	size_t used;		     /* bytes handed out */
-	size_t limit;		     /* bytes that may be handed out at most; 0: unlimited */
-	struct arena_shares *shares; /* NULL: nothing is shared */
+	size_t used;				 /* bytes handed out */
+	size_t limit;				 /* bytes that may be handed out at most; 0: unlimited */
+	struct arena_intern_table *intern_table; /* NULL: nothing is shared */
 };
 
 /* Returns room for `count` items of `size` bytes; NULL if memory is out or the limit is reached. */
@@ -23,14 +23,14 @@ void *arena_alloc(struct arena *a, size_t count, size_t size);
 char *arena_strdup(struct arena *a, const char *s);
 
 /* Bytes that the arena holds once, however often arena_share is called with them. They must not be changed. */
-struct arena_share {
+struct arena_interned {
 	const void *bytes;
 	size_t size;
 	void *user; /* for the caller's use; NULL at first */
 };
 /* Returns a copy of the bytes, or an earlier copy of equal ones; among very many copies that differ in few bytes only
  * some are found. NULL as for arena_alloc. */
-struct arena_share *arena_share(struct arena *a, const void *bytes, size_t size);
+struct arena_interned *arena_intern(struct arena *a, const void *bytes, size_t size);
 
 /* Frees all blocks; the arena is then empty and has no limit. */
 void arena_fini(struct arena *a);

@@ -89,7 +89,7 @@ static inline bool is_little_endian(void)
 }
 
 /* Copies `count` numbers of `width` bytes, each with its bytes in reverse order; to and from may be the same. */
-static inline void reverse_numbers(uint8_t *to, const uint8_t *from, size_t width, size_t count)
+static inline void reverse_bytes_of_numbers(uint8_t *to, const uint8_t *from, size_t width, size_t count)
 {
 	for (; count; count--, to += width, from += width)
 		for (size_t i = 0; i < (width + 1) / 2; i++) {
@@ -104,7 +104,7 @@ static inline void reverse_numbers(uint8_t *to, const uint8_t *from, size_t widt
 static inline void copy_numbers(void *to, const void *from, size_t width, size_t count)
 {
 	if (!is_little_endian())
-		reverse_numbers(to, from, width, count);
+		reverse_bytes_of_numbers(to, from, width, count);
 	else if (to != from && count)
 		memcpy(to, from, width * count);
 }

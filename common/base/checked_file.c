@@ -35,8 +35,8 @@ int checked_file_create(struct checked_file *s, const char *path, struct error *
 
 static int flush_buffer(struct checked_file *s, struct error *e)
 {
-	int rc = disk_write_all(s->fd, s->buffer, s->buffered);
-	s->buffered = 0;
+	int rc = disk_write_all(s->fd, s->buffer, s->buffered_bytes);
+	s->buffered_bytes = 0;
 	return rc ? set_file_error(s, -rc, e) : 0;
 }
 
@@ -44,14 +44,15 @@ static int flush_buffer(struct checked_file *s, struct error *e)
 int checked_file_write_numbers(struct checked_file *s, const void *numbers, size_t width, size_t count, struct error *e)
 {
 	for (const unsigned char *p = numbers; count;) {
-		size_t room = (BUFFER_SIZE - s->buffered) / width, n = count < room ? count : room, size = width * n;
-		copy_numbers(s->buffer + s->buffered, p, width, n);
-		s->crc = crc32c(s->crc, s->buffer + s->buffered, size);
-		s->buffered += size;
+		size_t room = (BUFFER_SIZE - s->buffered_bytes) / width, n = count < room ? count : room,
+		       size = width * n;
+		copy_numbers(s->buffer + s->buffered_bytes, p, width, n);
+		s->crc = crc32c(s->crc, s->buffer + s->buffered_bytes, size);
+		s->buffered_bytes += size;
 		s->bytes_written += size;
 		p += size;
 		count -= n;
-		int rc = BUFFER_SIZE - s->buffered < width ? flush_buffer(s, e) : 0;
+		int rc = BUFFER_SIZE - s->buffered_bytes < width ? flush_buffer(s, e) : 0;
 		if (rc)
 			return rc;
 	}
@@ -89,20 +90,20 @@ static int refill_buffer(struct checked_file *s, struct error *e)
 		n = disk_pread(s->fd, s->buffer, BUFFER_SIZE, (off_t)s->file_offset);
 	while (n < 0 && errno == EINTR);
 	s->buffer_offset = 0;
-	s->buffered = n > 0 ? (size_t)n : 0;
-	s->file_offset += s->buffered;
+	s->buffered_bytes = n > 0 ? (size_t)n : 0;
+	s->file_offset += s->buffered_bytes;
 	if (n < 0)
 		return set_file_error(s, errno, e);
-	return s->progress ? s->progress(s->user, s->buffered, e) : 0;
+	return s->progress ? s->progress(s->user, s->buffered_bytes, e) : 0;
 }
 
 static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
 	for (unsigned char *p = bytes; size;) {
-		int rc = s->buffer_offset == s->buffered ? refill_buffer(s, e) : 0;
+		int rc = s->buffer_offset == s->buffered_bytes ? refill_buffer(s, e) : 0;
 		if (rc)
 			return rc;
-		size_t n = s->buffered - s->buffer_offset < size ? s->buffered - s->buffer_offset : size;
+		size_t n = s->buffered_bytes - s->buffer_offset < size ? s->buffered_bytes - s->buffer_offset : size;
 		if (n == 0)
 			return error_set(e, EBADMSG, "%s: ends too early", s->path);
 		memcpy(p, s->buffer + s->buffer_offset, n);
@@ -123,11 +124,11 @@ static int verify_crc(struct checked_file *s, struct error *e)
 		return set_file_error(s, errno, e);
 	if ((uint64_t)st.st_size < sizeof expected)
 		return error_set(e, EBADMSG, "%s: too short", s->path);
-	s->remaining = (uint64_t)st.st_size - sizeof expected;
-	for (uint64_t remaining = s->remaining; remaining;) {
-		int rc = s->buffer_offset == s->buffered ? refill_buffer(s, e) : 0;
-		size_t n =
-			s->buffered - s->buffer_offset < remaining ? s->buffered - s->buffer_offset : (size_t)remaining;
+	s->remaining_bytes = (uint64_t)st.st_size - sizeof expected;
+	for (uint64_t remaining = s->remaining_bytes; remaining;) {
+		int rc = s->buffer_offset == s->buffered_bytes ? refill_buffer(s, e) : 0;
+		size_t n = s->buffered_bytes - s->buffer_offset < remaining ? s->buffered_bytes - s->buffer_offset
+									    : (size_t)remaining;
 		if (rc || n == 0)
 			return rc ? rc : error_set(e, EBADMSG, "%s: ends too early", s->path);
 		crc = crc32c(crc, s->buffer + s->buffer_offset, n);
@@ -147,7 +148,7 @@ int checked_file_open_with_progress(struct checked_file *s, const char *path, ch
 	s->progress = progress;
 	s->user = user;
 	rc = verify_crc(s, e);
-	s->buffer_offset = s->buffered = s->file_offset = 0;
+	s->buffer_offset = s->buffered_bytes = s->file_offset = 0;
 	if (rc)
 		checked_file_close(s);
 	return rc;
@@ -160,9 +161,9 @@ int checked_file_open(struct checked_file *s, const char *path, struct error *e)
 
 int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
-	if (size > s->remaining)
+	if (size > s->remaining_bytes)
 		return error_set(e, EBADMSG, "%s: ends too early", s->path);
-	s->remaining -= size;
+	s->remaining_bytes -= size;
 	return read_bytes(s, bytes, size, e);
 }
 
@@ -177,9 +178,9 @@ int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t widt
 
 int checked_file_expect_end(const struct checked_file *s, struct error *e)
 {
-	return s->remaining ? error_set(e, EBADMSG, "%s: %llu bytes after its end", s->path,
-					(unsigned long long)s->remaining)
-			    : 0;
+	return s->remaining_bytes ? error_set(e, EBADMSG, "%s: %llu bytes after its end", s->path,
+					      (unsigned long long)s->remaining_bytes)
+				  : 0;
 }
 
 void checked_file_close(struct checked_file *s)

@@ -25,9 +25,9 @@ struct checked_file {
 	uint32_t crc;
 	unsigned char *buffer;		 /* NULL: the file is closed */
 	size_t buffer_offset;		 /* reading: offset of the next byte in the buffer */
-	size_t buffered;		 /* bytes in the buffer */
+	size_t buffered_bytes;		 /* bytes in the buffer */
 	uint64_t file_offset;		 /* reading: offset in the file of the byte after the buffer's last */
-	uint64_t remaining;		 /* reading: bytes before the CRC that have not been read yet */
+	uint64_t remaining_bytes;	 /* reading: bytes before the CRC that have not been read yet */
 	uint64_t bytes_written;		 /* writing */
 	const char *path;		 /* not copied; must last as long as the file is open */
 	checked_file_progress *progress; /* called while reading; NULL: none */

@@ -12,7 +12,7 @@ bool log_bucket_take(struct log_bucket *b, double now)
 {
 	refill_bucket(b, now);
 	if (b->used_tokens + 1 > LOG_BURST) {
-		b->withheld++;
+		b->withheld_count++;
 		return false;
 	}
 	b->used_tokens++;
@@ -21,11 +21,11 @@ bool log_bucket_take(struct log_bucket *b, double now)
 
 uint64_t log_bucket_take_withheld(struct log_bucket *b, double now)
 {
-	uint64_t n = b->withheld;
+	uint64_t n = b->withheld_count;
 	refill_bucket(b, now);
 	if (!n || b->used_tokens + 1 > LOG_BURST)
 		return 0;
 	b->used_tokens++; /* the line that reports this */
-	b->withheld = 0;
+	b->withheld_count = 0;
 	return n;
 }

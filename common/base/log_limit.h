@@ -12,9 +12,9 @@
 enum { LOG_BURST = 100, LOG_PER_SECOND = 5 };
 
 struct log_bucket {
-	double used_tokens; /* tokens used at time `last_time`; zeroed: a full bucket */
-	double last_time;   /* time of the last call, s */
-	uint64_t withheld;  /* lines suppressed since log_bucket_take_withheld last reported any */
+	double used_tokens;	 /* tokens used at time `last_time`; zeroed: a full bucket */
+	double last_time;	 /* time of the last call, s */
+	uint64_t withheld_count; /* lines suppressed since log_bucket_take_withheld last reported any */
 };
 
 /* Returns whether the line may be written; if not, it is counted. `now` is in s and never decreases. */

@@ -12,7 +12,7 @@
 #include "common/base/option.h"
 
 #include "common/base/spelling.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/text.h"
 
 #include <float.h>
@@ -69,11 +69,11 @@ static int refuse_out_of_range(const struct option_row *r, const char *kind, con
 {
 	char range[80];
 	if (r->max >= DBL_MAX)
-		text_print(range, sizeof range, "%s %.10g%s", r->min_excluded ? "above" : "of at least", r->min,
+		text_print(range, sizeof range, "%s %.10g%s", r->excludes_min ? "above" : "of at least", r->min,
 			   r->kind == OPTION_KIND_COUNT ? " and below 2^64" : "");
-	else if (r->min_excluded || r->max_excluded)
-		text_print(range, sizeof range, "%s %.10g and %s %.10g", r->min_excluded ? "above" : "of at least",
-			   r->min, r->max_excluded ? "below" : "at most", r->max);
+	else if (r->excludes_min || r->excludes_max)
+		text_print(range, sizeof range, "%s %.10g and %s %.10g", r->excludes_min ? "above" : "of at least",
+			   r->min, r->excludes_max ? "below" : "at most", r->max);
 	else
 		text_print(range, sizeof range, r->max >= 1e10 ? "from %.0f to %.0f" : "from %.10g to %.10g", r->min,
 			   r->max);
@@ -82,7 +82,7 @@ static int refuse_out_of_range(const struct option_row *r, const char *kind, con
 
 static bool is_within(const struct option_row *r, double x)
 {
-	return (r->min_excluded ? x > r->min : x >= r->min) && (r->max_excluded ? x < r->max : x <= r->max);
+	return (r->excludes_min ? x > r->min : x >= r->min) && (r->excludes_max ? x < r->max : x <= r->max);
 }
 
 static void store_number(const struct option_row *r, void *field, double x)
@@ -180,7 +180,7 @@ static int parse_ratio(const struct option_row *r, void *field, const char *arg,
 static int check_value(const char *noun, option_values *values, const char *arg, struct error *e)
 {
 	char hint[128], list[512] = "";
-	struct spelling s = {.wanted = arg};
+	struct spelling s = {.wanted_name = arg};
 	const char *name;
 	for (size_t i = 0; (name = values(i)) != NULL; i++) {
 		if (strcmp(name, arg) == 0)
@@ -213,7 +213,7 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 		*(const char **)field = arg;
 		return 0;
 	case OPTION_KIND_OUTPUT:
-		*(const char **)field = target_from_arg(arg);
+		*(const char **)field = output_target_from_arg(arg);
 		return 0;
 	case OPTION_KIND_NAME:
 		return parse_name(r, field, arg, e);
@@ -250,8 +250,8 @@ struct option_parser {
 	int argc, index; /* argv[index] is being read */
 	char **argv;
 	void *target;
-	size_t word_count;	    /* words read that are not options */
-	enum option_kind requested; /* as for options_parse */
+	size_t word_count;		  /* words read that are not options */
+	enum option_kind requested_print; /* as for options_parse */
 	struct error *e;
 };
 
@@ -269,18 +269,19 @@ static int apply_environment(const struct option_parser *x)
 
 static int refuse_unknown(const struct option_parser *x, const char *dashes, const char *name)
 {
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_row_at(x->program, i, NULL)) != NULL; i++)
 		spelling_offer(&s, r->name);
 	/* One program's --status-socket is another's --socket. */
-	for (size_t i = 0; !s.best && (r = option_row_at(x->program, i, NULL)) != NULL; i++) {
+	for (size_t i = 0; !s.best_match && (r = option_row_at(x->program, i, NULL)) != NULL; i++) {
 		size_t n = strlen(name), m = strlen(r->name);
 		if (n > m && name[n - m - 1] == '-' && strcmp(name + n - m, r->name) == 0)
-			s.best = r->name;
+			s.best_match = r->name;
 	}
-	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
-			 s.best ? s.best : "", s.best ? "'?" : "");
+	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name,
+			 s.best_match ? "; did you mean '--" : "", s.best_match ? s.best_match : "",
+			 s.best_match ? "'?" : "");
 }
 
 /* Returns the row of a name or of an unambiguous prefix; NULL, with the error set, if there is none. */
@@ -310,7 +311,7 @@ static const struct option_row *find_option(const struct option_parser *x, const
 static int apply_option(struct option_parser *x, const struct option_row *r, char *arg)
 {
 	if (r->kind >= OPTION_KIND_HELP) {
-		x->requested = r->kind;
+		x->requested_print = r->kind;
 		return 0;
 	}
 	if (r->arg && !arg) {
@@ -348,7 +349,7 @@ static const struct option_row *find_option_by_key(const struct option_parser *x
 static int parse_short_options(struct option_parser *x, char *text)
 {
 	int rc = 0;
-	for (char *k = text; !rc && x->requested == OPTION_KIND_END && *k; k++) {
+	for (char *k = text; !rc && x->requested_print == OPTION_KIND_END && *k; k++) {
 		const struct option_row *r = find_option_by_key(x, *k);
 		if (!r)
 			return refuse_unknown(x, "-", text);
@@ -379,7 +380,7 @@ static int parse_arguments(struct option_parser *x)
 {
 	bool options = true;
 	int rc = 0;
-	for (x->index = 1; !rc && x->requested == OPTION_KIND_END && x->index < x->argc; x->index++) {
+	for (x->index = 1; !rc && x->requested_print == OPTION_KIND_END && x->index < x->argc; x->index++) {
 		char *text = x->argv[x->index];
 		if (options && strcmp(text, "--") == 0)
 			options = false;
@@ -395,7 +396,7 @@ static int check_required(const struct option_parser *x)
 {
 	const struct option_row *r;
 	for (size_t i = 0; (r = option_row_at(x->program, i, NULL)) != NULL; i++)
-		if (r->required && !*(const char **)((char *)x->target + r->offset))
+		if (r->is_required && !*(const char **)((char *)x->target + r->offset))
 			return error_set(x->e, EINVAL, "--%s %s is needed%s%s%s", r->name, r->arg,
 					 r->environment ? " (or $" : "", r->environment ? r->environment : "",
 					 r->environment ? ")" : "");
@@ -431,8 +432,8 @@ int options_parse(const struct program *p, int argc, char **argv, void *target, 
 		rc = apply_environment(&x);
 	if (!rc)
 		rc = parse_arguments(&x);
-	if (!rc && x.requested == OPTION_KIND_END)
+	if (!rc && x.requested_print == OPTION_KIND_END)
 		rc = run_checks(&x);
-	*requested = x.requested;
+	*requested = x.requested_print;
 	return rc;
 }

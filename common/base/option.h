@@ -52,8 +52,8 @@ struct option_row {
 	enum option_field_type field_type;
 	size_t offset;			 /* of the field in the struct that the table fills */
 	double min, max, unit;		 /* the bounds, in units (1 for numbers); max = DBL_MAX: no upper bound */
-	bool min_excluded, max_excluded; /* `min` or `max` itself is not allowed */
-	bool required;			 /* for a text: a NULL after parsing is a usage error */
+	bool excludes_min, excludes_max; /* `min` or `max` itself is not allowed */
+	bool is_required;		 /* for a text: a NULL after parsing is a usage error */
 	const char *default_value;	 /* the default, parsed like an argument; NULL: the field is left as it is */
 	const char *environment;	 /* environment variable used if the option is not given; NULL: none */
 	option_values *values;		 /* the only accepted arguments; NULL: any */

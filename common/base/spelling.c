@@ -41,23 +41,23 @@ static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 
 void spelling_offer(struct spelling *s, const char *candidate)
 {
-	size_t n = strlen(s->wanted), m = strlen(candidate);
+	size_t n = strlen(s->wanted_name), m = strlen(candidate);
 	if (n > SPELLING_NAME_MAX || m > SPELLING_NAME_MAX || n == 0)
 		return;
-	size_t d = edit_distance(s->wanted, n, candidate, m);
+	size_t d = edit_distance(s->wanted_name, n, candidate, m);
 	size_t longest = n > m ? n : m;
 	bool is_near = d <= 1 + longest / 4 && d < longest;
-	if (is_near && (!s->best || d < s->distance)) {
+	if (is_near && (!s->best_match || d < s->best_distance)) {
 		memcpy(s->copy, candidate, m + 1);
-		s->best = s->copy;
-		s->distance = d;
+		s->best_match = s->copy;
+		s->best_distance = d;
 	}
 }
 
 const char *spelling_hint(const struct spelling *s, char *text, size_t size)
 {
-	if (s->best)
-		snprintf(text, size, "; did you mean `%s`?", s->best);
+	if (s->best_match)
+		snprintf(text, size, "; did you mean `%s`?", s->best_match);
 	else
 		text[0] = 0;
 	return text;

@@ -7,12 +7,12 @@
 
 enum { SPELLING_NAME_MAX = 48 }; /* longer names are not compared */
 
-/* Keeps the nearest of the candidates that are near enough to `wanted` for a typing error. Set `wanted`, zero the rest.
- * Must not be copied, because `best` points into it. */
+/* Keeps the nearest of the candidates that are near enough to `wanted_name` for a typing error. Set `wanted_name`, zero
+ * the rest. Must not be copied, because `best_match` points into it. */
 struct spelling {
-	const char *wanted;
-	const char *best;		  /* the nearest candidate, in `copy`; NULL: none is near enough */
-	size_t distance;		  /* its edit distance */
+	const char *wanted_name;
+	const char *best_match;		  /* the nearest candidate, in `copy`; NULL: none is near enough */
+	size_t best_distance;		  /* its edit distance */
 	char copy[SPELLING_NAME_MAX + 1]; /* so that candidates need not outlive spelling_offer */
 };
 void spelling_offer(struct spelling *s, const char *candidate);

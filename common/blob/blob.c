@@ -8,7 +8,7 @@
  * Writing: blob_write_begin creates a temporary file; blob_write_append makes room, appends and hashes;
  * blob_write_commit compares the hash, flushes (unless the store is a cache), renames, and adds the entry. Until then
  * the blob does not exist. Instead of blob_write_commit, blob_write_defer leaves flushing and renaming to a batch; the
- * entry then exists at once, but is marked as missing until blob_deferred_enter.
+ * entry then exists at once, but is marked as missing until blob_deferred_publish.
  *
  * Failures: more bytes than announced are -EMSGSIZE, a wrong hash is -EBADMSG, and the temporary file is removed. A
  * full disk is -ENOSPC, once every blob that is not held has been evicted and the owner of the store has found no more
@@ -262,9 +262,9 @@ void blob_store_use_as_cache(struct blob_store *s)
 	s->is_cache = true;
 }
 
-void blob_store_set_full_handler(struct blob_store *s, bool (*more_room)(void *user), void *user)
+void blob_store_set_full_handler(struct blob_store *s, bool (*free_space)(void *user), void *user)
 {
-	s->free_space = more_room;
+	s->free_space = free_space;
 	s->user = user;
 }
 
@@ -349,7 +349,7 @@ int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, s
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
 	*size = n->size;
-	n->opened_since_check = true;
+	n->was_opened_since_check = true;
 	return fd;
 }
 
@@ -470,7 +470,7 @@ static int check_written(struct blob_writer *w, struct error *e)
 /* Marks a held entry as present: its file has been written and its hash checked. */
 static void mark_present(struct blob_store *s, struct blob_entry *n, uint64_t size)
 {
-	n->is_missing = n->opened_since_check = false;
+	n->is_missing = n->was_opened_since_check = false;
 	n->size = size;
 	s->bytes += size;
 	n->check_time = clock_seconds();
@@ -558,7 +558,7 @@ int blob_write_defer(struct blob_writer *w, struct blob_deferred *deferred, stru
 	return 0;
 }
 
-void blob_deferred_enter(struct blob_store *s, const struct blob_deferred *deferred)
+void blob_deferred_publish(struct blob_store *s, const struct blob_deferred *deferred)
 {
 	struct blob_entry *n = blob_find(s, &deferred->hash);
 	if (n->is_missing)

@@ -28,7 +28,7 @@ bool blob_store_evict(struct blob_store *s);
 uint64_t blob_store_bytes(const struct blob_store *s);
 /* Sets a function that is called when the disk is full and nothing is left to evict. It may make room elsewhere; it
  * returns false if it cannot. */
-void blob_store_set_full_handler(struct blob_store *s, bool (*more_room)(void *user), void *user);
+void blob_store_set_full_handler(struct blob_store *s, bool (*free_space)(void *user), void *user);
 /* Call if files that are lost in a power failure can be fetched again. They are then not flushed to the disk, and after
  * a restart no file may be used before blob_check has read it. */
 void blob_store_use_as_cache(struct blob_store *s);
@@ -83,7 +83,7 @@ void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path
 /* Ends a writer without flushing and renaming the file. Frees the writer in any case. */
 int blob_write_defer(struct blob_writer *w, struct blob_deferred *deferred, struct error *e);
 /* Marks the blob as present: its file has been flushed and renamed. */
-void blob_deferred_enter(struct blob_store *s, const struct blob_deferred *deferred);
+void blob_deferred_publish(struct blob_store *s, const struct blob_deferred *deferred);
 /* Ends the hold that blob_write_defer took; to be called once for each kept file. Returns true if the blob is missing
  * and no longer held: then call blob_store_sweep after the last one. */
 bool blob_deferred_release(struct blob_store *s, const struct blob_deferred *deferred);

@@ -16,9 +16,9 @@ enum { PATH_SIZE = 4096 };
 
 struct blob_batch {
 	struct blob_store *store;
-	struct list deferred;  /* struct blob_deferred */
-	size_t renamed_count;  /* files that have got their names */
-	atomic_bool cancelled; /* set by blob_batch_cancel */
+	struct list deferred;	  /* struct blob_deferred */
+	size_t renamed_count;	  /* files that have got their names */
+	atomic_bool is_cancelled; /* set by blob_batch_cancel */
 };
 
 struct blob_batch *blob_batch_new(struct blob_store *s)
@@ -71,8 +71,8 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 	int rc = 0;
 	for (size_t i = 0; !rc && i < b->deferred.count; i++) {
 		blob_temporary_path(b->store, deferred_at(b, i)->temp_number, from, sizeof from);
-		rc = atomic_load(&b->cancelled) ? error_set(e, ECANCELED, "nobody waits for the files")
-						: flush_file(from, e);
+		rc = atomic_load(&b->is_cancelled) ? error_set(e, ECANCELED, "nobody waits for the files")
+						   : flush_file(from, e);
 	}
 	for (; !rc && b->renamed_count < b->deferred.count; b->renamed_count += !rc) {
 		const struct blob_deferred *k = deferred_at(b, b->renamed_count);
@@ -86,13 +86,13 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 
 void blob_batch_cancel(struct blob_batch *b)
 {
-	atomic_store(&b->cancelled, true);
+	atomic_store(&b->is_cancelled, true);
 }
 
 void blob_batch_commit(struct blob_batch *b)
 {
 	for (size_t i = 0; i < b->deferred.count; i++)
-		blob_deferred_enter(b->store, deferred_at(b, i));
+		blob_deferred_publish(b->store, deferred_at(b, i));
 }
 
 void blob_batch_discard(struct blob_batch *b)

@@ -13,10 +13,10 @@
 struct blob_check {
 	struct blob_store *store;
 	struct blob_hash hash;
-	double begin_time; /* when the check began, s of the monotonic clock */
-	bool was_opened;   /* the entry's `opened_since_check` when the check began */
-	bool reached_end;  /* the end of the file has been reached */
-	int fd, rc;	   /* of the file; first error while reading */
+	double begin_time;    /* when the check began, s of the monotonic clock */
+	bool was_opened;      /* the entry's `was_opened_since_check` when the check began */
+	bool has_reached_end; /* the end of the file has been reached */
+	int fd, rc;	      /* of the file; first error while reading */
 	EVP_MD_CTX *md;
 	struct error error;
 };
@@ -31,7 +31,7 @@ int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct
 	if (!n || n->is_missing)
 		return error_set(e, ENOENT, "there is no %s", path);
 	if (n->check_time > 0 &&
-	    (seconds == BLOB_SINCE_OPENED ? !n->opened_since_check : clock_seconds() - n->check_time <= seconds) &&
+	    (seconds == BLOB_SINCE_OPENED ? !n->was_opened_since_check : clock_seconds() - n->check_time <= seconds) &&
 	    (disk_stat(path, &st) == 0 || errno != ENOENT)) /* a cache can be emptied at any time */
 		return 0;
 	struct blob_check *c = mem_alloc(1, sizeof *c);
@@ -40,10 +40,10 @@ int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct
 	*c = (struct blob_check){.store = s,
 				 .hash = *h,
 				 .begin_time = clock_seconds(),
-				 .was_opened = n->opened_since_check,
+				 .was_opened = n->was_opened_since_check,
 				 .fd = -1,
 				 .rc = 0};
-	n->opened_since_check = false; /* a file opened from now on may change after this check has read it */
+	n->was_opened_since_check = false; /* a file opened from now on may change after this check has read it */
 	blob_entry_hold(s, n);
 	n->check_count++;
 	*out = c;
@@ -76,9 +76,9 @@ static int hash_next_part(struct blob_check *c, const char *path)
 	if (!bytes)
 		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
 	int rc = 0;
-	for (int i = 0; !rc && !c->reached_end && i < PIECE_COUNT; i++) {
+	for (int i = 0; !rc && !c->has_reached_end && i < PIECE_COUNT; i++) {
 		ssize_t n = disk_read(c->fd, bytes, PIECE_SIZE);
-		c->reached_end = n == 0;
+		c->has_reached_end = n == 0;
 		if (n < 0 && errno != EINTR)
 			rc = error_file(&c->error, errno, path);
 		else if (n > 0 && EVP_DigestUpdate(c->md, bytes, (size_t)n) != 1)
@@ -96,7 +96,7 @@ bool blob_check_read(struct blob_check *c)
 		c->rc = open_file(c, path);
 	if (!c->rc)
 		c->rc = hash_next_part(c, path);
-	return !c->rc && !c->reached_end;
+	return !c->rc && !c->has_reached_end;
 }
 
 /* Returns 0 if the contents are right, -EBADMSG if they are wrong, -ENOENT if there is no file, or another -errno if
@@ -108,7 +108,7 @@ static int compare_hash(struct blob_check *c, struct error *e)
 		*e = c->error;
 		return c->rc;
 	}
-	if (!c->reached_end)
+	if (!c->has_reached_end)
 		return error_set(e, ECANCELED, "the check was not finished");
 	if (EVP_DigestFinal_ex(c->md, actual.bytes, NULL) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
@@ -144,7 +144,7 @@ int blob_check_end(struct blob_check *c, struct error *e)
 	} else if (rc == -EBADMSG || rc == -ENOENT) {
 		rc = mark_missing(s, n, rc == -EBADMSG, e);
 	} else if (rc) {
-		n->opened_since_check |= c->was_opened;
+		n->was_opened_since_check |= c->was_opened;
 	} else {
 		n->check_time = clock_seconds();
 	}

@@ -20,8 +20,8 @@ struct blob_entry {
 	unsigned hold_count;
 	unsigned check_count; /* checks that have begun and not ended */
 	double check_time; /* when the contents were last verified, s of the monotonic clock; 0: not since the start */
-	bool opened_since_check; /* opened since then, so the file may have been changed */
-	bool is_missing;	 /* the file does not exist or is damaged; holds are kept */
+	bool was_opened_since_check; /* opened since then, so the file may have been changed */
+	bool is_missing;	     /* the file does not exist or is damaged; holds are kept */
 };
 
 struct blob_store {

@@ -16,11 +16,11 @@ static double group_factor(const struct canvas *c, uint32_t group)
 	const struct plan *p = &c->plan;
 	if (p->kind != PLAN_CHAINS)
 		return ratio_or_zero(c->quantum, (double)p->epoch * (double)c->rounds);
-	struct exact_sum sum = c->prefix.groups[group].independent_sum;
-	exact_sum_merge(&sum, &c->bootstrap.groups[group].independent_sum);
-	uint64_t independent = c->prefix.groups[group].independent + c->bootstrap.groups[group].independent;
+	struct exact_sum sum = c->prefix_tally.groups[group].independent_sum;
+	exact_sum_merge(&sum, &c->bootstrap_tally.groups[group].independent_sum);
+	uint64_t independent = c->prefix_tally.groups[group].independent + c->bootstrap_tally.groups[group].independent;
 	return ratio_or_zero(exact_sum_value(&sum), (double)independent) *
-	       ratio_or_zero(c->quantum, (double)c->prefix.groups[group].samples);
+	       ratio_or_zero(c->quantum, (double)c->prefix_tally.groups[group].samples);
 }
 
 /* Returns X, Y, Z of a pixel on the grid; NULL if nothing was added to its tile. */

@@ -33,9 +33,9 @@ enum { FOLDED_GROUPS = ERROR_GROUPS_FOLDED, VALUES_MAX = 3 * PLAN_GROUPS_MAX };
 static const double one_group_kurtosis_16 = 9.6, highlight_errors_16 = 1.5;
 
 /* The tail index of errors is the smaller of two estimates, from the largest 1 / TAIL_DIVISOR of the errors and from
- * the largest 1 / (TAIL_DIVISOR * EXTREME_DIVISOR), but from at least 32 and 8 errors; worker/render/choose.h uses the
- * same shares for samples. With fewer than ERRORS_MIN errors in all, these would not be the tail but the bulk, and no
- * index is estimated. */
+ * the largest 1 / (TAIL_DIVISOR * EXTREME_DIVISOR), but from at least 32 and 8 errors;
+ * worker/render/choose_integrator.h uses the same shares for samples. With fewer than ERRORS_MIN errors in all, these
+ * would not be the tail but the bulk, and no index is estimated. */
 enum { TAIL_DIVISOR = 128, TAIL_SIZE_MIN = 32, TAIL_SIZE_MAX = 1 << 16, EXTREME_DIVISOR = 4, ERRORS_MIN = 2048 };
 
 /* ---- weights: 1 / (B^2 + floor), with an estimate of B that is as little noisy as possible */
@@ -61,7 +61,7 @@ static double divisor_square(const struct tile_error *t, double brightness, doub
 
 /* Adds a part of the relMSE whose pixels have one brightness in common, and its uncertainty. variance: of the
  * brightness. */
-static void add_share(struct tile_error *t, double part, double brightness, double variance, double divisor)
+static void add_error_part(struct tile_error *t, double part, double brightness, double variance, double divisor)
 {
 	double slope = 2 * brightness * part / divisor;
 	t->sum.total += part;
@@ -111,7 +111,7 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool is_r
 		float x = slope * deviations[g];
 		deviations[g] *= root * (1 + x + x * x);
 	}
-	add_share(t, variance / divisor, brightness, variance, divisor);
+	add_error_part(t, variance / divisor, brightness, variance, divisor);
 }
 
 /* Settles a channel in which colours cancel: its error is weighted over all brightnesses that it may have. */
@@ -141,7 +141,7 @@ static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 
 /* Returns the mean, over the 2 x 2 pixels to which this one belongs, of the squared relative standard error, each
  * limited to 1. */
-static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+static double neighbourhood_noise(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
 	for (uint32_t j = y & ~1u; j < t->height && j <= (y | 1); j++)
@@ -165,7 +165,8 @@ static uint32_t find_settled(struct tile_error *t)
 			for (size_t k = 0; k < 3; k++) {
 				size_t p = (size_t)y * t->width + x;
 				bool certain = brightness_is_reliable(t, t->brightness[p][k], 8 * t->variance[p][k]);
-				t->is_settled[p][k] = certain || noise_around(t, x, y, k) <= RELIABLE_VARIANCE_MAX;
+				t->is_settled[p][k] =
+					certain || neighbourhood_noise(t, x, y, k) <= RELIABLE_VARIANCE_MAX;
 				t->is_cancelling[p][k] = !certain && channel_is_cancelling(t, p, k);
 				t->is_settled[p][k] |= t->is_cancelling[p][k];
 				waiting += !t->is_settled[p][k];
@@ -195,7 +196,7 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 	add_bounds(t, pixel, k, part, error_by_other_groups(t, pixel, k));
 	for (uint32_t g = 0; g < t->groups; g++)
 		deviations[g] *= root;
-	add_share(t, part, base, base_variance, divisor);
+	add_error_part(t, part, base, base_variance, divisor);
 	return true;
 }
 
@@ -272,7 +273,7 @@ static void settle_block(struct tile_error *t, struct pixel_block *b, size_t k, 
 				pixel_deviations[g] *= root;
 			part += t->variance[pixel][k];
 		}
-	add_share(t, part / divisor, brightness, variance, divisor);
+	add_error_part(t, part / divisor, brightness, variance, divisor);
 	b->waiting_count[k] = 0;
 	b->waiting_sum[k] = b->waiting_rare_sum[k] = 0;
 	memset(b->waiting_deviation_sum + k * t->groups, 0, t->groups * sizeof *b->waiting_deviation_sum);

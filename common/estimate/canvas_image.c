@@ -27,7 +27,7 @@ static void add_bootstrap(struct tally *to, const struct tally *from, uint32_t g
 	for (uint32_t g = 0; g < groups; g++) {
 		to->groups[g].independent += from->groups[g].independent;
 		exact_sum_merge(&to->groups[g].independent_sum, &from->groups[g].independent_sum);
-		exact_sum_merge(&to->groups[g].beyond_sum, &from->groups[g].beyond_sum);
+		exact_sum_merge(&to->groups[g].overlong_sum, &from->groups[g].overlong_sum);
 	}
 	struct canvas_counts refused = {{0}, {{0}}};
 	for (int i = COUNT_NAN; i <= COUNT_NEGATIVE; i++)
@@ -52,8 +52,8 @@ static void compute_b(struct image_builder *m)
 		m->b[g] = ratio_or_zero(exact_sum_value(&m->totals->groups[g].independent_sum),
 					(double)m->totals->groups[g].independent);
 		exact_sum_merge(&sum, &m->totals->groups[g].independent_sum);
-		exact_sum_merge(&beyond, &m->c->bootstrap.groups[g].beyond_sum);
-		exact_sum_merge(&bootstrap, &m->c->bootstrap.groups[g].independent_sum);
+		exact_sum_merge(&beyond, &m->c->bootstrap_tally.groups[g].overlong_sum);
+		exact_sum_merge(&bootstrap, &m->c->bootstrap_tally.groups[g].independent_sum);
 		independent += m->totals->groups[g].independent;
 		mean += m->b[g] / groups;
 	}
@@ -63,7 +63,7 @@ static void compute_b(struct image_builder *m)
 	m->img->b_error = groups > 1 ? sqrt(square / groups / (groups - 1)) : NAN;
 	m->img->b_tail_index = m->c->plan.kind == PLAN_CHAINS ? m->c->b_tail_index : 0;
 	double outside = exact_sum_value(&beyond);
-	m->img->beyond_share = ratio_or_zero(outside, outside + exact_sum_value(&bootstrap));
+	m->img->overlong_share = ratio_or_zero(outside, outside + exact_sum_value(&bootstrap));
 }
 
 /* Computes the factors from sums on the grid to the images of the groups and to the pooled image. */
@@ -148,15 +148,15 @@ static int compute_moments(const struct image_builder *m, struct error *e)
 {
 	struct moments_group groups[PLAN_GROUPS_MAX];
 	for (uint32_t g = 0; g < m->c->plan.groups; g++)
-		groups[g] = (struct moments_group){m->c->bootstrap.groups[g].independent, m->totals->groups[g].samples,
-						   m->b[g]};
+		groups[g] = (struct moments_group){m->c->bootstrap_tally.groups[g].independent,
+						   m->totals->groups[g].samples, m->b[g]};
 	return moments_fill_image(m->c->moments, groups, m->c->rounds, m->includes_open_rounds, m->img, e);
 }
 
 static void set_interval_unknown(struct canvas_image *img, enum error_doubt why)
 {
 	img->rel_mse_doubt = why;
-	img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
+	img->rel_mse_interval_95[0] = img->rel_mse_interval_95[1] = NAN;
 }
 
 /* If the chains are flagged for some reason but are too short to be judged, the size of their errors is not known. */
@@ -188,8 +188,9 @@ static void doubt_unseen_light(struct image_builder *m)
 	struct canvas_image *img = m->img;
 	if (!(img->rel_mse > 0))
 		return;
-	img->rel_mse_unseen = plan_unseen_after(&m->c->plan, discovery_samples(m));
-	if (img->rel_mse_doubt || img->rel_mse + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen <= img->rel_mse_95[1])
+	img->rel_mse_unseen = plan_unseen_mean_square(&m->c->plan, discovery_samples(m));
+	if (img->rel_mse_doubt ||
+	    img->rel_mse + IMAGE_UNSEEN_FACTOR * img->rel_mse_unseen <= img->rel_mse_interval_95[1])
 		return;
 	set_interval_unknown(img, ERROR_DOUBT_UNSEEN);
 }
@@ -203,7 +204,7 @@ int canvas_image_init(const struct canvas *c, bool open_rounds, struct canvas_im
 				     .rel_mse_upper = NAN,
 				     .rel_mse_as_measured = NAN,
 				     .rel_mse_degrees = NAN,
-				     .rel_mse_95 = {NAN, NAN},
+				     .rel_mse_interval_95 = {NAN, NAN},
 				     .rounds = c->rounds};
 	struct image_builder m = {
 		.c = c, .img = img, .includes_open_rounds = open_rounds, .totals = mem_alloc(1, sizeof *m.totals)};
@@ -215,10 +216,10 @@ int canvas_image_init(const struct canvas *c, bool open_rounds, struct canvas_im
 		mem_free(m.totals);
 		return error_set(e, ENOMEM, "no memory for an image of %ux%u", p->crop_width, p->crop_height);
 	}
-	add_bootstrap(m.totals, &c->bootstrap, p->groups);
-	tally_merge(m.totals, &c->prefix, p->groups);
+	add_bootstrap(m.totals, &c->bootstrap_tally, p->groups);
+	tally_merge(m.totals, &c->prefix_tally, p->groups);
 	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
-		tally_merge(m.totals, &c->open[i], p->groups);
+		tally_merge(m.totals, &c->open_tallies[i], p->groups);
 	compute_b(&m);
 	compute_factors(&m);
 	img->counts = m.totals->counts;
@@ -249,6 +250,6 @@ void canvas_image_fini(struct canvas_image *img)
 	mem_free(img->error);
 	mem_free(img->r_hat);
 	mem_free(img->tile_error);
-	mem_free(img->tile_share);
-	img->rgb = img->error = img->r_hat = img->tile_error = img->tile_share = NULL;
+	mem_free(img->tile_energy_share);
+	img->rgb = img->error = img->r_hat = img->tile_error = img->tile_energy_share = NULL;
 }

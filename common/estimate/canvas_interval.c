@@ -101,8 +101,8 @@ static void set_doubt(const struct error_sums *s, double normal_end_ratio, struc
 	} else if (dark > max_dark_share) {
 		img->rel_mse_doubt = ERROR_DOUBT_DARK;
 		img->doubtful_share = dark;
-	} else if (!(img->rel_mse_95[1] <=
-		     fmax(max_end_ratio, max_end_ratio_factor * normal_end_ratio) * img->rel_mse_95[0])) {
+	} else if (!(img->rel_mse_interval_95[1] <=
+		     fmax(max_end_ratio, max_end_ratio_factor * normal_end_ratio) * img->rel_mse_interval_95[0])) {
 		img->rel_mse_doubt = ERROR_DOUBT_WIDE;
 	} else if (!(s->tail_index > img->error_tail_critical)) {
 		img->rel_mse_doubt = ERROR_DOUBT_TAIL;
@@ -110,7 +110,7 @@ static void set_doubt(const struct error_sums *s, double normal_end_ratio, struc
 		img->rel_mse_doubt = ERROR_DOUBT_FEW_GROUPS;
 	}
 	if (img->rel_mse_doubt)
-		img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
+		img->rel_mse_interval_95[0] = img->rel_mse_interval_95[1] = NAN;
 }
 
 void canvas_compute_interval(struct error_sums *s, struct canvas_image *img)
@@ -122,8 +122,8 @@ void canvas_compute_interval(struct error_sums *s, struct canvas_image *img)
 		s->distance[g] = s->gram[g][g];
 	for (uint32_t g = 0; g < s->groups; g++)
 		mean += s->distance[g] / groups;
-	img->rel_mse = img->rel_mse_as_measured = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] =
-		mean / (groups - 1) / (3.0 * img->width * img->height);
+	img->rel_mse = img->rel_mse_as_measured = img->rel_mse_upper = img->rel_mse_interval_95[0] =
+		img->rel_mse_interval_95[1] = mean / (groups - 1) / (3.0 * img->width * img->height);
 	if (!(mean > 0))
 		return;
 	double brightness_variance = s->total > 0 ? s->brightness_variance / (s->total * s->total) : 0,
@@ -139,7 +139,7 @@ void canvas_compute_interval(struct error_sums *s, struct canvas_image *img)
 	       high = s->total > 0 ? fmax(1, (s->upper_bound + s->dark_total) / s->total) : 1;
 	img->rel_mse_as_measured *= low;
 	img->rel_mse_upper *= high * f_quantile(0.95, degrees, degrees * (groups - 1));
-	img->rel_mse_95[0] *= low * f_quantile(0.025, degrees, degrees * (groups - 1));
-	img->rel_mse_95[1] *= high * f_quantile(0.975, degrees, degrees * (groups - 1));
+	img->rel_mse_interval_95[0] *= low * f_quantile(0.025, degrees, degrees * (groups - 1));
+	img->rel_mse_interval_95[1] *= high * f_quantile(0.975, degrees, degrees * (groups - 1));
 	set_doubt(s, normal_end_ratio, img);
 }

@@ -77,7 +77,7 @@ double convergence_student_tail(double t, uint32_t degrees)
 static bool tile_is_flagged(const struct canvas_image *img, size_t i)
 {
 	return img->r_hat[i] > (float)R_HAT_MIXED && img->tile_error[i] > (float)TILE_ERROR_MAX &&
-	       img->tile_share[i] >= (float)TILE_SHARE_MIN;
+	       img->tile_energy_share[i] >= (float)TILE_SHARE_MIN;
 }
 
 /* Returns the median of the `count` values of R-hat that are not NAN, by bisection over the values: quadratic, but
@@ -123,10 +123,10 @@ static void judge_tiles(const struct plan *p, const struct canvas_image *img, st
 		}
 		if (tile_is_flagged(img, i)) {
 			a->flagged_tiles++;
-			a->flagged_energy_share += (double)img->tile_share[i];
+			a->flagged_energy_share += (double)img->tile_energy_share[i];
 		}
 	}
-	a->r_hat_median = median_r_hat(img, count);
+	a->median_r_hat = median_r_hat(img, count);
 }
 
 /* ---- classes */
@@ -232,7 +232,7 @@ static void describe_verdict(const struct plan *p, const struct canvas_image *im
 
 void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *a)
 {
-	*a = (struct convergence){.r_hat_median = NAN, .max_r_hat = NAN};
+	*a = (struct convergence){.median_r_hat = NAN, .max_r_hat = NAN};
 	if (p->kind != PLAN_CHAINS)
 		return;
 	uint64_t epochs = img->samples / p->epoch;

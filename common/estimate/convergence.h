@@ -26,7 +26,7 @@ struct convergence {
 	uint32_t tiles, flagged_tiles;	/* number of tiles; of tiles in which chains have not mixed and whose mean is
 					   therefore uncertain */
 	double flagged_energy_share;	/* share of the image's energy in flagged tiles */
-	double r_hat_median, max_r_hat; /* over tiles with light; NAN: none */
+	double median_r_hat, max_r_hat; /* over tiles with light; NAN: none */
 	uint32_t worst_x, worst_y;	/* the tile of max_r_hat, in pixels of the full film */
 	uint32_t flagged_classes;	/* one bit per path class: chains and bootstrap differ */
 	/* one bit per path class: groups of chains differ, as if few had found the class */

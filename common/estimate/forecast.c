@@ -30,11 +30,11 @@ static const double burst_sd = 0.15; /* spread of a look in addition to chi-squa
 /* Prior standard deviation of the trend: rare bursts of light, and chains that remember their seeds. */
 static const double trend_prior_sd = 0.2;
 /* E-folds of work over which a trend decays; the spread of its logarithm. */
-static const double trend_memory = 2, trend_memory_sd = 0.8;
-static const double drift_sd = 0.08;	 /* standard deviation of unforeseen changes of x per e-fold of work */
-static const double min_price_sd = 0.03; /* least relative spread of the time per sample over time */
+static const double trend_decay_length = 2, trend_decay_length_sd = 0.8;
+static const double drift_sd = 0.08;	       /* standard deviation of unforeseen changes of x per e-fold of work */
+static const double min_sample_time_sd = 0.03; /* least relative spread of the time per sample over time */
 /* The same from one render to another: leases of other lengths cost up to 6 % more or less per sample. */
-static const double other_render_price_sd = 0.08;
+static const double other_render_sample_time_sd = 0.08;
 /* Looks at up to so many times the work that a target takes tell what it takes. */
 static const double max_work_ratio = 4;
 static const double log_four = 1.3862943611198906;
@@ -66,7 +66,7 @@ void forecast_add_image(struct forecast_history *h, const struct plan *p, const 
 				  .rel_mse = img->rel_mse,
 				  .rel_mse_upper = upper * upper,
 				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0,
-				  .doubtful = doubtful};
+				  .is_doubtful = doubtful};
 	forecast_add_look(h, &l);
 }
 
@@ -78,7 +78,7 @@ static const struct forecast_look *last_look(const struct forecast_history *h)
 const struct forecast_look *forecast_stopping_look(const struct forecast_history *h, double target)
 {
 	for (uint32_t i = 0; i < h->count; i++)
-		if (!h->looks[i].doubtful && sqrt(h->looks[i].rel_mse_upper) <= target)
+		if (!h->looks[i].is_doubtful && sqrt(h->looks[i].rel_mse_upper) <= target)
 			return &h->looks[i];
 	return NULL;
 }
@@ -107,8 +107,8 @@ struct fit {
 	double work;	     /* work at the last look; t below is log(work / this) */
 	double level, trend; /* log(relMSE x work) at the last look, and its growth per e-fold of work */
 	double level_sd, trend_sd, correlation; /* uncertainty of level and trend */
-	double spread, shift;			/* standard deviation and mean of a look's logarithm around the fit */
-	double covered;		  /* e-folds of work covered by the looks; limits the trend into the past */
+	double spread, spread_mean;		/* standard deviation and mean of a look's logarithm around the fit */
+	double covered_efolds;	  /* e-folds of work covered by the looks; limits the trend into the past */
 	double last_deviation;	  /* deviation of the last look, in units of spread */
 	double margin, margin_sd; /* log(upper end / estimate) of looks whose interval is known */
 	double doubt_probability; /* probability that a look's error is in doubt, from the last look on */
@@ -133,17 +133,17 @@ static void add_observation(struct normal_equations *q, double weight, double al
 /* The part of a look that is independent of the look before: value = al * level + at * trend + noise, where the noise
  * has the variance share * spread^2. */
 struct innovation {
-	double al, at, value, share;
+	double level_weight, trend_weight, value, variance_share;
 };
 
-static struct innovation innovation_of(const struct forecast_look *l, const struct forecast_look *previous,
-				       const struct fit *f)
+static struct innovation compute_innovation(const struct forecast_look *l, const struct forecast_look *previous,
+					    const struct fit *f)
 {
-	double t = log(l->work / f->work), x = log(l->rel_mse * l->work) - f->shift;
+	double t = log(l->work / f->work), x = log(l->rel_mse * l->work) - f->spread_mean;
 	if (!previous)
 		return (struct innovation){1, t, x, 1};
 	double r = previous->work / l->work;
-	double t0 = log(previous->work / f->work), x0 = log(previous->rel_mse * previous->work) - f->shift;
+	double t0 = log(previous->work / f->work), x0 = log(previous->rel_mse * previous->work) - f->spread_mean;
 	return (struct innovation){1 - r, t - r * t0, x - r * x0, 1 - r * r};
 }
 
@@ -154,17 +154,17 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 	double variance = f->spread * f->spread;
 	add_observation(&q, variance / (trend_prior_sd * trend_prior_sd), 0, 1, 0);
 	for (uint32_t i = first; i < h->count; i++) {
-		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
-		add_observation(&q, 1 / v.share, v.al, v.at, v.value);
+		struct innovation v = compute_innovation(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
+		add_observation(&q, 1 / v.variance_share, v.level_weight, v.trend_weight, v.value);
 	}
 	double det = q.ll * q.tt - q.lt * q.lt; /* > 0, because of the prior and the first look */
 	f->level = (q.l * q.tt - q.t * q.lt) / det;
 	f->trend = (q.ll * q.t - q.lt * q.l) / det;
 	double square = 0;
 	for (uint32_t i = first; i < h->count; i++) {
-		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
-		double d = v.value - v.al * f->level - v.at * f->trend;
-		square += d * d / v.share;
+		struct innovation v = compute_innovation(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
+		double d = v.value - v.level_weight * f->level - v.trend_weight * f->trend;
+		square += d * d / v.variance_share;
 	}
 	/* With rare bursts of light, looks scatter more than by chi-square. */
 	variance = (PRIOR_WEIGHT * variance + square) / (PRIOR_WEIGHT + (double)(h->count - first) - 1);
@@ -176,12 +176,12 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 
 static double rare_factor(const struct forecast_look *l)
 {
-	return l->doubtful ? 0 : stated_error_rare_factor(sqrt(l->rel_mse), sqrt(l->rel_mse_upper));
+	return l->is_doubtful ? 0 : stated_error_rare_factor(sqrt(l->rel_mse), sqrt(l->rel_mse_upper));
 }
 
 static bool look_is_in_doubt(const struct forecast_look *l)
 {
-	return l->doubtful || rare_factor(l) > 0;
+	return l->is_doubtful || rare_factor(l) > 0;
 }
 
 /* Fits the margin to the looks of h from `first` on, except those whose upper end is only a multiple of the estimate.
@@ -246,14 +246,14 @@ static struct fit fit_looks(const struct forecast_history *h)
 	struct fit f = {.work = end->work,
 			.history = h,
 			.spread = sqrt(2 / d + 2 / (d * d) + burst_sd * burst_sd),
-			.shift = -1 / d - 1 / (3 * d * d)};
-	f.covered = log(end->work / h->looks[first].work);
+			.spread_mean = -1 / d - 1 / (3 * d * d)};
+	f.covered_efolds = log(end->work / h->looks[first].work);
 	fit_level(&f, h, first);
-	f.last_deviation = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;
+	f.last_deviation = (log(end->rel_mse * end->work) - f.spread_mean - f.level) / f.spread;
 	fit_margin(&f, h, first);
 	fit_doubt(&f, h, first);
-	fit_seconds_per_sample(h, false, min_price_sd, &f.cpu_per_sample, &f.cpu_sd);
-	fit_seconds_per_sample(h, true, min_price_sd, &f.wall_per_sample, &f.wall_sd);
+	fit_seconds_per_sample(h, false, min_sample_time_sd, &f.cpu_per_sample, &f.cpu_sd);
+	fit_seconds_per_sample(h, true, min_sample_time_sd, &f.wall_per_sample, &f.wall_sd);
 	return f;
 }
 
@@ -267,8 +267,8 @@ static struct fit fit_new_render(const struct forecast_history *h, double target
 	while (reached && last_look(around)->work > max_work_ratio * reached->work)
 		around->count--;
 	struct fit f = fit_looks(around);
-	fit_seconds_per_sample(h, false, other_render_price_sd, &f.cpu_per_sample, &f.cpu_sd);
-	fit_seconds_per_sample(h, true, other_render_price_sd, &f.wall_per_sample, &f.wall_sd);
+	fit_seconds_per_sample(h, false, other_render_sample_time_sd, &f.cpu_per_sample, &f.cpu_sd);
+	fit_seconds_per_sample(h, true, other_render_sample_time_sd, &f.wall_per_sample, &f.wall_sd);
 	return f;
 }
 
@@ -294,9 +294,9 @@ static double draw_normal(struct random_state *d)
 
 /* One possible render. Members are as in struct fit, drawn from their distributions. */
 struct scenario {
-	double level, trend, memory, drift, margin, last_deviation, cpu_per_sample, wall_per_sample;
-	double lasting_luck; /* standard normal: how rare the light of the scene is */
-	double look_luck;    /* standard normal: the luck of the current look, which changes like its deviation */
+	double level, trend, trend_decay_length, drift, margin, last_deviation, cpu_per_sample, wall_per_sample;
+	double lasting_deviate; /* standard normal: how rare the light of the scene is */
+	double look_deviate;	/* standard normal: the luck of the current look, which changes like its deviation */
 };
 
 static struct scenario draw_scenario(const struct fit *f, struct random_state *d)
@@ -309,12 +309,12 @@ static struct scenario draw_scenario(const struct fit *f, struct random_state *d
 		.level = level, .trend = trend, .last_deviation = f->last_deviation + (f->level - level) / f->spread};
 	/* Separate statements, because C does not define the order in which an initializer is evaluated. */
 	y.margin = fmax(0, f->margin + f->margin_sd * draw_normal(d));
-	y.memory = trend_memory * exp(trend_memory_sd * draw_normal(d));
+	y.trend_decay_length = trend_decay_length * exp(trend_decay_length_sd * draw_normal(d));
 	y.drift = drift_sd * draw_normal(d);
 	y.cpu_per_sample = f->cpu_per_sample * exp(f->cpu_sd * draw_normal(d));
 	y.wall_per_sample = f->wall_per_sample * exp(f->wall_sd * draw_normal(d));
-	y.lasting_luck = draw_normal(d);
-	y.look_luck = draw_normal(d);
+	y.lasting_deviate = draw_normal(d);
+	y.look_deviate = draw_normal(d);
 	return y;
 }
 
@@ -333,20 +333,21 @@ static double doubt_probability_at(const struct fit *f, double work)
 	return sum / n;
 }
 
-/* Returns whether the look after this much work is in doubt. Of the variance that decides this, half (`lasting_luck`)
- * stays the same for a render, and half (`look_luck`) changes as fast as the deviations of looks. */
+/* Returns whether the look after this much work is in doubt. Of the variance that decides this, half
+ * (`lasting_deviate`) stays the same for a render, and half (`look_deviate`) changes as fast as the deviations of
+ * looks. */
 static bool scenario_is_in_doubt(const struct fit *f, const struct scenario *y, double work)
 {
-	return 0.5 * erfc(0.5 * (y->lasting_luck + y->look_luck)) < doubt_probability_at(f, work);
+	return 0.5 * erfc(0.5 * (y->lasting_deviate + y->look_deviate)) < doubt_probability_at(f, work);
 }
 
-/* Draws `lasting_luck` and `look_luck` again until the scenario's current look is in doubt exactly if the render's last
- * look is. */
+/* Draws `lasting_deviate` and `look_deviate` again until the scenario's current look is in doubt exactly if the
+ * render's last look is. */
 static void condition_on_doubt(const struct fit *f, struct scenario *y, bool doubt, struct random_state *d)
 {
 	for (int i = 0; i < TRIES_MAX && scenario_is_in_doubt(f, y, f->work) != doubt; i++) {
-		y->lasting_luck = draw_normal(d);
-		y->look_luck = draw_normal(d);
+		y->lasting_deviate = draw_normal(d);
+		y->look_deviate = draw_normal(d);
 	}
 }
 
@@ -354,8 +355,8 @@ static void condition_on_doubt(const struct fit *f, struct scenario *y, bool dou
 static double expected_change(const struct fit *f, const struct scenario *y, double t)
 {
 	if (t < 0)
-		return y->trend * fmax(-f->covered, t);
-	return y->trend * y->memory * (1 - exp(-t / y->memory)) + y->drift * t;
+		return y->trend * fmax(-f->covered_efolds, t);
+	return y->trend * y->trend_decay_length * (1 - exp(-t / y->trend_decay_length)) + y->drift * t;
 }
 
 /* Returns the expected log(relMSE) after this much work. */
@@ -379,9 +380,9 @@ static double simulate_render(const struct fit *f, struct scenario *y, const str
 		       innovation_weight = sqrt(fmax(0, 1 - r * r));
 		deviation = r * deviation + innovation_weight * draw_normal(d);
 		previous_work = work;
-		double estimate = expected_log_mse(f, y, work) + f->shift + f->spread * deviation;
+		double estimate = expected_log_mse(f, y, work) + f->spread_mean + f->spread * deviation;
 		if (rare_stop > 0)
-			y->look_luck = r * y->look_luck + innovation_weight * draw_normal(d);
+			y->look_deviate = r * y->look_deviate + innovation_weight * draw_normal(d);
 		if (rare_stop > 0 && scenario_is_in_doubt(f, y, work) ? estimate <= 2 * log(rare_stop)
 								      : estimate + y->margin <= 2 * log(target))
 			return (double)rounds;

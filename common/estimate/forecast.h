@@ -29,7 +29,7 @@ struct forecast_look {
 	double work;				/* mutations or samples, in the units of plan_round_mutations */
 	double cpu_seconds, seconds;		/* CPU time of leases, wall-clock time; both without the bootstrap */
 	double rel_mse, rel_mse_upper, degrees; /* estimate, upper end of its 90 % interval, degrees of freedom */
-	uint64_t doubtful; /* 1: the interval is not known (enum error_doubt), and no render stops at this look */
+	uint64_t is_doubtful; /* 1: the interval is not known (enum error_doubt), and no render stops at this look */
 };
 
 /* Copies the numbers of a look between this struct and a message, whose members have the same names. */

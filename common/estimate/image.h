@@ -50,7 +50,8 @@ struct canvas_image {
 	double rel_mse_as_measured; /* rel_mse if every pixel's brightness is right as it came out, without fireflies */
 	double rel_mse_degrees; /* degrees of freedom: rel_mse is distributed as its expectation times chi-square over
 				   them; NAN: not known */
-	double rel_mse_95[2];	/* contains this image's relMSE in 95 % of all cases; NAN if rel_mse_doubt is set */
+	double rel_mse_interval_95[2]; /* contains this image's relMSE in 95 % of all cases; NAN if rel_mse_doubt is set
+					*/
 	enum error_doubt rel_mse_doubt;
 	double doubtful_share; /* share of rel_mse from the doubtful pixels (ERROR_DOUBT_ONE_GROUP, ERROR_DOUBT_DARK) */
 	/* relMSE due to light that the samples so far are unlikely to have found, by the pilot */
@@ -68,10 +69,10 @@ struct canvas_image {
 	 *   NAN if no chain came.
 	 * - tile_error: the relative standard error of the tile's mean brightness from the spread between sequences
 	 *   (sqrt(V / sequences) over the mean, without b's own error); NAN if the tile is dark.
-	 * - tile_share: the tile's share of the crop's energy.
+	 * - tile_energy_share: the tile's share of the crop's energy.
 	 */
 	uint32_t tiles_across, tiles_down;
-	float *r_hat, *tile_error, *tile_share;
+	float *r_hat, *tile_error, *tile_energy_share;
 	struct path_class_energy classes[PATH_CLASSES];
 	/* For samples whose brightest contributions are spread by chains (erpt): the chains' share of b, and of its
 	 * variance between the groups; NAN where that is 0 / 0. */
@@ -79,7 +80,7 @@ struct canvas_image {
 	double b, b_error;	  /* pooled b; its standard error (chains), valid unless stated_error_print_b_doubt says
 				     otherwise */
 	double b_tail_index;	  /* tail index of the independent samples whose mean is b; 0: not known */
-	double beyond_share;	  /* share of the energy in paths too long for the chains' state */
+	double overlong_share;	  /* share of the energy in paths too long for the chains' state */
 	uint64_t samples, rounds; /* sum of COUNT_SAMPLES, and complete rounds, of this image */
 	struct canvas_counts counts; /* counters of this image, with the contributions that the bootstrap refused */
 	bool is_black;		     /* all pixels are 0 */

@@ -103,7 +103,7 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	memcpy(stored->counters, b->counters, sizeof stored->counters);
 	stored->independent_sum = b->independent_sum;
 	stored->independent_square = b->independent_square;
-	stored->beyond_sum = b->beyond_sum;
+	stored->overlong_sum = b->overlong_sum;
 	memcpy(stored->classes, b->classes, sizeof stored->classes);
 	s->missing_count--;
 	return 0;
@@ -113,7 +113,7 @@ static int save_lease(const struct bootstrap *s, const struct batch *b, struct c
 {
 	struct plan_range r = plan_bootstrap_range(&s->plan, b->key.group, b->key.part);
 	const uint32_t key[KEY_NUMBERS] = {b->key.group, b->key.part};
-	const double sums[SUM_NUMBERS] = {b->independent_sum, b->independent_square, b->beyond_sum};
+	const double sums[SUM_NUMBERS] = {b->independent_sum, b->independent_square, b->overlong_sum};
 	int rc = checked_file_write_numbers(f, key, sizeof *key, KEY_NUMBERS, e);
 	if (!rc)
 		rc = checked_file_write_numbers(f, b->counters, sizeof *b->counters, BATCH_COUNTERS, e);
@@ -160,7 +160,7 @@ static int load_lease(struct bootstrap *s, struct checked_file *f, struct error 
 	if (!rc) {
 		b.independent_sum = sums[0];
 		b.independent_square = sums[1];
-		b.beyond_sum = sums[2];
+		b.overlong_sum = sums[2];
 	}
 	if (!rc)
 		rc = batch_check(&b, &s->plan, e);
@@ -194,7 +194,7 @@ void bootstrap_compute_b(const struct bootstrap *s, struct bootstrap_result *r)
 		for (uint32_t part = 0; part < s->plan.parts; part++) {
 			const struct batch *b = stored_batch(s, g, part);
 			exact_sum_add(&sum, b->independent_sum);
-			exact_sum_add(&beyond, b->beyond_sum);
+			exact_sum_add(&beyond, b->overlong_sum);
 			count += b->counters[COUNT_INDEPENDENT];
 		}
 		r->b[g] = exact_sum_value(&sum) / (double)count;
@@ -203,8 +203,8 @@ void bootstrap_compute_b(const struct bootstrap *s, struct bootstrap_result *r)
 	}
 	double inside = exact_sum_value(&all), outside = exact_sum_value(&beyond);
 	r->b_pooled = inside / (double)all_count;
-	r->beyond_share = outside > 0 ? outside / (inside + outside) : 0;
-	r->black = s->plan.kind == PLAN_CHAINS && !(inside > 0);
+	r->overlong_share = outside > 0 ? outside / (inside + outside) : 0;
+	r->is_black = s->plan.kind == PLAN_CHAINS && !(inside > 0);
 }
 
 void bootstrap_draw_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)

@@ -28,7 +28,7 @@ uint32_t bootstrap_added_count(const struct bootstrap *s);			    /* number of le
  * offset  bytes  contents
  * 0       8      group, part
  * 8       128    counters, 8 bytes each (enum batch_counter)
- * 136     24     doubles: independent_sum, independent_square, beyond_sum of struct batch
+ * 136     24     doubles: independent_sum, independent_square, overlong_sum of struct batch
  * 160     160    doubles by path class
  * 320            weights, floats: as many as the plan has for the lease
  */

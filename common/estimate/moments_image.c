@@ -15,63 +15,64 @@
 #define ROUNDING 0x1p-20
 
 /* The shares of time that sequences spend in one tile. */
-struct spread {
-	double mean;	/* of the sequences' shares */
-	double between; /* their variance */
-	double within;	/* mean variance of one mutation's share within a sequence */
+struct variance_split {
+	double mean;		 /* of the sequences' shares */
+	double between_variance; /* their variance */
+	double within_variance;	 /* mean variance of one mutation's share within a sequence */
 };
 
 /* n: mutations per sequence. */
-static double r_hat(const struct spread *s, double n)
+static double r_hat(const struct variance_split *s, double n)
 {
-	if (!(s->mean > 0) || isnan(s->between) || n < 2)
+	if (!(s->mean > 0) || isnan(s->between_variance) || n < 2)
 		return NAN;
-	bool same = s->between <= (ROUNDING * s->mean) * (ROUNDING * s->mean);
-	if (s->within <= ROUNDING * s->mean)
+	bool same = s->between_variance <= (ROUNDING * s->mean) * (ROUNDING * s->mean);
+	if (s->within_variance <= ROUNDING * s->mean)
 		return same ? 1 : INFINITY;
-	return sqrt((n - 1) / n + s->between / s->within);
+	return sqrt((n - 1) / n + s->between_variance / s->within_variance);
 }
 
-static void compute_spread(const struct moments *m, uint32_t tile, double n, struct spread *s)
+static void compute_spread(const struct moments *m, uint32_t tile, double n, struct variance_split *s)
 {
 	size_t sequences = (size_t)m->lease_count * m->sequences_per_lease;
 	double count = (double)sequences, square = 0, second = 0;
-	*s = (struct spread){0, 0, 0};
+	*s = (struct variance_split){0, 0, 0};
 	for (size_t i = 0; i < sequences; i++)
 		s->mean += (double)m->first_moments[i * m->tile_count + tile];
 	s->mean /= MOMENTS_GRID * n * count;
 	for (size_t i = 0; i < sequences; i++) {
 		double p = (double)m->first_moments[i * m->tile_count + tile] / (MOMENTS_GRID * n), d = p - s->mean;
-		s->between += d * d;
+		s->between_variance += d * d;
 		square += p * p;
 	}
 	for (size_t i = 0; i < m->lease_count; i++)
 		second += (double)m->second_moments[i * m->tile_count + tile];
-	s->between = sequences > 1 ? s->between / (count - 1) : NAN;
-	s->within = n > 1 ? (second / (MOMENTS_GRID * n * count) - square / count) * n / (n - 1) : NAN;
+	s->between_variance = sequences > 1 ? s->between_variance / (count - 1) : NAN;
+	s->within_variance = n > 1 ? (second / (MOMENTS_GRID * n * count) - square / count) * n / (n - 1) : NAN;
 }
 
 static int compute_tiles(const struct moments *m, double n, struct canvas_image *img, struct error *e)
 {
 	img->r_hat = mem_alloc(m->tile_count, sizeof *img->r_hat);
 	img->tile_error = mem_alloc(m->tile_count, sizeof *img->tile_error);
-	img->tile_share = mem_alloc(m->tile_count, sizeof *img->tile_share);
+	img->tile_energy_share = mem_alloc(m->tile_count, sizeof *img->tile_energy_share);
 	double *mean = mem_alloc(m->tile_count, sizeof *mean), all = 0;
-	bool allocated = img->r_hat && img->tile_error && img->tile_share && mean;
+	bool allocated = img->r_hat && img->tile_error && img->tile_energy_share && mean;
 	int rc = allocated ? 0 : error_set(e, ENOMEM, "no memory for tiles");
 	for (uint32_t t = 0; t < m->tile_count && rc == 0; t++) {
-		struct spread s;
+		struct variance_split s;
 		compute_spread(m, t, n, &s);
 		img->r_hat[t] = (float)r_hat(&s, n);
 		img->tile_error[t] =
 			(float)(s.mean > 0
-					? sqrt(s.between / ((double)m->lease_count * m->sequences_per_lease)) / s.mean
+					? sqrt(s.between_variance / ((double)m->lease_count * m->sequences_per_lease)) /
+						  s.mean
 					: NAN);
 		mean[t] = s.mean;
 		all += s.mean;
 	}
 	for (uint32_t t = 0; t < m->tile_count && rc == 0; t++)
-		img->tile_share[t] = (float)(all > 0 ? mean[t] / all : 0);
+		img->tile_energy_share[t] = (float)(all > 0 ? mean[t] / all : 0);
 	mem_free(mean);
 	return rc;
 }

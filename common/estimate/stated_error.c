@@ -125,7 +125,7 @@ void stated_error_print(const struct canvas_image *img, char *text, size_t size)
 			     100 * sqrt(img->rel_mse), why);
 	else
 		text_appendf(&t, "relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(img->rel_mse),
-			     100 * sqrt(img->rel_mse_95[0]), 100 * sqrt(img->rel_mse_95[1]));
+			     100 * sqrt(img->rel_mse_interval_95[0]), 100 * sqrt(img->rel_mse_interval_95[1]));
 	if (img->unvisited_count)
 		text_appendf(&t, "; no chain reached %llu of %llu pixels", (unsigned long long)img->unvisited_count,
 			     (unsigned long long)img->width * img->height);

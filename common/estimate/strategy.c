@@ -167,7 +167,7 @@ void strategy_print_note(const struct plan *p, const struct canvas_counts *n, bo
 			     print_thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }
 
-void strategy_append_beyond(double share, char *note, size_t size)
+void strategy_append_overlong(double share, char *note, size_t size)
 {
 	size_t used = strnlen(note, size);
 	if (share > 0.001)

@@ -27,6 +27,6 @@ enum { STRATEGY_NOTE_MAX = 1024 };
 void strategy_print_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size);
 /* Appends that this share of the energy is missing in the image, because its paths are too long for the chains; does
  * nothing up to 0.1 %. */
-void strategy_append_beyond(double share, char *note, size_t size);
+void strategy_append_overlong(double share, char *note, size_t size);
 
 #endif

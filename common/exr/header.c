@@ -40,7 +40,7 @@ bool header_is_excluded(const char *name)
 {
 	for (const struct header_row *r = header_rows; r->name; r++)
 		if (strcmp(r->name, name) == 0)
-			return r->excluded;
+			return r->is_excluded;
 	return false;
 }
 
@@ -71,29 +71,29 @@ static void begin_string(struct header *h, enum header_name name)
 {
 	struct exr_attribute *a = add_attribute(h, name, STRING);
 	a->type = EXR_ATTRIBUTE_STRING;
-	a->string = h->unused.end;
-	*h->unused.end = 0;
+	a->string = h->unused_bytes.end;
+	*h->unused_bytes.end = 0;
 }
 
 static void end_string(struct header *h)
 {
-	if (h->unused.remaining > 1) {
-		h->unused.end++;
-		h->unused.remaining--;
+	if (h->unused_bytes.remaining > 1) {
+		h->unused_bytes.end++;
+		h->unused_bytes.remaining--;
 	}
 }
 
 static void add_string(struct header *h, enum header_name name, const char *value)
 {
 	begin_string(h, name);
-	text_appendf(&h->unused, "%s", value);
+	text_appendf(&h->unused_bytes, "%s", value);
 	end_string(h);
 }
 
 static void add_count(struct header *h, enum header_name name, uint64_t value)
 {
 	begin_string(h, name);
-	text_appendf(&h->unused, "%" PRIu64, value);
+	text_appendf(&h->unused_bytes, "%" PRIu64, value);
 	end_string(h);
 }
 
@@ -125,7 +125,7 @@ static void add_convergence(struct header *h, const struct canvas_image *img, co
 	if (*a->text)
 		add_string(h, H_DISAGREEMENT, a->text);
 	if (!isnan(a->max_r_hat)) {
-		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
+		add_double(h, H_R_HAT_MEDIAN, a->median_r_hat);
 		add_double(h, H_R_HAT_WORST, a->max_r_hat);
 	}
 	convergence_print_table(img->classes, img->b, a, table, sizeof table);
@@ -141,8 +141,8 @@ static void add_error(struct header *h, const struct canvas_image *img)
 		add_string(h, H_REL_MSE_DOUBT, why);
 	} else if (isfinite(img->rel_mse)) {
 		add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
-		add_double(h, H_REL_MSE_LOW_95, img->rel_mse_95[0]);
-		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
+		add_double(h, H_REL_MSE_LOW_95, img->rel_mse_interval_95[0]);
+		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_interval_95[1]);
 	}
 	add_string(h, H_REL_MSE_DEFINITION, REL_MSE_DEFINITION);
 	if (img->unvisited_count)
@@ -166,7 +166,7 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 		add_count(h, H_MUTATIONS, img->samples);
 		add_double(h, H_B, img->b);
 		add_b_error(h, img);
-		add_double(h, H_BEYOND, img->beyond_share);
+		add_double(h, H_BEYOND, img->overlong_share);
 		add_count(h, H_ACCEPTED, img->counts.counters[COUNT_ACCEPTED]);
 		add_count(h, H_INDEPENDENT, img->counts.counters[COUNT_INDEPENDENT]);
 		add_count(h, H_STUCK, img->counts.counters[COUNT_STUCK]);
@@ -189,7 +189,7 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	struct convergence a;
 	convergence_judge(p, img, &a);
 	strategy_print_note(p, &img->counts, img->is_black, text, sizeof text);
-	strategy_append_beyond(img->beyond_share, text, sizeof text);
+	strategy_append_overlong(img->overlong_share, text, sizeof text);
 	convergence_append_note(&a, text, sizeof text);
 	if (*text)
 		add_string(h, H_NOTE, text);
@@ -205,10 +205,10 @@ static void add_extra(struct header *h, const struct header_extra *x)
 		add_string(h, H_CAMERA, x->camera);
 	if (x->scene_notes && *x->scene_notes)
 		add_string(h, H_SCENE_NOTES, x->scene_notes);
-	add_int(h, H_MIXED, x->mixed_fingerprints);
+	add_int(h, H_MIXED, x->has_mixed_fingerprints);
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)
-		text_appendf(&h->unused, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name,
+		text_appendf(&h->unused_bytes, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name,
 			     x->effects[i].is_on ? "on" : "off", x->effects[i].is_forced ? " (forced)" : "",
 			     x->effects[i].reason, x->effects[i].is_on ? "omitting it would save" : "saves",
 			     x->effects[i].savings);
@@ -229,7 +229,7 @@ static void add_extra(struct header *h, const struct header_extra *x)
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)
 {
 	h->count = 0;
-	h->unused = (struct text){h->text, HEADER_TEXT_MAX};
+	h->unused_bytes = (struct text){h->text, HEADER_TEXT_MAX};
 	add_string(h, H_VERSION, HSLT_VERSION);
 	add_plan(h, p, img->rounds, x->inputs);
 	add_result(h, img, p);

@@ -2,8 +2,8 @@
 /*
  * The header attributes "hslt:..." of an image, in one table: name, type, meaning. EXR has no 64-bit integers, so
  * counts are strings of decimal digits. The coordinator and hslt-render fill them in with the same function, so equal
- * images have equal headers, except for attributes marked `excluded`, which may differ between runs with the same plan
- * (times, workers, date).
+ * images have equal headers, except for attributes marked `is_excluded`, which may differ between runs with the same
+ * plan (times, workers, date).
  */
 #ifndef COMMON_EXR_HEADER_H
 #define COMMON_EXR_HEADER_H
@@ -15,13 +15,13 @@
 
 struct header_row {
 	const char *name;
-	int type;      /* EXR_ATTRIBUTE_... of struct exr_attribute */
-	bool excluded; /* ignored by hslt-compare --exact */
+	int type;	  /* EXR_ATTRIBUTE_... of struct exr_attribute */
+	bool is_excluded; /* ignored by hslt-compare --exact */
 	const char *meaning;
 };
 extern const struct header_row header_rows[]; /* ends with a NULL name */
 
-/* Returns `excluded` of the attribute; false for unknown names. */
+/* Returns `is_excluded` of the attribute; false for unknown names. */
 bool header_is_excluded(const char *name);
 
 /* One effect of the renderer and why it was switched on or off. */
@@ -40,7 +40,7 @@ struct header_extra {
 	size_t effect_count;
 	const struct header_effect *effects;
 	/* workers of different numeric fingerprints took part: the bits are not reproducible */
-	bool mixed_fingerprints;
+	bool has_mixed_fingerprints;
 	double wall_seconds, cpu_seconds;
 	uint32_t worker_count;
 	const char *date;     /* UTC; NULL: now */
@@ -52,7 +52,7 @@ struct header {
 	size_t count;
 	struct exr_attribute attributes[HEADER_ATTRIBUTES_MAX];
 	char text[HEADER_TEXT_MAX]; /* the strings of the attributes */
-	struct text unused;	    /* the unused part of `text` */
+	struct text unused_bytes;   /* the unused part of `text` */
 };
 /* Fills in all attributes. Never fails: text that does not fit is cut. Allocates nothing. h must not be moved
  * afterwards, since attributes point into it. */

@@ -10,7 +10,7 @@
 
 #include "common/base/io.h"
 #include "common/base/mem.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -86,7 +86,7 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 static int set_file_error(struct error *e, const char *path, const char *action)
 {
 	int code = errno;
-	return error_set(e, code, "%s: cannot %s: %s", target_display_name(path), action, strerror(code));
+	return error_set(e, code, "%s: cannot %s: %s", output_target_display_name(path), action, strerror(code));
 }
 
 /* Flushes the folder of `path`, so that a new name survives a crash. Failures are ignored: the image is written. */
@@ -116,12 +116,12 @@ static int create_temporary(const char *path, char temporary[PATH_SIZE], struct 
 int image_file_probe(const char *path, struct error *e)
 {
 	char temporary[PATH_SIZE];
-	struct target t;
-	int rc = target_resolve(&t, path, e);
+	struct output_target t;
+	int rc = output_target_resolve(&t, path, e);
 	if (rc)
 		return rc;
-	if (t.write_directly)
-		return t.descriptor < 0 && access(t.path, W_OK) ? set_file_error(e, path, "write there") : 0;
+	if (t.writes_directly)
+		return t.fd < 0 && access(t.path, W_OK) ? set_file_error(e, path, "write there") : 0;
 	int fd = create_temporary(t.path, temporary, e);
 	if (fd < 0)
 		return fd;
@@ -130,10 +130,10 @@ int image_file_probe(const char *path, struct error *e)
 	return 0;
 }
 
-static int write_directly(const struct target *t, const char *path, const unsigned char *bytes, size_t size,
+static int write_directly(const struct output_target *t, const char *path, const unsigned char *bytes, size_t size,
 			  struct error *e)
 {
-	int fd = target_open(t, e);
+	int fd = output_target_open(t, e);
 	if (fd < 0)
 		return fd;
 	int rc = io_write_all(fd, bytes, size) ? set_file_error(e, path, "write") : 0;
@@ -166,11 +166,11 @@ static int replace_file(const char *path, const unsigned char *bytes, size_t siz
 
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
-	struct target t;
-	int rc = target_resolve(&t, path, e);
+	struct output_target t;
+	int rc = output_target_resolve(&t, path, e);
 	if (rc)
 		return rc;
-	return t.write_directly ? write_directly(&t, path, bytes, size, e) : replace_file(t.path, bytes, size, e);
+	return t.writes_directly ? write_directly(&t, path, bytes, size, e) : replace_file(t.path, bytes, size, e);
 }
 
 /* Reads a pipe to its end. *bytes is to be freed also after a failure. */

@@ -12,7 +12,7 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 		      unsigned char **bytes, size_t *size, struct error *e);
 
 /* Writes a file atomically and durably: temporary file, fsync, rename, fsync of the folder. Targets that are not
- * regular files are written directly (common/base/target.h). Returns 0 or -errno. */
+ * regular files are written directly (common/base/output_target.h). Returns 0 or -errno. */
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e);
 
 /* Returns 0 if image_file_write can write there, otherwise -errno: to be called before hours of work are spent. Leaves

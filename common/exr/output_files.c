@@ -11,7 +11,7 @@
 
 #include "common/base/picture_name.h"
 #include "common/base/spelling.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/exr/image_file.h"
 
 #include <fcntl.h>
@@ -71,17 +71,18 @@ static const struct {
 
 /* Identifies a file: by device and inode if it exists, otherwise by its path without links. */
 struct file_identity {
-	bool exists, regular, stream; /* stream: bytes of two outputs would be mixed in it: a pipe, or a descriptor */
+	bool exists, is_regular,
+		is_stream; /* is_stream: bytes of two outputs would be mixed in it: a pipe, or a descriptor */
 	dev_t device;
 	ino_t inode;
-	char path[PATH_MAX + TARGET_PATH_MAX];
+	char path[PATH_MAX + OUTPUT_TARGET_PATH_MAX];
 };
 
 /* Sets the path of a file that does not exist: its folder without links, then its name. If the folder does not exist
  * either, the path stays as it is; image_file_probe will report that. */
 static void identify_new_file(struct file_identity *p, const char *path)
 {
-	char folder[TARGET_PATH_MAX], real[PATH_MAX];
+	char folder[OUTPUT_TARGET_PATH_MAX], real[PATH_MAX];
 	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
 	snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
 	snprintf(p->path, sizeof p->path, "%s/%s", realpath(folder, real) ? real : folder, name);
@@ -90,18 +91,18 @@ static void identify_new_file(struct file_identity *p, const char *path)
 static int identify_file(struct file_identity *p, const char *path, struct error *e)
 {
 	struct stat st;
-	struct target t;
+	struct output_target t;
 	*p = (struct file_identity){0};
-	int rc = target_resolve(&t, path, e);
+	int rc = output_target_resolve(&t, path, e);
 	if (rc)
 		return rc;
-	if (t.descriptor >= 0 ? fstat(t.descriptor, &st) : stat(t.path, &st)) {
+	if (t.fd >= 0 ? fstat(t.fd, &st) : stat(t.path, &st)) {
 		identify_new_file(p, t.path);
 		return 0;
 	}
 	p->exists = true;
-	p->regular = S_ISREG(st.st_mode);
-	p->stream = S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode) || (t.descriptor >= 0 && !S_ISCHR(st.st_mode));
+	p->is_regular = S_ISREG(st.st_mode);
+	p->is_stream = S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode) || (t.fd >= 0 && !S_ISCHR(st.st_mode));
 	p->device = st.st_dev;
 	p->inode = st.st_ino;
 	return 0;
@@ -113,7 +114,7 @@ static bool is_same_file(const struct file_identity *a, const struct file_identi
 		return false;
 	if (!a->exists)
 		return strcmp(a->path, b->path) == 0;
-	bool mixes = (a->regular && b->regular) || (a->stream && b->stream);
+	bool mixes = (a->is_regular && b->is_regular) || (a->is_stream && b->is_stream);
 	return mixes && a->device == b->device && a->inode == b->inode;
 }
 
@@ -131,7 +132,7 @@ static int refuse_input(const struct output_file *f, const char *input, struct e
 static int check_inputs(const struct output_file *f, const struct file_identity *p, const char *const *inputs,
 			size_t count, struct error *e)
 {
-	for (size_t i = 0; p->regular && i < count; i++) {
+	for (size_t i = 0; p->is_regular && i < count; i++) {
 		struct stat st;
 		if (inputs[i] && stat(inputs[i], &st) == 0 && st.st_dev == p->device && st.st_ino == p->inode)
 			return refuse_input(f, inputs[i], e);
@@ -144,8 +145,8 @@ static int check_plot(const char *option, const char *path, struct error *e)
 {
 	char hint[40];
 	const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
-	struct spelling s = {.wanted = dot ? dot : ""};
-	if (strcasecmp(s.wanted, ".svg") == 0)
+	struct spelling s = {.wanted_name = dot ? dot : ""};
+	if (strcasecmp(s.wanted_name, ".svg") == 0)
 		return 0;
 	spelling_offer(&s, ".svg");
 	spelling_offer(&s, ".png");
@@ -177,9 +178,9 @@ int output_files_check_names(const struct output_files *o, struct error *e)
 static int check_format(const struct output_file *f, struct error *e)
 {
 	char begin[BEGINNING_SIZE + 1] = "";
-	struct target t;
-	int rc = target_resolve(&t, f->path, e);
-	if (rc || t.write_directly)
+	struct output_target t;
+	int rc = output_target_resolve(&t, f->path, e);
+	if (rc || t.writes_directly)
 		return rc;
 	int fd = open(t.path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 	if (fd < 0)
@@ -205,7 +206,7 @@ int output_files_check(const struct output_files *o, const char *const *inputs, 
 			if (f[j].path &&
 			    (is_same_file(&places[i], &places[j]) || are_both_stdout(f[i].path, f[j].path)))
 				rc = error_set(e, EINVAL, "%s and %s are the same file, %s", f[j].option, f[i].option,
-					       target_display_name(f[i].path));
+					       output_target_display_name(f[i].path));
 		if (!rc)
 			rc = check_format(&f[i], e);
 		if (!rc)

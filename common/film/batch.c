@@ -196,7 +196,7 @@ static int check_counter_range(const struct batch *b, const struct plan *p, uint
  * and sum^2 / n <= squares <= sum^2 (the first is the Cauchy-Schwarz inequality). Squares may have underflowed. */
 static int check_sums(const struct batch *b, struct error *e)
 {
-	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
+	const double sums[] = {b->independent_sum, b->independent_square, b->overlong_sum, b->cpu_seconds};
 	for (int i = 0; i < 4; i++)
 		if (!isfinite(sums[i]) || sums[i] < 0)
 			return error_set(e, EBADMSG, "a sum over independent samples is negative or not finite");

@@ -63,9 +63,9 @@ enum batch_counter {
 	COUNT_LONGEST_STUCK, /* most rejections in a row (merged by maximum) */
 	COUNT_STATES_LOST, /* chains whose state after the epoch could not be decoded again, so that they begin the next
 			      epoch where they began this one; or whose seed carried no light on this worker */
-	COUNT_SPREAD,	   /* contributions of samples that were too bright and were spread by chains (erpt) */
-	COUNT_SPREAD_MUTATIONS, /* mutations of these chains */
-	COUNT_SPREAD_RAYS,	/* rays of these chains, included in COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
+	COUNT_REDISTRIBUTED, /* contributions of samples that were too bright and were spread by chains (erpt) */
+	COUNT_REDISTRIBUTION_MUTATIONS, /* mutations of these chains */
+	COUNT_REDISTRIBUTION_RAYS,	/* rays of these chains, included in COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
 };
 
 /* Returns all rays of one batch, whose counters are bounded by batch_check. Sums of many batches may be saturated, and
@@ -122,9 +122,9 @@ struct batch {
 	uint32_t strategy_count; /* entries of the plan's mixture, or 0 */
 	uint64_t strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	/* Sums of I and I^2 over the independent samples, I = X+Y+Z of the whole sample. COUNT_INDEPENDENT also counts
-	 * samples with I = 0. beyond_sum: the sum of I of paths too long for a chain's state, estimated by the
+	 * samples with I = 0. overlong_sum: the sum of I of paths too long for a chain's state, estimated by the
 	 * bootstrap; not part of independent_sum, since b is the integral over the paths that chains can reach. */
-	double independent_sum, independent_square, beyond_sum;
+	double independent_sum, independent_square, overlong_sum;
 	/* By path class. Bootstrap: the class's part of independent_sum. Chains: time, the sum of w times the class's
 	 * share of the state's I. Samples: the part of independent_sum that chains spread (erpt). */
 	double classes[PATH_CLASSES];

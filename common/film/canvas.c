@@ -160,11 +160,11 @@ int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, con
 	c->tiles_down = tiles_along(p->crop_height);
 	size_t films = (size_t)p->groups * FILMS_PER_GROUP;
 	c->bytes = canvas_bytes(p);
-	c->flags = mem_alloc(films * canvas_tile_count(c), 1);
+	c->tile_flags = mem_alloc(films * canvas_tile_count(c), 1);
 	c->sum_bounds = mem_alloc(films, sizeof *c->sum_bounds);
 	c->is_merged = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);
 	c->missing_rounds = mem_alloc((size_t)p->groups * p->parts, sizeof *c->missing_rounds);
-	int rc = c->flags && c->sum_bounds && c->is_merged && c->missing_rounds
+	int rc = c->tile_flags && c->sum_bounds && c->is_merged && c->missing_rounds
 			 ? map_sums(c, folder, e)
 			 : error_set(e, ENOMEM, "no memory for the films");
 	if (rc == 0)
@@ -185,7 +185,7 @@ void canvas_free(struct canvas *c)
 		munmap(c->sums, c->bytes);
 	if (c->fd >= 0)
 		disk_close(c->fd);
-	mem_free(c->flags);
+	mem_free(c->tile_flags);
 	mem_free(c->sum_bounds);
 	mem_free(c->is_merged);
 	mem_free(c->missing_rounds);
@@ -222,7 +222,7 @@ static size_t lease_film(const struct canvas *c, const struct lease_key *k)
 
 static struct tally *lease_tally(struct canvas *c, const struct lease_key *k)
 {
-	return round_is_closed(c, k) ? &c->prefix : &c->open[round_parity(k->epoch)];
+	return round_is_closed(c, k) ? &c->prefix_tally : &c->open_tallies[round_parity(k->epoch)];
 }
 
 bool canvas_has_lease(const struct canvas *c, const struct lease_key *k)
@@ -418,9 +418,9 @@ static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile
 
 void canvas_sum_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out)
 {
-	*out = c->prefix.counts;
+	*out = c->prefix_tally.counts;
 	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
-		canvas_counts_add(out, &c->open[i].counts);
+		canvas_counts_add(out, &c->open_tallies[i].counts);
 }
 
 static void close_round(struct canvas *c)
@@ -433,9 +433,9 @@ static void close_round(struct canvas *c)
 				close_tile(c, prefix, from, t, &c->sum_bounds[prefix]);
 		c->sum_bounds[from] = 0;
 	}
-	tally_merge(&c->prefix, &c->open[open], c->plan.groups);
+	tally_merge(&c->prefix_tally, &c->open_tallies[open], c->plan.groups);
 	moments_close_round(c->moments, c->rounds);
-	c->open[open] = (struct tally){0};
+	c->open_tallies[open] = (struct tally){0};
 	c->merged_counts[open] = 0;
 	memset(c->is_merged + (size_t)(1 + open) * leases, 0, leases);
 	c->rounds++;
@@ -450,7 +450,7 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 	uint8_t *is_merged =
 		&c->is_merged[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
 	if (k->kind == LEASE_BOOTSTRAP) {
-		tally_add(&c->bootstrap, b);
+		tally_add(&c->bootstrap_tally, b);
 		moments_add(c->moments, b, false);
 		*is_merged = 1;
 		return 0;

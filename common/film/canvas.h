@@ -22,9 +22,9 @@ struct canvas;
 struct bootstrap_result {
 	double b[PLAN_GROUPS_MAX]; /* by group */
 	double b_pooled;
-	double beyond_share; /* share of the energy in paths too long for the chains' state */
-	bool black; /* no sample carried light. Chains cannot start: the job ends with a black image. Samples continue,
-		       since a small bootstrap proves nothing about many samples */
+	double overlong_share; /* share of the energy in paths too long for the chains' state */
+	bool is_black;	       /* no sample carried light. Chains cannot start: the job ends with a black image. Samples
+			       continue,	 since a small bootstrap proves nothing about many samples */
 };
 
 /* Returns the exponent of the grid, whose quantum is 2^exponent: fixed for chains (values are of order 1 per mutation);

@@ -34,13 +34,13 @@ struct canvas {
 	int64_t *sums;			     /* [film][tile][SLOT_VALUES] */
 	size_t bytes;			     /* of the sums */
 	int fd;				     /* the file of the sums; -1: anonymous memory */
-	uint8_t *flags;			     /* [film][tile] of enum tile_flag */
+	uint8_t *tile_flags;		     /* [film][tile] of enum tile_flag */
 	uint64_t *sum_bounds;		     /* [film]: at least the largest |sum| of the film */
 	uint64_t rounds;		     /* number of complete rounds */
 	uint32_t merged_counts[OPEN_ROUNDS]; /* merged leases of the open rounds, by parity */
-	uint8_t *is_merged;	  /* 1: merged; [bootstrap, open round of parity 0, of parity 1][group][part] */
+	uint8_t *is_merged;	  /* 1: merged; [bootstrap_tally, open round of parity 0, of parity 1][group][part] */
 	uint32_t *missing_rounds; /* [group][part]: number of the last complete rounds whose batch was taken back */
-	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
+	struct tally prefix_tally, open_tallies[OPEN_ROUNDS], bootstrap_tally;
 	double b_tail_index; /* tail index of the bootstrap; 0: not known */
 	struct moments *moments;
 };
@@ -65,7 +65,7 @@ static inline int64_t *canvas_slot(const struct canvas *c, size_t film, size_t t
 
 static inline uint8_t *canvas_tile_flags(const struct canvas *c, size_t film, size_t tile)
 {
-	return c->flags + film * canvas_tile_count(c) + tile;
+	return c->tile_flags + film * canvas_tile_count(c) + tile;
 }
 
 static inline bool canvas_lease_is_merged(const struct canvas *c, uint32_t set, uint32_t group, uint32_t part)

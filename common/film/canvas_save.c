@@ -69,7 +69,7 @@ static void transfer_tally(struct transfer *t, struct tally *y)
 		transfer_u64(t, &y->groups[g].samples, 1);
 		transfer_u64(t, &y->groups[g].independent, 1);
 		transfer_u64(t, y->groups[g].independent_sum.words, EXACT_SUM_WORDS);
-		transfer_u64(t, y->groups[g].beyond_sum.words, EXACT_SUM_WORDS);
+		transfer_u64(t, y->groups[g].overlong_sum.words, EXACT_SUM_WORDS);
 	}
 }
 
@@ -79,10 +79,10 @@ static int transfer_all(struct transfer *t, struct canvas *c)
 	transfer_numbers(t, c->merged_counts, sizeof *c->merged_counts, OPEN_ROUNDS);
 	transfer_numbers(t, c->is_merged, sizeof *c->is_merged, lease_flag_count(c));
 	transfer_u64(t, c->sum_bounds, film_count(c));
-	transfer_tally(t, &c->prefix);
+	transfer_tally(t, &c->prefix_tally);
 	for (int i = 0; i < OPEN_ROUNDS; i++)
-		transfer_tally(t, &c->open[i]);
-	transfer_tally(t, &c->bootstrap);
+		transfer_tally(t, &c->open_tallies[i]);
+	transfer_tally(t, &c->bootstrap_tally);
 	transfer_u64(t, &c->b_tail_index, 1);
 	return t->rc;
 }

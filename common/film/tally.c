@@ -39,7 +39,7 @@ void tally_add(struct tally *t, const struct batch *b)
 	t->groups[g].samples += b->counters[COUNT_SAMPLES];
 	t->groups[g].independent += b->counters[COUNT_INDEPENDENT];
 	bool finite = exact_sum_add(&t->groups[g].independent_sum, b->independent_sum) &&
-		      exact_sum_add(&t->groups[g].beyond_sum, b->beyond_sum);
+		      exact_sum_add(&t->groups[g].overlong_sum, b->overlong_sum);
 	assert(finite); /* batch_check */
 	(void)finite;
 }
@@ -56,7 +56,7 @@ void tally_subtract(struct tally *t, const struct batch *b)
 	t->groups[g].samples -= b->counters[COUNT_SAMPLES];
 	t->groups[g].independent -= b->counters[COUNT_INDEPENDENT];
 	bool finite = exact_sum_add(&t->groups[g].independent_sum, -b->independent_sum) &&
-		      exact_sum_add(&t->groups[g].beyond_sum, -b->beyond_sum);
+		      exact_sum_add(&t->groups[g].overlong_sum, -b->overlong_sum);
 	assert(finite); /* as when the batch was added */
 	(void)finite;
 }
@@ -68,6 +68,6 @@ void tally_merge(struct tally *to, const struct tally *from, uint32_t groups)
 		to->groups[g].samples += from->groups[g].samples;
 		to->groups[g].independent += from->groups[g].independent;
 		exact_sum_merge(&to->groups[g].independent_sum, &from->groups[g].independent_sum);
-		exact_sum_merge(&to->groups[g].beyond_sum, &from->groups[g].beyond_sum);
+		exact_sum_merge(&to->groups[g].overlong_sum, &from->groups[g].overlong_sum);
 	}
 }

@@ -22,8 +22,8 @@ void canvas_counts_add(struct canvas_counts *to, const struct canvas_counts *fro
 struct tally {
 	struct canvas_counts counts;
 	struct {
-		uint64_t samples, independent;		      /* sums of COUNT_SAMPLES and COUNT_INDEPENDENT */
-		struct exact_sum independent_sum, beyond_sum; /* sums of independent_sum and beyond_sum */
+		uint64_t samples, independent;			/* sums of COUNT_SAMPLES and COUNT_INDEPENDENT */
+		struct exact_sum independent_sum, overlong_sum; /* sums of independent_sum and overlong_sum */
 	} groups[PLAN_GROUPS_MAX];
 };
 

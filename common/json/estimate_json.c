@@ -36,7 +36,7 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 		list = json_array_with(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work,
 						       "cpuSeconds", l->cpu_seconds, "wallSeconds", l->seconds,
 						       "relMSE", l->rel_mse, "relMSEUpper", l->rel_mse_upper, "degrees",
-						       json_real_or_null(l->degrees), "doubtful", l->doubtful != 0));
+						       json_real_or_null(l->degrees), "doubtful", l->is_doubtful != 0));
 	}
 	return list;
 }
@@ -59,7 +59,7 @@ void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
 					  .rel_mse = read_number(o, "relMSE"),
 					  .rel_mse_upper = read_number(o, "relMSEUpper"),
 					  .degrees = read_number(o, "degrees"),
-					  .doubtful = json_is_true(json_object_get(o, "doubtful"))};
+					  .is_doubtful = json_is_true(json_object_get(o, "doubtful"))};
 		forecast_add_look(h, &l);
 	}
 }
@@ -91,7 +91,7 @@ json_t *convergence_to_json(const struct convergence *a)
 {
 	return json_pack("{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict),
 			 "text", a->text, /* */
-			 "rHatMedian", json_real_or_null(a->r_hat_median), "rHatWorst",
+			 "rHatMedian", json_real_or_null(a->median_r_hat), "rHatWorst",
 			 json_real_or_null(a->max_r_hat),							 /* */
 			 "worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles, /* */
 			 "tilesFlagged", (json_int_t)a->flagged_tiles, "energyFlagged",
@@ -125,7 +125,7 @@ void convergence_from_json(const json_t *o, struct convergence *a)
 	const char *verdict = json_string_value(json_object_get(o, "verdict")),
 		   *text = json_string_value(json_object_get(o, "text"));
 	const json_t *worst = json_object_get(o, "worst");
-	*a = (struct convergence){.r_hat_median = read_real_or_nan(o, "rHatMedian"),
+	*a = (struct convergence){.median_r_hat = read_real_or_nan(o, "rHatMedian"),
 				  .max_r_hat = read_real_or_nan(o, "rHatWorst")};
 	for (int v = CHAINS_AGREE; verdict && v <= CHAINS_DISAGREE; v++)
 		if (strcmp(verdict, convergence_name((enum convergence_verdict)v)) == 0)

@@ -537,7 +537,8 @@ int authority_revoke(const char *folder, const char *name_or_serial, unsigned *c
 	int rc = authority_open(&a, folder, true, e);
 	if (rc)
 		return rc;
-	struct revocation r = {.a = &a, .suggestion = {.wanted = name_or_serial}, .name_or_serial = name_or_serial};
+	struct revocation r = {
+		.a = &a, .suggestion = {.wanted_name = name_or_serial}, .name_or_serial = name_or_serial};
 	struct error damage;
 	char hint[96];
 	rc = for_each_issued(folder, revoke_one, &r, &damage, e);

@@ -12,7 +12,7 @@
 
 #include "common/base/io.h"
 #include "common/base/mem.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/text.h"
 #include "common/base/temp_file.h"
 #include "common/net/jitter.h"
@@ -48,10 +48,10 @@ struct client {
 	struct conn *conn; /* NULL: closed */
 	STAILQ_HEAD(, received_message) received;
 	uint64_t wait_timeout_ms; /* how long the current call waits without any message */
-	unsigned waiting_count;	  /* messages in `received` */
-	size_t waiting_bytes;	  /* their memory */
+	unsigned received_count;  /* messages in `received` */
+	size_t received_bytes;	  /* their memory */
 	struct tls *tls;	  /* NULL: plaintext */
-	bool is_open, timed_out;
+	bool is_open, has_timed_out;
 	int certificate_error; /* what conn_certificate_error returned for the connection */
 	char name[128];	       /* the program's name */
 	char close_reason[256];
@@ -67,7 +67,7 @@ static void on_opened(void *user)
 static void on_timeout(uv_timer_t *t)
 {
 	struct client *cl = t->data;
-	cl->timed_out = true;
+	cl->has_timed_out = true;
 }
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
@@ -84,8 +84,8 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		return;
 	}
 	w->message.payload.limit = size;
-	cl->waiting_bytes += env->bytes + size;
-	if (++cl->waiting_count > WAITING_MESSAGES_MAX || cl->waiting_bytes > WAITING_BYTES_MAX ||
+	cl->received_bytes += env->bytes + size;
+	if (++cl->received_count > WAITING_MESSAGES_MAX || cl->received_bytes > WAITING_BYTES_MAX ||
 	    !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
 		conn_close(cl->conn, "the coordinator sends more than was requested");
@@ -115,7 +115,7 @@ static void on_heartbeat(uv_timer_t *t)
 
 static void start_timeout(struct client *cl, double seconds)
 {
-	cl->timed_out = false;
+	cl->has_timed_out = false;
 	uv_timer_stop(&cl->timeout);
 	uv_update_time(&cl->loop);
 	cl->wait_timeout_ms = (uint64_t)(1000 * (seconds >= 0 ? seconds : 0));
@@ -128,18 +128,18 @@ int client_send(struct client *cl, const Farm__Envelope *m, const void *payload,
 	if (cl->conn)
 		conn_send(cl->conn, m, payload, size);
 	start_timeout(cl, ANSWER_SECONDS);
-	while (cl->conn && conn_unsent_bytes(cl->conn) && !cl->timed_out)
+	while (cl->conn && conn_unsent_bytes(cl->conn) && !cl->has_timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	if (!cl->conn && STAILQ_EMPTY(&cl->received))
 		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->close_reason);
-	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not read what is sent to it") : 0;
+	return cl->has_timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not read what is sent to it") : 0;
 }
 
 int client_receive(struct client *cl, double seconds, struct client_message *m, struct error *e)
 {
 	memset(m, 0, sizeof *m);
 	start_timeout(cl, seconds);
-	while (STAILQ_EMPTY(&cl->received) && cl->conn && !cl->timed_out)
+	while (STAILQ_EMPTY(&cl->received) && cl->conn && !cl->has_timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	struct received_message *w = STAILQ_FIRST(&cl->received);
 	if (!w && !cl->conn)
@@ -148,8 +148,8 @@ int client_receive(struct client *cl, double seconds, struct client_message *m, 
 		return error_set(e, ETIMEDOUT, "the coordinator did not answer in time");
 	*m = w->message;
 	STAILQ_REMOVE_HEAD(&cl->received, next);
-	cl->waiting_count--;
-	cl->waiting_bytes -= m->envelope.bytes + m->payload.size;
+	cl->received_count--;
+	cl->received_bytes -= m->envelope.bytes + m->payload.size;
 	mem_free(w);
 	if (m->envelope.message->body_case != FARM__ENVELOPE__BODY_FAULT)
 		return 0;
@@ -220,7 +220,7 @@ static int try_address(struct client *cl, const struct net_addr *a, struct error
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	int rc = conn_connect(&cl->conn, &cl->loop, a, &config, &events, cl, e);
 	start_timeout(cl, HELLO_SECONDS);
-	while (!rc && cl->conn && !cl->is_open && !cl->timed_out)
+	while (!rc && cl->conn && !cl->is_open && !cl->has_timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	return rc;
 }
@@ -263,7 +263,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		rc = refuse_coordinator(cl, host_port, e);
 	else if (!rc && !cl->is_open)
 		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
-			       cl->timed_out ? "no answer in time" : cl->close_reason);
+			       cl->has_timed_out ? "no answer in time" : cl->close_reason);
 	if (!rc)
 		rc = exchange_hello(cl, host_port, e);
 	if (rc)
@@ -368,7 +368,7 @@ static void wait_with_heartbeats(struct client *cl, double seconds)
 {
 	uint64_t end = uv_hrtime() + (uint64_t)(1e9 * seconds);
 	start_timeout(cl, seconds);
-	while (cl->conn && !cl->timed_out && uv_hrtime() < end)
+	while (cl->conn && !cl->has_timed_out && uv_hrtime() < end)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 }
 
@@ -394,7 +394,7 @@ static int fetch_with_retries(struct client *cl, struct client_message *first, u
 	int rc = fetch_remaining(cl, first, job, what, fd, path, e);
 	for (int i = 2; rc == -EAGAIN && i <= FETCH_ATTEMPTS; i++, backoff *= 2) {
 		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_ATTEMPTS);
-		wait_with_heartbeats(cl, jitter(backoff));
+		wait_with_heartbeats(cl, jitter_seconds(backoff));
 		rc = restart_fetch(cl, job, what, fd, path, e);
 	}
 	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_ATTEMPTS) : rc;
@@ -441,13 +441,13 @@ static int copy_file(int from, int to, const char *path, struct error *e)
 /* Fetches into a temporary file, then copies it to the target: bytes written to a pipe could not be taken back if the
  * connection broke. */
 static int fetch_to_stream(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
-			   const struct target *t, const char *name, struct error *e)
+			   const struct output_target *t, const char *name, struct error *e)
 {
 	FILE *temporary = tmpfile();
 	if (!temporary)
 		return error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
 	int rc = fetch_with_retries(cl, first, job, what, fileno(temporary), "a temporary file", e);
-	int fd = rc ? -1 : target_open(t, e);
+	int fd = rc ? -1 : output_target_open(t, e);
 	if (!rc && fd < 0)
 		rc = client_local_error(fd);
 	if (!rc)
@@ -485,13 +485,13 @@ int client_fetch_log(struct client *cl, uint64_t job, int fd, struct error *e)
 static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path,
 		      bool replace, struct error *e)
 {
-	char temporary[TARGET_PATH_MAX + 8];
-	struct target t;
-	int found = target_resolve(&t, path, e);
+	char temporary[OUTPUT_TARGET_PATH_MAX + 8];
+	struct output_target t;
+	int found = output_target_resolve(&t, path, e);
 	if (found)
 		return found;
-	if (t.write_directly)
-		return fetch_to_stream(cl, first, job, what, &t, target_display_name(path), e);
+	if (t.writes_directly)
+		return fetch_to_stream(cl, first, job, what, &t, output_target_display_name(path), e);
 	path = t.path;
 	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
@@ -541,22 +541,22 @@ int client_preview_name(const char *path, char *name, size_t size, struct error 
 
 int client_fetch_preview(struct client *cl, uint64_t job, const char *path, bool *is_renamed, struct error *e)
 {
-	char preview_path[TARGET_PATH_MAX];
-	struct target t;
+	char preview_path[OUTPUT_TARGET_PATH_MAX];
+	struct output_target t;
 	struct client_message first;
-	int rc = target_resolve(&t, path, e);
+	int rc = output_target_resolve(&t, path, e);
 	*is_renamed = false;
 	if (!rc)
 		rc = fetch_chunk(cl, job, FARM__WHAT__WHAT_PREVIEW, 0, &first, e);
 	if (rc)
 		return rc;
 	const char *final = base_name(first.envelope.message->fetch_chunk->output);
-	*is_renamed = !t.write_directly && *final &&
+	*is_renamed = !t.writes_directly && *final &&
 		      (strcmp(base_name(path), final) == 0 || strcmp(base_name(t.path), final) == 0);
 	if (*is_renamed)
 		rc = client_preview_name(path, preview_path, sizeof preview_path, e);
 	if (!rc && *is_renamed)
-		rc = target_resolve(&t, preview_path, e);
+		rc = output_target_resolve(&t, preview_path, e);
 	if (!rc && *is_renamed && strcmp(base_name(t.path), final) == 0)
 		rc = error_set(e, EEXIST, "%s: leads to %s, which is for the final image", preview_path, t.path);
 	if (!rc)

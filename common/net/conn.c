@@ -57,7 +57,7 @@ struct conn {
 	bool has_backlog;     /* there is such a rest; the socket is not read until it is used up */
 	unsigned frame_count; /* frames delivered since other connections could be read */
 	/* is_accepted: by a listener */
-	bool is_accepted, first_byte_checked, had_bad_checksum;
+	bool is_accepted, has_checked_first_byte, had_bad_checksum;
 	int certificate_error; /* what conn_certificate_error returns */
 	char close_reason[256];
 };
@@ -348,8 +348,8 @@ static void on_resume(uv_idle_t *h)
 /* Recognises a peer that uses TLS by its first byte, since no frame begins like a TLS record, and refuses it. */
 static bool refuse_if_tls(struct conn *c, const char *bytes, size_t size)
 {
-	bool first = !c->first_byte_checked && size;
-	c->first_byte_checked = true;
+	bool first = !c->has_checked_first_byte && size;
+	c->has_checked_first_byte = true;
 	if (!first || !tls_is_first_byte((unsigned char)*bytes))
 		return false;
 	if (c->is_accepted)

@@ -3,7 +3,7 @@
 
 #include <uv.h>
 
-double jitter(double seconds)
+double jitter_seconds(double seconds)
 {
 	unsigned char random = 128; /* used if the system has no random numbers */
 	uv_random(NULL, NULL, &random, 1, 0, NULL);

@@ -4,6 +4,6 @@
 #define COMMON_NET_JITTER_H
 
 /* Returns a random time between 0.5 and 1.5 times `seconds`. Any thread. */
-double jitter(double seconds);
+double jitter_seconds(double seconds);
 
 #endif

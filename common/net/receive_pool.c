@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/net/receive_pool.h"
 
-static bool has_room(const struct receive_pool *p, uint64_t bytes)
+static bool has_capacity(const struct receive_pool *p, uint64_t bytes)
 {
 	return p->used_bytes == 0 || (p->used_bytes <= p->max_bytes && bytes <= p->max_bytes - p->used_bytes);
 }
@@ -30,7 +30,7 @@ static void enqueue_turn(struct receive_pool *p, struct receive_turn *t)
 bool receive_pool_acquire(struct receive_pool *p, struct receive_turn *t, uint64_t bytes)
 {
 	t->bytes = bytes;
-	if (!p->queue && has_room(p, bytes)) {
+	if (!p->queue && has_capacity(p, bytes)) {
 		grant_bytes(p, t);
 		return true;
 	}
@@ -54,7 +54,7 @@ void receive_pool_release(struct receive_pool *p, struct receive_turn *t)
 	else if (t->is_granted)
 		p->used_bytes -= t->bytes;
 	t->is_granted = false;
-	while (p->queue && has_room(p, p->queue->bytes)) {
+	while (p->queue && has_capacity(p, p->queue->bytes)) {
 		struct receive_turn *next = p->queue;
 		dequeue_turn(p, next);
 		grant_bytes(p, next);

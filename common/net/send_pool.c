@@ -17,11 +17,11 @@ static struct send_share *slowest_reader(const struct send_pool *p, uint64_t now
 {
 	struct send_share *found = NULL;
 	uint64_t count = 0;
-	for (struct send_share *s = LIST_FIRST(&p->waiting); s; s = LIST_NEXT(s, next)) {
+	for (struct send_share *s = LIST_FIRST(&p->waiting_shares); s; s = LIST_NEXT(s, next)) {
 		send_pool_note_progress(s, now);
 		count++;
 	}
-	for (struct send_share *s = LIST_FIRST(&p->waiting); s; s = LIST_NEXT(s, next)) {
+	for (struct send_share *s = LIST_FIRST(&p->waiting_shares); s; s = LIST_NEXT(s, next)) {
 		bool large = s->bytes >= p->used_bytes / count;
 		bool slower = !found || s->progress_ms < found->progress_ms ||
 			      (s->progress_ms == found->progress_ms && s->bytes > found->bytes);
@@ -46,7 +46,7 @@ bool send_pool_add(struct send_share *s, uint64_t bytes, uint64_t now)
 	if (!s->bytes) {
 		s->progress_ms = now;
 		s->last_unsent_bytes = s->unsent_bytes(s);
-		LIST_INSERT_HEAD(&p->waiting, s, next);
+		LIST_INSERT_HEAD(&p->waiting_shares, s, next);
 	}
 	s->bytes += bytes;
 	p->used_bytes += bytes;

@@ -28,9 +28,9 @@ struct send_share {
 
 /* Initially zeroed except for max_bytes. */
 struct send_pool {
-	uint64_t max_bytes, used_bytes;	 /* bytes */
-	uint64_t closing_bytes;		 /* bytes of connections being closed, freed in the loop's next iteration */
-	LIST_HEAD(, send_share) waiting; /* shares that hold something */
+	uint64_t max_bytes, used_bytes; /* bytes */
+	uint64_t closing_bytes;		/* bytes of connections being closed, freed in the loop's next iteration */
+	LIST_HEAD(, send_share) waiting_shares; /* shares that hold something */
 };
 
 /* Adds bytes to a share; closes connections if necessary. now: ms of the loop's clock. Returns false if this connection

@@ -149,9 +149,9 @@ static void on_written(uv_write_t *r, int status)
 		q->events->drained(q->user);
 }
 
-/* Sends `head`, then the bytes after the first `skip`. Frees the bytes, also after a failure. */
-static void write_stream(struct send_queue *q, struct sent_prefix head, unsigned char *bytes, size_t size, size_t skip,
-			 size_t plain)
+/* Sends `prefix`, then the bytes after the first `skip`. Frees the bytes, also after a failure. */
+static void write_stream(struct send_queue *q, struct sent_prefix prefix, unsigned char *bytes, size_t size,
+			 size_t skip, size_t plain)
 {
 	struct write_request *w = mem_alloc(1, sizeof *w);
 	if (!w) {
@@ -159,10 +159,13 @@ static void write_stream(struct send_queue *q, struct sent_prefix head, unsigned
 		report_failure(q, "no memory to send");
 		return;
 	}
-	*w = (struct write_request){
-		.queue = q, .prefix = head, .bytes = bytes, .size = head.size + size - skip, .plaintext_bytes = plain};
+	*w = (struct write_request){.queue = q,
+				    .prefix = prefix,
+				    .bytes = bytes,
+				    .size = prefix.size + size - skip,
+				    .plaintext_bytes = plain};
 	w->request.data = w;
-	uv_buf_t both[] = {uv_buf_init((char *)w->prefix.bytes, (unsigned)head.size),
+	uv_buf_t both[] = {uv_buf_init((char *)w->prefix.bytes, (unsigned)prefix.size),
 			   uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
 	int rc = uv_write(&w->request, q->stream, both, 2, on_written);
 	if (rc) {
@@ -171,7 +174,7 @@ static void write_stream(struct send_queue *q, struct sent_prefix head, unsigned
 		report_failure(q, uv_strerror(rc));
 		return;
 	}
-	q->in_flight_bytes += head.size + size - skip;
+	q->in_flight_bytes += prefix.size + size - skip;
 }
 
 static void write_copy(struct send_queue *q, const void *bytes, size_t size, size_t plain)
@@ -289,13 +292,13 @@ static void queue_bytes(struct send_queue *q, struct sent_prefix head, unsigned 
 
 void send_queue_send_frame(struct send_queue *q, unsigned char *frame, size_t size)
 {
-	struct sent_prefix head = {.size = q->first_frame_sent ? FRAME_CHECKED_PREFIX_SIZE : FRAME_PREFIX_SIZE};
+	struct sent_prefix head = {.size = q->has_sent_first_frame ? FRAME_CHECKED_PREFIX_SIZE : FRAME_PREFIX_SIZE};
 	assert(size > FRAME_PREFIX_SIZE);
-	if (q->first_frame_sent)
+	if (q->has_sent_first_frame)
 		frame_checked_prefix_write(head.bytes, frame, frame + FRAME_PREFIX_SIZE, size - FRAME_PREFIX_SIZE);
 	else
 		memcpy(head.bytes, frame, FRAME_PREFIX_SIZE);
-	q->first_frame_sent = true;
+	q->has_sent_first_frame = true;
 	queue_bytes(q, head, frame, size, FRAME_PREFIX_SIZE);
 }
 

@@ -42,7 +42,7 @@ struct send_queue {
 	size_t copied_bytes;		  /* bytes of the first frame that libuv also has, encrypted */
 	struct send_share share;	  /* share of the pool: unsent_bytes + copied_bytes */
 	size_t in_flight_bytes;		  /* bytes that libuv has to write; with TLS including its overhead */
-	bool first_frame_sent;		  /* the first frame has been given to the queue */
+	bool has_sent_first_frame;	  /* the first frame has been given to the queue */
 	bool was_evicted;		  /* the queue failed because all queues together held too much */
 };
 

@@ -44,7 +44,7 @@ static int try_threads(unsigned count)
 	return rc;
 }
 
-static void do_nothing(uv_work_t *work)
+static void run_empty_task(uv_work_t *work)
 {
 	(void)work;
 }
@@ -58,7 +58,7 @@ int uv_pool_start(uv_loop_t *loop, struct error *e)
 		return error_set(e, ENOMEM, "no memory for %u threads, or too many threads (ulimit -v, ulimit -u)",
 				 count);
 	if (!rc)
-		rc = uv_queue_work(loop, &first, do_nothing, NULL);
+		rc = uv_queue_work(loop, &first, run_empty_task, NULL);
 	if (rc)
 		return error_set(e, -rc, "no threads: %s", uv_strerror(rc));
 	uv_run(loop, UV_RUN_DEFAULT);

@@ -165,7 +165,7 @@ static uint32_t power_of_two_below(uint64_t x)
 	return p;
 }
 
-bool plan_wants_rays(const struct plan_request *r)
+bool plan_needs_ray_count(const struct plan_request *r)
 {
 	bool is_fixed = r->bootstrap && r->epoch && (r->chains || r->kind == PLAN_SAMPLES);
 	bool counted = r->spp || r->mutations;
@@ -237,7 +237,7 @@ static uint64_t lease_bytes(const struct plan *p)
 	return crop_pixels(p) * PIXEL_BYTES / (p->kind == PLAN_CHAINS ? 1 : p->parts);
 }
 
-/* Chooses the length of an epoch by the rule that plan.h states above plan_wants_speed, and returns which part of the
+/* Chooses the length of an epoch by the rule that plan.h states above plan_needs_speed, and returns which part of the
  * rule decided. p's parts, groups and chains are set already. */
 static enum epoch_rule choose_epoch(const struct plan_request *r, const struct plan *p, uint64_t total, uint64_t *epoch)
 {
@@ -318,7 +318,7 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 		*text = 0;
 }
 
-bool plan_wants_speed(const struct plan_request *r, const struct plan *p)
+bool plan_needs_speed(const struct plan_request *r, const struct plan *p)
 {
 	return !r->epoch && !(r->speed > 0) && p->epoch > LEASE_SAMPLES_SAFE / lease_unit(p);
 }
@@ -551,7 +551,7 @@ int plan_check(const struct plan *p, struct error *e)
 	return rc ? rc : check_bounds(p, e);
 }
 
-double plan_unseen_after(const struct plan *p, double spp)
+double plan_unseen_mean_square(const struct plan *p, double spp)
 {
 	const double *mean_squares = p->unseen.mean_squares, x = fmin(fmax(0.5 * log2(spp), 0), PLAN_UNSEEN_COUNT - 1);
 	int i = (int)fmin(x, PLAN_UNSEEN_COUNT - 2);

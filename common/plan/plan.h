@@ -53,7 +53,7 @@ struct plan_unseen {
 	double mean_squares[PLAN_UNSEEN_COUNT];
 };
 
-/* Mean numbers of rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: not counted. */
+/* Mean numbers of rays that a pilot counted (worker/render/count_rays.h), the same on every machine; 0: not counted. */
 struct plan_rays {
 	double bootstrap; /* per bootstrap sample */
 	double step;	  /* per mutation or sample */
@@ -136,7 +136,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
  *   the job.
  */
 /* Returns whether a pilot should measure the speed: without it, a lease might take longer than about 20 s. */
-bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
+bool plan_needs_speed(const struct plan_request *r, const struct plan *p);
 /*
  * How much work fits into a time is computed from counted rays, assuming that a thread traces two million a second.
  * Unless their numbers are requested, the bootstrap takes at most a quarter of the time of one thread, and starting the
@@ -145,7 +145,7 @@ bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
  * the bootstrap takes more than about 20 s.
  */
 /* Returns whether a pilot should count rays: the plan depends on them. */
-bool plan_wants_rays(const struct plan_request *r);
+bool plan_needs_ray_count(const struct plan_request *r);
 /* Returns how many bootstrap samples one thread is assumed to draw in that time, at least 256; the largest possible
  * number if no rays were counted. */
 uint64_t plan_affordable_bootstrap(const struct plan_request *r, double seconds);
@@ -153,7 +153,7 @@ uint64_t plan_affordable_bootstrap(const struct plan_request *r, double seconds)
 int plan_check(const struct plan *p, struct error *e);
 /* Returns the mean square of struct plan_unseen after that many samples per pixel, interpolated linearly in their
  * logarithm. */
-double plan_unseen_after(const struct plan *p, double spp);
+double plan_unseen_mean_square(const struct plan *p, double spp);
 /* Describes the rule by which plan_make chose the length of an epoch; empty if the length was requested. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 enum { PLAN_TEXT_MAX = 1536 }; /* bytes that suffice for the text of any plan_describe... function */

@@ -173,7 +173,7 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		m.strategies = strategy[0];
 		m.independent_sum = b->independent_sum;
 		m.independent_square = b->independent_square;
-		m.beyond_sum = b->beyond_sum;
+		m.beyond_sum = b->overlong_sum;
 		m.cpu_seconds = b->cpu_seconds;
 		m.n_tile_sizes = b->tile_count;
 		m.tile_sizes = k.tile_sizes;
@@ -300,7 +300,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 			memcpy(b->strategies, m->strategies, m->n_strategies * sizeof *m->strategies);
 		b->independent_sum = m->independent_sum;
 		b->independent_square = m->independent_square;
-		b->beyond_sum = m->beyond_sum;
+		b->overlong_sum = m->beyond_sum;
 		b->cpu_seconds = m->cpu_seconds;
 		memcpy(b->classes, m->classes, sizeof b->classes);
 		rc = read_tiles(&c, m, p, b, e);

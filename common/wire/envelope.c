@@ -53,7 +53,7 @@ static void *allocate_bounded(void *user, size_t size)
 			       FIRST_BLOCK_FACTOR * ((env->limit - UNPACKED_BYTES_BASE) / AMPLIFICATION),
 		       usual = b || first > BLOCK_BYTES ? BLOCK_BYTES : first, capacity = need > usual ? need : usual;
 		b = mem_alloc(1, sizeof *b + capacity);
-		env->out_of_memory = !b;
+		env->is_out_of_memory = !b;
 		if (!b)
 			return NULL;
 		b->size = capacity;
@@ -148,7 +148,7 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 	else if (m->body_case == FARM__ENVELOPE__BODY__NOT_SET)
 		fault = "an envelope without a message";
 	if (fault) {
-		bool out_of_memory = env->out_of_memory;
+		bool out_of_memory = env->is_out_of_memory;
 		envelope_fini(env);
 		return out_of_memory ? error_set(e, ENOMEM, "no memory for a message")
 				     : error_set(e, EBADMSG, "%s", fault);

@@ -35,9 +35,9 @@ struct envelope_block;
 struct envelope {
 	Farm__Envelope *message;
 	struct envelope_block *blocks;
-	size_t bytes;	    /* memory of all blocks */
-	size_t used, limit; /* while unpacking: bytes handed out to protobuf-c, and their limit */
-	bool out_of_memory; /* an allocation failed */
+	size_t bytes;	       /* memory of all blocks */
+	size_t used, limit;    /* while unpacking: bytes handed out to protobuf-c, and their limit */
+	bool is_out_of_memory; /* an allocation failed */
 };
 
 /* Unpacks a message. Returns 0; -EBADMSG if the message does not parse, has unknown fields or no body, or needs more

@@ -59,14 +59,14 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 	text_copy(p->name, sizeof p->name, e->name);
 	p->threads = e->threads;
 	p->joined_at = p->last_seen = f->now;
-	p->state = identity->quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
-	if (identity->quarantined)
+	p->state = identity->is_quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
+	if (identity->is_quarantined)
 		memcpy(p->last_fault, identity->last_fault, sizeof p->last_fault);
-	p->class->active_count += p->state == PEER_ACTIVE;
+	p->class->active_peer_count += p->state == PEER_ACTIVE;
 	list_init(&p->waiting_link);
 	f->lease_capacity += limit;
-	if (f->now + f->config.silence_timeout < f->expiry_check_at)
-		f->expiry_check_at = f->now + f->config.silence_timeout;
+	if (f->now + f->config.silence_timeout < f->next_expiry_check_at)
+		f->next_expiry_check_at = f->now + f->config.silence_timeout;
 	uint32_t i = f->peer_count++;
 	for (; i > 0 && f->peers[i - 1]->id > p->id; i--)
 		f->peers[i] = f->peers[i - 1];
@@ -78,7 +78,7 @@ void connection_drop_leases(struct farm *f, struct peer *p, bool revoke)
 {
 	for (uint32_t i = 0; i < p->lease_capacity; i++) {
 		struct lease *l = &p->leases[i];
-		if (!l->in_use)
+		if (!l->is_in_use)
 			continue;
 		if (revoke)
 			lease_revoke(f, l);
@@ -89,11 +89,11 @@ void connection_drop_leases(struct farm *f, struct peer *p, bool revoke)
 
 void connection_leave(struct farm *f, struct peer *p)
 {
-	p->wanted_leases = 0;
+	p->wanted_lease_count = 0;
 	peer_requeue(f, p);
 	connection_drop_leases(f, p, false);
 	if (p->state == PEER_ACTIVE)
-		p->class->active_count--;
+		p->class->active_peer_count--;
 	peer_class_release(p->class);
 	worker_registry_release(f, p->identity);
 	f->lease_capacity -= p->lease_capacity;
@@ -108,13 +108,13 @@ void connection_leave(struct farm *f, struct peer *p)
 void connection_lose_leases(struct farm *f, struct peer *p)
 {
 	for (uint32_t i = 0; i < p->lease_capacity; i++)
-		if (p->leases[i].in_use)
+		if (p->leases[i].is_in_use)
 			lost_holders_add(f, &p->leases[i]);
 }
 
 void connection_lose(struct farm *f, struct peer *p)
 {
-	p->wanted_leases = 0;
+	p->wanted_lease_count = 0;
 	peer_requeue(f, p);
 	connection_lose_leases(f, p);
 	connection_leave(f, p);

@@ -20,7 +20,7 @@ const char *doubt_maker_name(const struct farm *f, const struct lease_key *k)
 	const struct job *j = farm_find_job(f, k->job);
 	bool known_slot =
 		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
-	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
+	const struct slot *s = known_slot ? job_get_slot(j, k->group, k->part) : NULL;
 	return s && s->next_epoch == k->epoch && k->epoch > 0 ? worker_name(f, s->doubt.maker)
 							      : "?"; /* only the maker of the latest states is known */
 }
@@ -28,7 +28,8 @@ const char *doubt_maker_name(const struct farm *f, const struct lease_key *k)
 static bool is_party(const struct slot *s, uint64_t worker_id)
 {
 	const struct doubt *d = &s->doubt;
-	return worker_id == d->barred || (doubt_is_pending(s) && (worker_id == d->maker || worker_id == d->refuser));
+	return worker_id == d->barred_maker ||
+	       (doubt_is_pending(s) && (worker_id == d->maker || worker_id == d->refuser));
 }
 
 /* Whether a connected worker is neither the maker nor a refuser of the states, so that it could be asked. */
@@ -42,7 +43,7 @@ static bool has_third_worker(const struct farm *f, const struct job *j, const st
 	return false;
 }
 
-bool doubt_is_barred(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
+bool doubt_bars_worker(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
 {
 	return is_party(s, p->identity->id) && has_third_worker(f, j, s);
 }
@@ -63,7 +64,7 @@ static void reopen_epoch(struct farm *f, struct job *j, struct slot *s)
 		j->rounds = s->next_epoch;
 		/* a pending estimate would be of rounds that are no longer complete; the update may contain other
 		 * actions, too */
-		j->evaluating = false;
+		j->is_estimating_error = false;
 	}
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		if (j->slots[i].next_epoch - j->rounds > 1)
@@ -80,10 +81,10 @@ static void roll_back_epoch(struct farm *f, struct job *j, struct slot *s, const
 		 watermark = d->rollback_watermark > s->next_epoch ? d->rollback_watermark : s->next_epoch;
 	reopen_epoch(f, j, s);
 	*d = (struct doubt){.maker = d->previous_maker,
-			    .barred = maker,
+			    .barred_maker = maker,
 			    .rollback_watermark = watermark,
 			    .rollback_count = d->rollback_count + 1};
-	struct action *a = update_add(f, ACTION_ROLL_BACK);
+	struct action *a = update_add(f, ACTION_ROLL_BACK_EPOCH);
 	a->worker_id = maker;
 	a->job = j->id;
 	a->key = slot_lease_key(j, s);
@@ -97,7 +98,7 @@ static void restart_chains(struct farm *f, struct job *j, struct slot *s, const 
 {
 	const struct lease_key k = slot_lease_key(j, s);
 	lease_revoke_slot(f, s); /* some workers may still hold the refused states */
-	s->doubt.from_seeds = true;
+	s->doubt.starts_from_seeds = true;
 	text_print(f->answer_text, sizeof f->answer_text,
 		   "the chains of group %u part %u start epoch %llu from their seeds: their states, made by %s, were "
 		   "refused by %s",
@@ -108,15 +109,16 @@ static void restart_chains(struct farm *f, struct job *j, struct slot *s, const 
 	a->text = f->answer_text;
 }
 
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
-		   const char *text)
+void doubt_handle_refusal(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
+			  const char *text)
 {
 	struct doubt *d = &s->doubt;
 	uint64_t worker_id = p->identity->id;
 	bool is_second_refusal = d->refuser && d->refuser != worker_id && d->maker != worker_id;
 	if (!d->refuser)
 		d->refuser = worker_id;
-	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text, worker_name(f, d->maker));
+	text_print(j->explanation, sizeof j->explanation, "%s: %s (made by %s)", p->name, text,
+		   worker_name(f, d->maker));
 	if (!is_second_refusal && has_third_worker(f, j, s)) {
 		job_place_slot(j, s);
 		return;
@@ -128,7 +130,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 		text_copy(refusers, sizeof refusers, p->name);
 	else
 		text_print(refusers, sizeof refusers, "%s and %s", worker_name(f, d->refuser), p->name);
-	struct identity *maker = is_second_refusal && !j->mixed && d->maker != d->refuser
+	struct identity *maker = is_second_refusal && !j->is_mixed && d->maker != d->refuser
 					 ? identity_index_find_by_id(&f->identity_index, d->maker)
 					 : NULL;
 	if (can_roll_back && d->rollback_count < DOUBT_ROLLBACKS_MAX)
@@ -144,12 +146,12 @@ void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const str
 		  const struct lease_key *k)
 {
 	struct doubt *d = &s->doubt;
-	bool contradicts_refusal = doubt_is_pending(s) && !is_party(s, identity->id) && !j->mixed;
+	bool contradicts_refusal = doubt_is_pending(s) && !is_party(s, identity->id) && !j->is_mixed;
 	struct identity *refuser =
 		contradicts_refusal ? identity_index_find_by_id(&f->identity_index, d->refuser) : NULL;
 	bool is_behind_watermark = s->next_epoch < d->rollback_watermark;
 	*d = (struct doubt){.maker = identity->id,
-			    .previous_maker = d->from_seeds ? 0 : d->maker,
+			    .previous_maker = d->starts_from_seeds ? 0 : d->maker,
 			    .rollback_watermark = is_behind_watermark ? d->rollback_watermark : 0,
 			    .rollback_count = is_behind_watermark ? d->rollback_count : 0};
 	if (refuser)

@@ -32,10 +32,10 @@ enum { DOUBT_ROLLBACKS_MAX = 4 };
 
 /* Handles a refusal of chain states by p, whose lease has already been dropped. can_roll_back: the caller can take back
  * the previous epoch (its batch and the states before it are available). text: the worker's reason. */
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
-		   const char *text);
+void doubt_handle_refusal(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can_roll_back,
+			  const char *text);
 /* Whether p may not get the slot's lease because it made or refused the states and another worker is available. */
-bool doubt_is_barred(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
+bool doubt_bars_worker(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
 /* Call when a result of the slot's next epoch is merged, before job_merge_epoch: the sender `identity` has accepted the
  * states. */
 void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *identity,

@@ -15,13 +15,13 @@
 #include "coordinator/core/job_fields.h"
 
 enum event_kind {
-	EVENT_TICK,	    /* none: time has passed; due at update.wake_time at the latest */
-	EVENT_JOINED,	    /* join */
-	EVENT_LEFT,	    /* peer: its connection is closed */
-	EVENT_HEARTBEAT,    /* peer: every other event of a peer counts as a heartbeat, too */
-	EVENT_REQUEST,	    /* peer, wanted_leases */
-	EVENT_BATCH,	    /* peer, key, valid, text: the result of a lease */
-	EVENT_STORED_BATCH, /* key, digest: a result stored by an earlier run, which may count now */
+	EVENT_TICK,	     /* none: time has passed; due at update.wake_time at the latest */
+	EVENT_JOINED,	     /* join */
+	EVENT_LEFT,	     /* peer: its connection is closed */
+	EVENT_HEARTBEAT,     /* peer: every other event of a peer counts as a heartbeat, too */
+	EVENT_LEASE_REQUEST, /* peer, wanted_leases */
+	EVENT_BATCH,	     /* peer, key, valid, text: the result of a lease */
+	EVENT_STORED_BATCH,  /* key, digest: a result stored by an earlier run, which may count now */
 	/* peer, key: a result has arrived and will be judged later (EVENT_BATCH); meanwhile the worker may get
 	 * another lease */
 	EVENT_BATCH_DELIVERED,
@@ -31,7 +31,7 @@ enum event_kind {
 	EVENT_SUBMIT,	       /* tag, submit */
 	EVENT_CANCEL,	       /* tag, job */
 	EVENT_PREPARED,	       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
-	EVENT_ERROR_ESTIMATED, /* error_estimated: the answer to ACTION_EVALUATE_ERROR */
+	EVENT_ERROR_ESTIMATED, /* error_estimated: the answer to ACTION_ESTIMATE_ERROR */
 	/* image_published: statistics of the final image after ACTION_PUBLISH; the job has ended */
 	EVENT_IMAGE_PUBLISHED,
 	/* tag, restore: continues a job of an earlier run, or a job that has ended. With tag 0 max_jobs does not
@@ -39,17 +39,17 @@ enum event_kind {
 	EVENT_RESTORE,
 	/* tag, job, hold, text: hands out no more leases of the job; an empty text ends this hold. */
 	EVENT_HOLD,
-	EVENT_PRIORITY,	   /* tag, job, priority: applies from the next lease on */
-	EVENT_EXTEND,	   /* tag, job, plan: the job's own plan with other bounds; not fewer rounds */
+	EVENT_SET_PRIORITY, /* tag, job, priority: applies from the next lease on */
+	EVENT_EXTEND,	    /* tag, job, plan: the job's own plan with other bounds; not fewer rounds */
 	EVENT_QUARANTINED, /* join (without peer, fingerprint, threads), text: a worker quarantined in an earlier run */
-	EVENT_JOB_BROKEN,  /* job, text: the job fails (a sum left the grid, the disk is full) */
+	EVENT_JOB_FAILED,  /* job, text: the job fails (a sum left the grid, the disk is full) */
 };
 
 /* Reasons to hold a job. Several may apply at once; leases go out when none applies. */
 enum job_hold {
 	HOLD_STORAGE, /* its results cannot be stored */
 	HOLD_FILES,   /* a file of its scene is missing or damaged */
-	HOLD_BY_USER, /* a user asked for it */
+	HOLD_USER,    /* a user asked for it */
 	JOB_HOLD_COUNT,
 };
 
@@ -79,7 +79,7 @@ struct event_submit {
 	int priority; /* -100..100 */
 	/* Name in the owner's certificate. "": no certificate, and all these jobs have the same owner. */
 	const char *owner;
-	bool mixed; /* accepts workers of any numeric fingerprint */
+	bool is_mixed; /* accepts workers of any numeric fingerprint */
 	/* Fraction of the job's leases that two workers compute; ignored for mixed jobs, whose results cannot be
 	 * compared. */
 	double verify_fraction;
@@ -95,10 +95,10 @@ struct event_restore {
 	/* [groups][parts]: the worker that made the last merged batch (peer, fingerprint and threads are not set);
 	 * its name is NULL if unknown. The array is NULL if no maker is known. */
 	const struct event_join *makers;
-	bool black; /* as in EVENT_PREPARED */
+	bool is_black; /* as in EVENT_PREPARED */
 	/* Seconds after the job's first lease: now, at the start of the first round, and at the end of the last
 	 * complete round. NAN: not reached yet. The time between two runs of the coordinator is not included. */
-	double elapsed, opened, completed;
+	double elapsed, first_round_at, last_round_end;
 	const struct forecast_history *looks;
 	struct job_counts counts; /* counted so far */
 };
@@ -125,17 +125,18 @@ struct event {
 			struct lease_key key;
 			/* BATCH: the result passed batch_check and the checks of the frame; otherwise text says what
 			 * is wrong. */
-			bool valid;
+			bool is_valid;
 			/* BATCH, STORED_BATCH: set for leases for which farm_lease_is_verified returns true. */
 			struct batch_digest digest;
-			bool worker_at_fault; /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
-			bool memory_full; /* with worker_at_fault: temporary, because the worker's memory is in use */
-			bool bad_states;  /* LEASE_FAILED: the worker refuses the chain states of the grant */
-			/* With bad_states: the refused states are not the lease's current states but those of an
+			bool is_worker_at_fault; /* LEASE_FAILED: a fault of the worker's own machine, not of the job */
+			bool is_memory_full; /* with is_worker_at_fault: temporary, because the worker's memory is in
+						use */
+			bool has_bad_states; /* LEASE_FAILED: the worker refuses the chain states of the grant */
+			/* With has_bad_states: the refused states are not the lease's current states but those of an
 			 * earlier grant. */
-			bool states_outdated;
-			/* With bad_states: the batch that produced the states can be taken out of the films, and the
-			 * earlier states are available. */
+			bool has_outdated_states;
+			/* With has_bad_states: the batch that produced the states can be taken out of the films, and
+			 * the earlier states are available. */
 			bool can_roll_back;
 		} lease;
 		enum job_hold hold;

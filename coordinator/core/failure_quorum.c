@@ -33,11 +33,11 @@ static void add_worker(struct failure_quorum *l, const struct identity *identity
 }
 
 /* Counts only as far as FAILURE_QUORUM_SIZE, since more makes no difference. */
-uint32_t failure_quorum_required_certificates(const struct farm *f)
+uint32_t failure_quorum_size_required(const struct farm *f)
 {
 	struct failure_quorum all_workers = {.count = 0};
 	for (uint32_t i = 0; i < f->registry_count && count_certificates(&all_workers) < FAILURE_QUORUM_SIZE; i++)
-		if (!f->registry[i]->quarantined)
+		if (!f->registry[i]->is_quarantined)
 			add_worker(&all_workers, f->registry[i]);
 	return count_certificates(&all_workers);
 }
@@ -45,5 +45,5 @@ uint32_t failure_quorum_required_certificates(const struct farm *f)
 bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *identity)
 {
 	add_worker(l, identity);
-	return l->count == FAILURE_QUORUM_SIZE && count_certificates(l) >= failure_quorum_required_certificates(f);
+	return l->count == FAILURE_QUORUM_SIZE && count_certificates(l) >= failure_quorum_size_required(f);
 }

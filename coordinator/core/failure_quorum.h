@@ -18,7 +18,7 @@ struct identity;
 
 /* Returns how many different certificates the workers in a quorum must have: as many as the workers that are not
  * quarantined have, at most FAILURE_QUORUM_SIZE. */
-uint32_t failure_quorum_required_certificates(const struct farm *f);
+uint32_t failure_quorum_size_required(const struct farm *f);
 
 /* Adds a worker. Returns true if the quorum is reached: the lease or job is at fault. */
 bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *identity);

@@ -28,7 +28,7 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 	f->config = *c;
 	f->next_job_id = c->first_job_id;
 	f->live_job_capacity = c->max_jobs;
-	f->expiry_check_at = f->schedule_at = INFINITY;
+	f->next_expiry_check_at = f->next_schedule_at = INFINITY;
 	f->now = -INFINITY;
 	list_init(&f->classes);
 	list_init(&f->owners);
@@ -88,7 +88,7 @@ static void handle_joined(struct farm *f, const struct event *ev)
 static void handle_quarantined(struct farm *f, const struct event *ev)
 {
 	const struct event_join join = with_join_defaults(&ev->join);
-	worker_registry_restore_quarantined(f, &join, ev->text);
+	worker_registry_restore(f, &join, ev->text);
 }
 
 static void handle_left(struct farm *f, const struct event *ev)
@@ -103,7 +103,7 @@ static void handle_request(struct farm *f, const struct event *ev)
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (!p)
 		return;
-	p->wanted_leases = ev->wanted_leases < p->lease_capacity ? ev->wanted_leases : p->lease_capacity;
+	p->wanted_lease_count = ev->wanted_leases < p->lease_capacity ? ev->wanted_leases : p->lease_capacity;
 	if (list_is_empty(&p->waiting_link) || !peer_wants_lease(p))
 		peer_requeue(f, p);
 }
@@ -126,23 +126,23 @@ static void (*const event_handlers[])(struct farm *, const struct event *) = {
 	[EVENT_JOINED] = handle_joined,
 	[EVENT_LEFT] = handle_left,
 	[EVENT_HEARTBEAT] = ignore_event,
-	[EVENT_REQUEST] = handle_request,
+	[EVENT_LEASE_REQUEST] = handle_request,
 	[EVENT_BATCH] = answer_batch,
-	[EVENT_STORED_BATCH] = answer_stored,
-	[EVENT_BATCH_DELIVERED] = answer_delivered,
-	[EVENT_LEASE_FAILED] = answer_failed,
-	[EVENT_LEASE_RETURNED] = answer_returned,
+	[EVENT_STORED_BATCH] = answer_stored_batch,
+	[EVENT_BATCH_DELIVERED] = answer_batch_delivered,
+	[EVENT_LEASE_FAILED] = answer_lease_failed,
+	[EVENT_LEASE_RETURNED] = answer_lease_returned,
 	[EVENT_SUBMIT] = rounds_submit,
 	[EVENT_CANCEL] = rounds_cancel,
-	[EVENT_PREPARED] = rounds_prepared,
-	[EVENT_ERROR_ESTIMATED] = rounds_error_estimated,
-	[EVENT_IMAGE_PUBLISHED] = rounds_image_published,
+	[EVENT_PREPARED] = rounds_handle_prepared,
+	[EVENT_ERROR_ESTIMATED] = rounds_handle_error_estimated,
+	[EVENT_IMAGE_PUBLISHED] = rounds_handle_image_published,
 	[EVENT_RESTORE] = restore_job,
 	[EVENT_HOLD] = orders_hold,
-	[EVENT_PRIORITY] = orders_priority,
+	[EVENT_SET_PRIORITY] = orders_set_priority,
 	[EVENT_EXTEND] = orders_extend,
 	[EVENT_QUARANTINED] = handle_quarantined,
-	[EVENT_JOB_BROKEN] = handle_job_broken,
+	[EVENT_JOB_FAILED] = handle_job_broken,
 };
 
 void farm_step(struct farm *f, const struct event *ev, struct update *u)
@@ -158,5 +158,5 @@ void farm_step(struct farm *f, const struct event *ev, struct update *u)
 	schedule_leases(f);
 	u->actions = f->actions;
 	u->count = f->action_count;
-	u->wake_time = fmin(f->expiry_check_at, f->schedule_at);
+	u->wake_time = fmin(f->next_expiry_check_at, f->next_schedule_at);
 }

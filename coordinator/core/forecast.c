@@ -17,13 +17,13 @@ static double work_of_leases(uint64_t merged, double total, const struct job *j)
 }
 
 /* Bootstrap samples and mutations merged so far. */
-static double work_done(const struct job *j)
+static double done_work(const struct job *j)
 {
 	return work_of_leases(j->bootstrap_merged, bootstrap_work(j), j) +
 	       work_of_leases(j->leases_merged, (double)plan_round_mutations(&j->plan), j);
 }
 
-static double work_of_rounds(const struct job *j, double rounds)
+static double rounds_work(const struct job *j, double rounds)
 {
 	return bootstrap_work(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
@@ -38,26 +38,26 @@ static double rounds_by_sqrt_rule(const struct job *j)
 
 /* Returns how many samples and mutations the job will need in total, according to its plan or to the error so far. An
  * error-based estimate is at least the two open rounds more than what is complete. */
-static struct forecast_range work_total(const struct job *j)
+static struct forecast_range total_work(const struct job *j)
 {
 	struct forecast_range total = {INFINITY, INFINITY, INFINITY};
 	if (j->plan.rounds != UINT64_MAX)
-		total.low = total.middle = total.high = work_of_rounds(j, (double)j->plan.rounds);
+		total.low = total.middle = total.high = rounds_work(j, (double)j->plan.rounds);
 	if (!(j->plan.target_error > 0) || isnan(j->rel_error))
 		return total;
 	double min_rounds = (double)j->rounds + 2, rule = rounds_by_sqrt_rule(j);
 	struct forecast_range rounds = {rule, rule, rule};
 	if (j->looks.count)
 		rounds = j->target_cost.rounds;
-	total.low = fmin(total.low, work_of_rounds(j, fmax(rounds.low, min_rounds)));
-	total.middle = fmin(total.middle, work_of_rounds(j, fmax(rounds.middle, min_rounds)));
-	total.high = fmin(total.high, work_of_rounds(j, fmax(rounds.high, min_rounds)));
+	total.low = fmin(total.low, rounds_work(j, fmax(rounds.low, min_rounds)));
+	total.middle = fmin(total.middle, rounds_work(j, fmax(rounds.middle, min_rounds)));
+	total.high = fmin(total.high, rounds_work(j, fmax(rounds.high, min_rounds)));
 	return total;
 }
 
 static bool has_time_bound(const struct job *j)
 {
-	return j->plan.seconds > 0 && !isnan(j->started);
+	return j->plan.seconds > 0 && !isnan(j->started_at);
 }
 
 /* Returns the seconds until the job's time bound ends it; NAN if the time is over and the rate of the round that has
@@ -65,7 +65,7 @@ static bool has_time_bound(const struct job *j)
 static double seconds_to_time_bound(const struct job *j, double rate, double now)
 {
 	double round = (double)plan_round_mutations(&j->plan);
-	return merge_seconds_remaining(&j->plan, job_elapsed(j, now), (work_done(j) - bootstrap_work(j)) / round,
+	return merge_seconds_remaining(&j->plan, job_elapsed(j, now), (done_work(j) - bootstrap_work(j)) / round,
 				       rate / round);
 }
 
@@ -73,7 +73,7 @@ double job_progress(const struct job *j, double now)
 {
 	if (j->state == JOB_DONE)
 		return 1;
-	double p = work_done(j) / work_total(j).middle;
+	double p = done_work(j) / total_work(j).middle;
 	if (has_time_bound(j) && job_is_live(j)) /* elapsed time never decreases, unlike an estimate from a rate */
 		p = fmax(p, fmin(0.99, job_elapsed(j, now) / j->plan.seconds));
 	return fmin(1, fmax(j->progress_floor, p));
@@ -86,7 +86,7 @@ static double remaining_seconds(const struct job *j, double total, bool idle, do
 {
 	double remaining = INFINITY, rate = idle || !j->leases_merged ? 0 : rate_value(&j->rate, now);
 	if (rate > 0)
-		remaining = fmax(0, total - work_done(j)) / rate;
+		remaining = fmax(0, total - done_work(j)) / rate;
 	if (has_time_bound(j))
 		remaining = fmin(remaining, seconds_to_time_bound(j, rate, now)); /* fmin ignores a NAN */
 	return isfinite(remaining) ? remaining : NAN;
@@ -96,7 +96,7 @@ struct forecast_range job_eta(const struct job *j, bool idle, double now)
 {
 	if (!job_is_live(j) || job_is_held(j))
 		return (struct forecast_range){NAN, NAN, NAN};
-	struct forecast_range total = work_total(j);
+	struct forecast_range total = total_work(j);
 	return (struct forecast_range){remaining_seconds(j, total.low, idle, now),
 				       remaining_seconds(j, total.middle, idle, now),
 				       remaining_seconds(j, total.high, idle, now)};
@@ -109,11 +109,11 @@ void job_note_look(struct job *j, double rel_error, double rel_mse, double degre
 	double prefix_fraction = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
 	struct forecast_look l = {.work = (double)j->rounds * (double)plan_round_mutations(&j->plan),
 				  .cpu_seconds = cpu_seconds * prefix_fraction,
-				  .seconds = j->estimate_requested_at - j->opened,
+				  .seconds = j->estimate_requested_at - j->first_round_at,
 				  .rel_mse = rel_mse,
 				  .rel_mse_upper = rel_error * rel_error,
 				  .degrees = degrees > 0 ? degrees : j->plan.groups - 1.0,
-				  .doubtful = doubtful};
+				  .is_doubtful = doubtful};
 	uint32_t count = j->looks.count;
 	forecast_add_look(&j->looks, &l);
 	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS_MAX))

@@ -20,10 +20,10 @@ struct backoff {
 	uint64_t job; /* 0: this entry is free */
 	uint32_t failures;
 	double until;
-	bool worker_at_fault; /* all failures since the last pause were faults of the worker's own machine */
-	bool memory_full;     /* no failure: its memory has room for one scene and holds another one */
-	/* with memory_full: it held leases at that time. Once it holds none, the pause ends at once */
-	bool held_leases;
+	bool is_worker_at_fault; /* all failures since the last pause were faults of the worker's own machine */
+	bool is_memory_full;	 /* no failure: its memory has room for one scene and holds another one */
+	/* with is_memory_full: it held leases at that time. Once it holds none, the pause ends at once */
+	bool had_leases;
 };
 
 enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEY_COUNT };
@@ -39,11 +39,11 @@ struct identity {
 	uint32_t reference_count; /* references: connections, and noted answers of verified leases */
 	uint32_t consecutive_faults, wrong_results;
 	uint32_t lease_window; /* leases that it may hold (see peer_note_success) */
-	bool quarantined;
+	bool is_quarantined;
 	double last_seen;
 	/* Its memory is full; until this time it gets only leases of jobs of which it already holds some. */
 	double memory_full_until;
-	bool held_leases_when_full; /* it held leases at that time; once it holds none, memory_full_until no longer
+	bool had_leases_when_full; /* it held leases at that time; once it holds none, memory_full_until no longer
 				       applies */
 	struct backoff backoffs[IDENTITY_BACKOFFS_MAX];
 	char last_fault[256]; /* describes its last fault */

@@ -29,8 +29,8 @@ static void begin_lease_kind(struct job *j, enum lease_kind kind, uint64_t limit
 	j->kind = kind;
 	j->round_limit = limit;
 	j->rounds = 0;
-	j->slots_done = j->slots_ahead = 0;
-	j->has_slots_far_ahead = false;
+	j->done_slot_count = j->ahead_slot_count = 0;
+	j->has_far_ahead_slot = false;
 	j->duration_count = 0;
 	j->median_duration = NAN;
 	rate_init(&j->rate, now);
@@ -47,17 +47,17 @@ static void init_job(struct job *j, const struct event_submit *e, double now)
 {
 	text_copy(j->name, sizeof j->name, e->name);
 	j->priority = e->priority;
-	j->mixed = e->mixed;
+	j->is_mixed = e->is_mixed;
 	j->verify_fraction = e->verify_fraction;
 	j->plan = *e->plan;
-	j->submitted = now;
-	j->started = j->ended = j->rel_error = j->opened = j->held_since = NAN;
+	j->submitted_at = now;
+	j->started_at = j->ended_at = j->rel_error = j->first_round_at = j->held_since = NAN;
 	for (int i = 0; i < 2; i++) {
-		list_init(&j->ready[i]);
-		list_init(&j->leased[i]);
-		list_init(&j->awaiting_second[i]);
+		list_init(&j->ready_slots[i]);
+		list_init(&j->leased_slots[i]);
+		list_init(&j->awaiting_second_answer[i]);
 	}
-	list_init(&j->blocked);
+	list_init(&j->blocked_slots);
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		list_init(&j->slots[i].link);
 	begin_lease_kind(j, LEASE_BOOTSTRAP, 1, now);
@@ -73,7 +73,7 @@ struct job *job_new(struct farm *f, const struct event_submit *e, const char **r
 	struct job *j = mem_alloc(1, sizeof *j);
 	if (j)
 		j->slots = mem_alloc(slots, sizeof *j->slots);
-	bool verified = e->verify_fraction > 0 && !e->mixed;
+	bool verified = e->verify_fraction > 0 && !e->is_mixed;
 	if (j && j->slots && verified)
 		j->proofs = mem_alloc(slots, sizeof *j->proofs);
 	if (j && j->slots && (j->proofs || !verified))
@@ -106,12 +106,12 @@ bool job_is_live(const struct job *j)
 
 bool job_is_schedulable(const struct job *j)
 {
-	return job_is_live(j) && !j->preparing && j->pending_end == END_NONE && !job_is_held(j);
+	return job_is_live(j) && !j->is_preparing && j->pending_end == END_NONE && !job_is_held(j);
 }
 
 bool job_has_answers(const struct job *j)
 {
-	return j->bootstrap_merged + j->leases_merged + j->noted_slots > 0;
+	return j->bootstrap_merged + j->leases_merged + j->noted_slot_count > 0;
 }
 
 bool job_is_held(const struct job *j)
@@ -124,10 +124,10 @@ bool job_is_held(const struct job *j)
 
 double job_elapsed(const struct job *j, double now)
 {
-	return (isnan(j->held_since) ? now : j->held_since) - j->started;
+	return (isnan(j->held_since) ? now : j->held_since) - j->started_at;
 }
 
-struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)
+struct slot *job_get_slot(const struct job *j, uint32_t group, uint32_t part)
 {
 	return &j->slots[(size_t)group * j->plan.parts + part];
 }
@@ -135,8 +135,8 @@ struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)
 struct slot *job_find_ready_slot(const struct job *j)
 {
 	for (int i = 0; i < 2; i++)
-		if (!list_is_empty(&j->ready[i]))
-			return list_entry(j->ready[i].next, struct slot, link);
+		if (!list_is_empty(&j->ready_slots[i]))
+			return list_entry(j->ready_slots[i].next, struct slot, link);
 	return NULL;
 }
 
@@ -147,12 +147,12 @@ void job_place_slot(struct job *j, struct slot *s)
 		return;
 	uint64_t ahead = s->next_epoch - j->rounds;
 	if (ahead > 1)
-		list_append(&j->blocked, &s->link);
+		list_append(&j->blocked_slots, &s->link);
 	else if (s->holder_count >= proof_max_holders(j, s))
-		list_append(&j->leased[ahead], &s->link);
+		list_append(&j->leased_slots[ahead], &s->link);
 	else
-		list_append(proof_is_pending(j, s) || doubt_is_pending(s) ? &j->awaiting_second[ahead]
-									  : &j->ready[ahead],
+		list_append(proof_is_pending(j, s) || doubt_is_pending(s) ? &j->awaiting_second_answer[ahead]
+									  : &j->ready_slots[ahead],
 			    &s->link);
 }
 
@@ -170,7 +170,7 @@ double job_copy_timeout(const struct farm_config *c, const struct slot *s)
 
 double job_copy_due_time(const struct farm_config *c, const struct job *j, const struct slot *s)
 {
-	return s->holder_since +
+	return s->last_holder_sent_at +
 	       (isnan(j->median_duration) ? c->default_copy_delay : straggler_medians * j->median_duration);
 }
 
@@ -196,13 +196,13 @@ static void add_duration(struct job *j, double duration)
 
 void job_place_all_slots(struct job *j)
 {
-	j->slots_done = j->slots_ahead = 0;
-	j->has_slots_far_ahead = false;
+	j->done_slot_count = j->ahead_slot_count = 0;
+	j->has_far_ahead_slot = false;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		uint64_t merged = j->slots[i].next_epoch - j->rounds;
-		j->slots_done += merged > 0;
-		j->slots_ahead += merged > 1;
-		j->has_slots_far_ahead = j->has_slots_far_ahead || merged > 2;
+		j->done_slot_count += merged > 0;
+		j->ahead_slot_count += merged > 1;
+		j->has_far_ahead_slot = j->has_far_ahead_slot || merged > 2;
 		job_place_slot(j, &j->slots[i]);
 	}
 }
@@ -211,9 +211,9 @@ bool job_merge_epoch(struct job *j, struct slot *s, double now, double duration)
 {
 	assert(!s->leases && s->next_epoch - j->rounds <= 1);
 	if (s->next_epoch++ == j->rounds)
-		j->slots_done++;
+		j->done_slot_count++;
 	else
-		j->slots_ahead++;
+		j->ahead_slot_count++;
 	s->timeout_count = 0;
 	s->failure_quorum.count = 0;
 	s->lost_holders.count = 0;
@@ -224,21 +224,21 @@ bool job_merge_epoch(struct job *j, struct slot *s, double now, double duration)
 	if (!isnan(duration))
 		add_duration(j, duration);
 	rate_add(&j->rate, now, lease_work(j));
-	bool complete = j->slots_done == j->slot_count;
-	if (complete && j->has_slots_far_ahead) {
+	bool complete = j->done_slot_count == j->slot_count;
+	if (complete && j->has_far_ahead_slot) {
 		j->rounds++;
 		job_place_all_slots(j);
 	} else if (complete) {
 		j->rounds++;
-		j->slots_done = j->slots_ahead;
-		j->slots_ahead = 0;
+		j->done_slot_count = j->ahead_slot_count;
+		j->ahead_slot_count = 0;
 		list_remove(&s->link);
-		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->leased[0]) &&
-		       list_is_empty(&j->awaiting_second[0]));
-		list_join(&j->ready[0], &j->ready[1]);
-		list_join(&j->leased[0], &j->leased[1]);
-		list_join(&j->awaiting_second[0], &j->awaiting_second[1]);
-		list_join(&j->ready[1], &j->blocked);
+		assert(list_is_empty(&j->ready_slots[0]) && list_is_empty(&j->leased_slots[0]) &&
+		       list_is_empty(&j->awaiting_second_answer[0]));
+		list_join(&j->ready_slots[0], &j->ready_slots[1]);
+		list_join(&j->leased_slots[0], &j->leased_slots[1]);
+		list_join(&j->awaiting_second_answer[0], &j->awaiting_second_answer[1]);
+		list_join(&j->ready_slots[1], &j->blocked_slots);
 	}
 	job_place_slot(j, s);
 	return complete;
@@ -255,11 +255,11 @@ void job_raise_round_limit(struct job *j)
 
 void job_open_rounds(struct job *j, double now)
 {
-	j->opened = now;
+	j->first_round_at = now;
 	begin_lease_kind(j, LEASE_RENDER, j->plan.rounds, now);
 }
 
-void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now)
+void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next_epochs, double now)
 {
 	uint64_t rounds = UINT64_MAX, merged = 0;
 	if (kind == LEASE_RENDER) {
@@ -267,12 +267,12 @@ void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, doub
 		job_open_rounds(j, now);
 	}
 	for (uint32_t i = 0; i < j->slot_count; i++)
-		rounds = next[i] < rounds ? next[i] : rounds;
+		rounds = next_epochs[i] < rounds ? next_epochs[i] : rounds;
 	j->rounds = rounds;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
-		assert(next[i] <= j->round_limit);
-		j->slots[i].next_epoch = next[i];
-		merged += next[i];
+		assert(next_epochs[i] <= j->round_limit);
+		j->slots[i].next_epoch = next_epochs[i];
+		merged += next_epochs[i];
 	}
 	job_place_all_slots(j);
 	if (kind == LEASE_RENDER)
@@ -292,7 +292,7 @@ void job_pin(struct job *j, struct peer_class *c)
 
 void job_unpin_if_untouched(struct job *j)
 {
-	if (!j->class || j->outstanding_leases || j->noted_slots || j->bootstrap_merged || j->leases_merged)
+	if (!j->class || j->outstanding_lease_count || j->noted_slot_count || j->bootstrap_merged || j->leases_merged)
 		return;
 	peer_class_release(j->class);
 	j->class = NULL;
@@ -301,5 +301,5 @@ void job_unpin_if_untouched(struct job *j)
 
 bool job_accepts_class(const struct job *j, const struct peer_class *c)
 {
-	return j->mixed || !j->class || j->class == c;
+	return j->is_mixed || !j->class || j->class == c;
 }

@@ -16,7 +16,7 @@ bool job_is_held(const struct job *j);
 bool job_has_answers(const struct job *j); /* at least one result was merged or noted */
 /* Seconds since the job's first lease, not counting the time it was held; NAN: no lease was sent yet. */
 double job_elapsed(const struct job *j, double now);
-struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part);
+struct slot *job_get_slot(const struct job *j, uint32_t group, uint32_t part);
 /* A slot whose lease can be handed out, of the first incomplete round if possible; NULL: none. */
 struct slot *job_find_ready_slot(const struct job *j);
 /* Moves the slot to the right list after its holders or its next epoch changed. */
@@ -31,8 +31,8 @@ double job_copy_due_time(const struct farm_config *c, const struct job *j, const
 /* Counts the slot's next epoch as merged. duration: seconds that the lease took, NAN if unknown. Returns true if the
  * slot's round is now complete. */
 bool job_merge_epoch(struct job *j, struct slot *s, double now, double duration);
-/* Marks leases of a new job as merged. next: see struct event_restore. */
-void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now);
+/* Marks leases of a new job as merged. next_epochs: see struct event_restore. */
+void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next_epochs, double now);
 void job_raise_round_limit(struct job *j);	 /* raises the limit of rounds to that of the plan */
 void job_open_rounds(struct job *j, double now); /* the bootstrap is complete: render leases begin */
 /* Pins the job to this class unless it is pinned; job_unpin_if_untouched undoes it when nothing is merged or noted

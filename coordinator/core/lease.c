@@ -8,7 +8,7 @@
 
 #include <assert.h>
 
-struct lease_key lease_key(const struct lease *l)
+struct lease_key lease_get_key(const struct lease *l)
 {
 	return slot_lease_key(l->job, l->slot);
 }
@@ -28,9 +28,9 @@ static struct lease *allocate_lease(struct farm *f, struct peer *p)
 	struct lease *oldest = NULL;
 	for (uint32_t i = 0; i < p->lease_capacity; i++) {
 		struct lease *l = &p->leases[i];
-		if (!l->in_use)
+		if (!l->is_in_use)
 			return l;
-		if (l->overdue && (!oldest || l->sent_at < oldest->sent_at))
+		if (l->is_overdue && (!oldest || l->sent_at < oldest->sent_at))
 			oldest = l;
 	}
 	assert(oldest);
@@ -42,36 +42,36 @@ static void add_lease_action(struct farm *f, enum action_kind kind, const struct
 {
 	struct action *a = update_add(f, kind);
 	a->peer = l->peer->id;
-	a->key = lease_key(l);
+	a->key = lease_get_key(l);
 	a->job = a->key.job;
-	a->from_seeds = l->slot->doubt.from_seeds;
+	a->starts_from_seeds = l->slot->doubt.starts_from_seeds;
 }
 
 void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 {
 	struct lease *l = lease_find(s, p);
-	assert(peer_wants_lease(p) && (!l || l->overdue));
+	assert(peer_wants_lease(p) && (!l || l->is_overdue));
 	if (!l) {
 		l = allocate_lease(f, p);
-		*l = (struct lease){.in_use = true, .peer = p, .job = j, .slot = s, .next = s->leases};
+		*l = (struct lease){.is_in_use = true, .peer = p, .job = j, .slot = s, .next = s->leases};
 		s->leases = l;
 	}
-	l->overdue = l->delivered = false;
+	l->is_overdue = l->is_delivered = false;
 	l->sent_at = f->now;
 	l->deadline = f->now + job_lease_timeout(&f->config, j, s);
-	if (l->deadline < f->expiry_check_at)
-		f->expiry_check_at = l->deadline;
+	if (l->deadline < f->next_expiry_check_at)
+		f->next_expiry_check_at = l->deadline;
 	if (s->holder_count == 0)
-		s->holder_since = f->now;
+		s->last_holder_sent_at = f->now;
 	else
 		j->counts.duplicates += s->holder_count >= proof_max_holders(j, s);
 	s->holder_count++;
-	j->outstanding_leases++;
-	j->owner->outstanding_leases++;
-	p->held_leases++;
+	j->outstanding_lease_count++;
+	j->owner->outstanding_lease_count++;
+	p->held_lease_count++;
 	job_place_slot(j, s);
 	peer_requeue(f, p);
-	if (!j->mixed)
+	if (!j->is_mixed)
 		job_pin(j, p->class);
 	add_lease_action(f, ACTION_SEND_LEASE, l);
 }
@@ -80,15 +80,15 @@ static void release_slot(struct farm *f, struct lease *l)
 {
 	struct slot *s = l->slot;
 	s->holder_count--;
-	l->job->outstanding_leases--;
-	l->job->owner->outstanding_leases--;
-	if (l->delivered)
-		l->peer->delivered_leases--;
+	l->job->outstanding_lease_count--;
+	l->job->owner->outstanding_lease_count--;
+	if (l->is_delivered)
+		l->peer->delivered_lease_count--;
 	else
-		l->peer->held_leases--;
+		l->peer->held_lease_count--;
 	for (const struct lease *k = s->leases; k; k = k->next)
-		if (k != l && !k->overdue)
-			s->holder_since = k->sent_at;
+		if (k != l && !k->is_overdue)
+			s->last_holder_sent_at = k->sent_at;
 	job_place_slot(l->job, s);
 	job_unpin_if_untouched(l->job);
 	if (!peer_wants_lease(l->peer) || list_is_empty(&l->peer->waiting_link))
@@ -98,13 +98,13 @@ static void release_slot(struct farm *f, struct lease *l)
 void lease_mark_delivered(struct farm *f, struct lease *l)
 {
 	struct peer *p = l->peer;
-	if (l->delivered)
+	if (l->is_delivered)
 		return;
-	l->delivered = true;
-	if (l->overdue)
+	l->is_delivered = true;
+	if (l->is_overdue)
 		return;
-	p->held_leases--;
-	p->delivered_leases++;
+	p->held_lease_count--;
+	p->delivered_lease_count++;
 	if (list_is_empty(&p->waiting_link))
 		peer_requeue(f, p);
 }
@@ -115,20 +115,20 @@ void lease_drop(struct farm *f, struct lease *l)
 	while (*at != l)
 		at = &(*at)->next;
 	*at = l->next;
-	if (!l->overdue)
+	if (!l->is_overdue)
 		release_slot(f, l);
-	l->in_use = false;
+	l->is_in_use = false;
 }
 
 void lease_revoke(struct farm *f, struct lease *l)
 {
-	add_lease_action(f, ACTION_REVOKE, l);
+	add_lease_action(f, ACTION_REVOKE_LEASE, l);
 	lease_drop(f, l);
 }
 
 void lease_expire(struct farm *f, struct lease *l)
 {
-	l->overdue = true;
+	l->is_overdue = true;
 	l->slot->timeout_count++;
 	l->job->counts.timeouts++;
 	release_slot(f, l);

@@ -11,7 +11,7 @@ struct job;
 struct peer;
 struct slot;
 
-struct lease_key lease_key(const struct lease *l);
+struct lease_key lease_get_key(const struct lease *l);
 struct lease *lease_find(const struct slot *s, const struct peer *p); /* NULL: p does not hold the slot's lease */
 
 /* Gives the slot's open lease to a worker that wants one. */

@@ -76,10 +76,10 @@ void lost_holders_add(struct farm *f, struct lease *l)
 {
 	struct job *j = l->job;
 	struct slot *s = l->slot;
-	const struct lease_key k = lease_key(l);
+	const struct lease_key k = lease_get_key(l);
 	const struct peer *p = l->peer;
 	uint32_t certificates, n;
-	bool counts = !l->overdue && !l->delivered;
+	bool counts = !l->is_overdue && !l->is_delivered;
 	lease_drop(f, l);
 	if (!counts)
 		return;
@@ -93,8 +93,8 @@ void lost_holders_add(struct farm *f, struct lease *l)
 		   "%s: %u workers in a row were lost while they held %s " LEASE_POSITION_FORMAT
 		   " (%d end the job); the last one: %s",
 		   j->name, n, LEASE_VALUES(&k), LOST_HOLDERS_FATAL, p->name);
-	text_copy(j->text, sizeof j->text, f->answer_text);
-	if (n < LOST_HOLDERS_FATAL || certificates < failure_quorum_required_certificates(f))
+	text_copy(j->explanation, sizeof j->explanation, f->answer_text);
+	if (n < LOST_HOLDERS_FATAL || certificates < failure_quorum_size_required(f))
 		return;
 	owner_limit(j->owner, f->now);
 	rounds_end_job(f, j, END_FAILED, f->answer_text);

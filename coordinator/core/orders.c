@@ -31,8 +31,8 @@ static void set_hold(struct job *j, enum job_hold hold, const char *reason, doub
 		return;
 	j->progress_floor = job_progress(j, now); /* must not go back when the job's clock moves on */
 	double pause = now - j->held_since;	  /* shifts the job's times by the time it was held; NAN stays NAN */
-	j->started += pause;
-	j->opened += pause;
+	j->started_at += pause;
+	j->first_round_at += pause;
 	j->estimate_requested_at += pause;
 	j->held_since = NAN;
 }
@@ -44,7 +44,7 @@ void orders_hold(struct farm *f, const struct event *ev)
 		set_hold(j, ev->hold, ev->text ? ev->text : "", f->now);
 }
 
-void orders_priority(struct farm *f, const struct event *ev)
+void orders_set_priority(struct farm *f, const struct event *ev)
 {
 	struct job *j = find_live_job(f, ev);
 	if (!j)

@@ -8,7 +8,7 @@
 struct farm;
 
 void orders_hold(struct farm *f, const struct event *ev);
-void orders_priority(struct farm *f, const struct event *ev);
+void orders_set_priority(struct farm *f, const struct event *ev);
 void orders_extend(struct farm *f, const struct event *ev);
 
 #endif

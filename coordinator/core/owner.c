@@ -41,7 +41,7 @@ void owner_limit(struct owner *o, double now)
 {
 	static const double first_limit_seconds = 60;
 	enum { DOUBLINGS = 6 };
-	o->limited_until =
-		now + ldexp(first_limit_seconds, o->limit_count < DOUBLINGS ? (int)o->limit_count : DOUBLINGS);
-	o->limit_count++;
+	o->limited_until = now + ldexp(first_limit_seconds,
+				       o->limitation_count < DOUBLINGS ? (int)o->limitation_count : DOUBLINGS);
+	o->limitation_count++;
 }

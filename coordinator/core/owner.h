@@ -12,10 +12,10 @@ enum { OWNER_NAME_SIZE = 72 };
 struct owner {
 	struct link link; /* in farm.owners */
 	uint32_t reference_count;
-	uint32_t outstanding_leases; /* by all jobs of this owner */
-	double wanted_machines;	     /* machines that its jobs could use; scratch of share.c */
-	uint32_t limit_count;	     /* number of times that a job of this owner ended workers */
-	double limited_until;	     /* -INFINITY: not limited */
+	uint32_t outstanding_lease_count; /* by all jobs of this owner */
+	double wanted_machines;		  /* machines that its jobs could use; scratch of share.c */
+	uint32_t limitation_count;	  /* number of times that a job of this owner ended workers */
+	double limited_until;		  /* -INFINITY: not limited */
 	char name[OWNER_NAME_SIZE];
 };
 

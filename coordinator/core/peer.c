@@ -10,9 +10,9 @@ enum { BACKOFF_DOUBLINGS_MAX = 6 };
 void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
 {
 	if (p->state == PEER_ACTIVE && s != PEER_ACTIVE)
-		p->class->active_count--;
+		p->class->active_peer_count--;
 	if (p->state != PEER_ACTIVE && s == PEER_ACTIVE)
-		p->class->active_count++;
+		p->class->active_peer_count++;
 	p->state = s;
 	peer_requeue(f, p);
 }
@@ -22,13 +22,14 @@ void peer_note_contact(struct farm *f, struct peer *p)
 	p->last_seen = f->now;
 	p->identity->contact_count += p->state == PEER_SILENT;
 	if (p->state == PEER_SILENT)
-		peer_set_state(f, p, p->identity->quarantined ? PEER_QUARANTINED : PEER_ACTIVE);
+		peer_set_state(f, p, p->identity->is_quarantined ? PEER_QUARANTINED : PEER_ACTIVE);
 }
 
 bool peer_wants_lease(const struct peer *p)
 {
-	return p->state == PEER_ACTIVE && p->held_leases < p->wanted_leases &&
-	       p->held_leases < p->identity->lease_window && p->held_leases + p->delivered_leases < p->lease_capacity;
+	return p->state == PEER_ACTIVE && p->held_lease_count < p->wanted_lease_count &&
+	       p->held_lease_count < p->identity->lease_window &&
+	       p->held_lease_count + p->delivered_lease_count < p->lease_capacity;
 }
 
 void peer_requeue(struct farm *f, struct peer *p)
@@ -76,13 +77,13 @@ static struct backoff *begin_backoff(const struct farm *f, struct peer *p, uint6
 
 static bool holds_leases(const struct peer *p)
 {
-	return p->held_leases + p->delivered_leases > 0;
+	return p->held_lease_count + p->delivered_lease_count > 0;
 }
 
 static bool holds_lease_of_job(const struct peer *p, uint64_t job)
 {
 	for (uint32_t i = 0; i < p->lease_capacity; i++)
-		if (p->leases[i].in_use && p->leases[i].job->id == job)
+		if (p->leases[i].is_in_use && p->leases[i].job->id == job)
 			return true;
 	return false;
 }
@@ -94,13 +95,13 @@ void peer_note_memory_full(const struct farm *f, struct peer *p, uint64_t job)
 	struct backoff *a = find_backoff(p, job);
 	bool holds_any = holds_leases(p);
 	p->identity->memory_full_until = f->now + f->config.initial_backoff;
-	p->identity->held_leases_when_full = holds_any;
-	if (a && a->until > f->now && !a->memory_full)
+	p->identity->had_leases_when_full = holds_any;
+	if (a && a->until > f->now && !a->is_memory_full)
 		return;
 	a = a ? a : begin_backoff(f, p, job);
-	a->worker_at_fault = a->memory_full = true;
+	a->is_worker_at_fault = a->is_memory_full = true;
 	/* If it holds leases of this job, the job waits for its own scene to leave the memory. */
-	a->held_leases = holds_any && !holds_lease_of_job(p, job);
+	a->had_leases = holds_any && !holds_lease_of_job(p, job);
 	a->until = f->now + f->config.initial_backoff;
 }
 
@@ -109,15 +110,15 @@ void peer_note_failure(const struct farm *f, struct peer *p, uint64_t job, bool 
 	struct backoff *a = find_backoff(p, job);
 	p->failures++;
 	if (a && a->until > f->now) {
-		a->worker_at_fault = a->worker_at_fault && worker_at_fault;
-		a->memory_full = false;
+		a->is_worker_at_fault = a->is_worker_at_fault && worker_at_fault;
+		a->is_memory_full = false;
 		return;
 	}
 	a = a ? a : begin_backoff(f, p, job);
 	uint32_t doublings = a->failures < BACKOFF_DOUBLINGS_MAX ? a->failures : BACKOFF_DOUBLINGS_MAX;
 	a->failures++;
-	a->worker_at_fault = worker_at_fault;
-	a->memory_full = false;
+	a->is_worker_at_fault = worker_at_fault;
+	a->is_memory_full = false;
 	a->until = f->now + ldexp(f->config.initial_backoff, (int)doublings);
 }
 
@@ -162,20 +163,21 @@ double peer_pause_end(const struct peer *p, const struct job *j)
 {
 	const struct backoff *a = find_backoff(p, j->id);
 	bool is_idle = !holds_leases(p), holds_job_lease = holds_lease_of_job(p, j->id);
-	double until = a && !(a->memory_full && a->held_leases && (is_idle || holds_job_lease)) ? a->until : -INFINITY,
+	double until = a && !(a->is_memory_full && a->had_leases && (is_idle || holds_job_lease)) ? a->until
+												  : -INFINITY,
 	       memory_end = p->identity->memory_full_until;
-	return memory_end > until && !(is_idle && p->identity->held_leases_when_full) && !holds_job_lease ? memory_end
-													  : until;
+	return memory_end > until && !(is_idle && p->identity->had_leases_when_full) && !holds_job_lease ? memory_end
+													 : until;
 }
 
 bool peer_is_at_fault(const struct peer *p, uint64_t job)
 {
 	const struct backoff *a = find_backoff(p, job);
-	return a && a->worker_at_fault;
+	return a && a->is_worker_at_fault;
 }
 
 bool peer_waits_for_memory(const struct peer *p, uint64_t job)
 {
 	const struct backoff *a = find_backoff(p, job);
-	return a && a->memory_full;
+	return a && a->is_memory_full;
 }

@@ -10,10 +10,10 @@
 enum { FINGERPRINT_SIZE = 128 };
 
 struct peer_class {
-	struct link link;	   /* in farm.classes */
-	struct link waiting_peers; /* workers that want a lease */
-	uint32_t reference_count;  /* references: workers and live jobs */
-	uint32_t active_count;	   /* workers that may get leases */
+	struct link link;	    /* in farm.classes */
+	struct link waiting_peers;  /* workers that want a lease */
+	uint32_t reference_count;   /* references: workers and live jobs */
+	uint32_t active_peer_count; /* workers that may get leases */
 	char fingerprint[FINGERPRINT_SIZE];
 };
 

@@ -47,12 +47,12 @@ static bool has_answered(const struct proof *p, const struct identity *identity)
 	return false;
 }
 
-bool proof_is_barred(const struct job *j, const struct slot *s, const struct peer *p)
+bool proof_bars_worker(const struct job *j, const struct slot *s, const struct peer *p)
 {
 	if (!is_verified(j, s))
 		return false;
 	for (const struct lease *l = s->leases; l; l = l->next)
-		if (!l->overdue && l->peer != p && l->peer->identity == p->identity)
+		if (!l->is_overdue && l->peer != p && l->peer->identity == p->identity)
 			return true;
 	return has_answered(proof_for_slot(j, s), p->identity);
 }
@@ -75,7 +75,7 @@ enum verify_outcome proof_add_answer(struct job *j, struct slot *s, struct ident
 	}
 	if (agrees)
 		return VERIFY_AGREES;
-	j->noted_slots += p->count == 0;
+	j->noted_slot_count += p->count == 0;
 	j->counts.mismatched += p->count == 1;
 	p->workers[p->count] = identity;
 	p->digests[p->count] = *d;

@@ -26,7 +26,7 @@ bool proof_is_required(const struct job *j, const struct lease_key *k);
 uint32_t proof_max_holders(const struct job *j, const struct slot *s);
 /* Whether the worker may not get the slot's lease: it has answered already, or holds the lease on another connection.
  */
-bool proof_is_barred(const struct job *j, const struct slot *s, const struct peer *p);
+bool proof_bars_worker(const struct job *j, const struct slot *s, const struct peer *p);
 /* Whether the slot waits for another worker: one holds or has answered its lease, and another answer is needed. */
 bool proof_is_pending(const struct job *j, const struct slot *s);
 

@@ -11,7 +11,7 @@
 /* Quarantines a worker permanently: it gets no leases, and nothing that it sends counts. */
 static void quarantine_worker(struct farm *f, struct identity *identity)
 {
-	if (identity->quarantined)
+	if (identity->is_quarantined)
 		return;
 	worker_registry_quarantine(f, identity);
 	struct action *a = update_add(f, ACTION_QUARANTINE);

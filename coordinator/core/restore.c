@@ -33,10 +33,10 @@ static void restore_times(struct farm *f, struct job *j, const struct event_rest
 {
 	if (isnan(r->elapsed))
 		return;
-	j->started = f->now - r->elapsed;
+	j->started_at = f->now - r->elapsed;
 	j->state = JOB_BOOTSTRAP;
 	if (j->kind == LEASE_RENDER)
-		j->opened = j->started + (isnan(r->opened) ? r->elapsed : r->opened);
+		j->first_round_at = j->started_at + (isnan(r->first_round_at) ? r->elapsed : r->first_round_at);
 }
 
 static void restore_looks(struct job *j, const struct forecast_history *looks)
@@ -45,7 +45,7 @@ static void restore_looks(struct job *j, const struct forecast_history *looks)
 	if (looks->count == 0)
 		return;
 	const struct forecast_look *last = &looks->looks[looks->count - 1];
-	j->rel_error = last->doubtful ? NAN : sqrt(last->rel_mse_upper);
+	j->rel_error = last->is_doubtful ? NAN : sqrt(last->rel_mse_upper);
 	j->rel_error_rounds = (uint64_t)(last->work / (double)plan_round_mutations(&j->plan));
 	job_update_forecast(j);
 }
@@ -103,9 +103,9 @@ void restore_job(struct farm *f, const struct event *ev)
 	j->progress_floor = job_progress(j, f->now);
 	if (j->kind != LEASE_RENDER)
 		return;
-	rounds_start_rendering(f, j, r->black);
+	rounds_start_rendering(f, j, r->is_black);
 	/* A bound that the last complete round met still applies. An estimate of the error that was due is made
 	 * again, with the same result. */
 	if (job_is_live(j) && j->rounds > 0)
-		rounds_check_bounds(f, j, isnan(r->completed) ? r->elapsed : r->completed);
+		rounds_check_bounds(f, j, isnan(r->last_round_end) ? r->elapsed : r->last_round_end);
 }

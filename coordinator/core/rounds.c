@@ -4,9 +4,9 @@
  *
  * Happy path: rounds_submit puts the job on the list of live jobs, ordered by priority. The first lease starts it
  * (rounds_start_job). When the bootstrap is merged, the shell prepares seeds and b (ACTION_BOOTSTRAP_DONE) and
- * rounds_prepared opens the first round. After each complete round rounds_check_bounds checks the bounds; if the error
- * has to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_estimated decides. rounds_end_job
- * revokes the leases that are out and has the image published.
+ * rounds_handle_prepared opens the first round. After each complete round rounds_check_bounds checks the bounds; if the
+ * error has to be estimated, the shell does that (ACTION_ESTIMATE_ERROR) and rounds_handle_error_estimated decides.
+ * rounds_end_job revokes the leases that are out and has the image published.
  *
  * Failures: a submission is rejected with a sentence (priority, too many jobs, job_new's reasons). A job fails when
  * its bootstrap cannot be prepared or when another file of the core ends it. A black bootstrap ends the job as done.
@@ -38,7 +38,7 @@ static void add_change_action(struct farm *f, const struct job *j)
 	struct action *a = add_job_action(f, ACTION_JOB_CHANGED, j);
 	a->state = j->state;
 	a->end = j->end;
-	a->text = j->text;
+	a->text = j->explanation;
 }
 
 void rounds_reject_event(struct farm *f, const struct event *ev, const char *text)
@@ -117,8 +117,8 @@ void rounds_submit(struct farm *f, const struct event *ev)
 
 void rounds_start_job(struct farm *f, struct job *j)
 {
-	if (isnan(j->started))
-		j->started = f->now;
+	if (isnan(j->started_at))
+		j->started_at = f->now;
 	if (j->state == JOB_QUEUED) {
 		j->state = JOB_BOOTSTRAP;
 		add_change_action(f, j);
@@ -134,7 +134,7 @@ static void forget_oldest_ended(struct farm *f, const struct job *latest)
 	uint32_t oldest = UINT32_MAX;
 	for (uint32_t i = 0; i < f->job_count; i++) {
 		const struct job *j = f->jobs[i];
-		if (!job_is_live(j) && j != latest && (oldest == UINT32_MAX || j->ended < f->jobs[oldest]->ended))
+		if (!job_is_live(j) && j != latest && (oldest == UINT32_MAX || j->ended_at < f->jobs[oldest]->ended_at))
 			oldest = i;
 	}
 	assert(oldest != UINT32_MAX);
@@ -155,8 +155,8 @@ void rounds_end_job(struct farm *f, struct job *j, enum job_end end, const char 
 	j->progress_floor = job_progress(j, f->now);
 	j->state = end == END_CANCELLED ? JOB_CANCELLED : end == END_FAILED ? JOB_FAILED : JOB_DONE;
 	j->end = end;
-	j->ended = f->now;
-	text_copy(j->text, sizeof j->text, text);
+	j->ended_at = f->now;
+	text_copy(j->explanation, sizeof j->explanation, text);
 	verify_forget_job(f, j);
 	if (j->class)
 		peer_class_release(j->class);
@@ -187,9 +187,9 @@ void rounds_cancel(struct farm *f, const struct event *ev)
 
 static void request_error_estimate(struct farm *f, struct job *j)
 {
-	j->evaluating = true;
+	j->is_estimating_error = true;
 	j->estimate_requested_at = f->now;
-	add_job_action(f, ACTION_EVALUATE_ERROR, j);
+	add_job_action(f, ACTION_ESTIMATE_ERROR, j);
 }
 
 enum job_end rounds_met_bound(const struct job *j, double elapsed)
@@ -214,14 +214,14 @@ void rounds_check_bounds(struct farm *f, struct job *j, double elapsed)
 	}
 }
 
-void rounds_round_complete(struct farm *f, struct job *j)
+void rounds_handle_round_done(struct farm *f, struct job *j)
 {
 	if (j->kind == LEASE_RENDER) {
 		add_job_action(f, ACTION_ROUND_DONE, j);
 		rounds_check_bounds(f, j, job_elapsed(j, f->now));
 		return;
 	}
-	j->preparing = true;
+	j->is_preparing = true;
 	add_job_action(f, ACTION_BOOTSTRAP_DONE, j);
 }
 
@@ -235,12 +235,12 @@ void rounds_start_rendering(struct farm *f, struct job *j, bool black)
 	add_change_action(f, j);
 }
 
-void rounds_prepared(struct farm *f, const struct event *ev)
+void rounds_handle_prepared(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->prepared.job);
-	if (!j || !job_is_live(j) || !j->preparing)
+	if (!j || !job_is_live(j) || !j->is_preparing)
 		return;
-	j->preparing = false;
+	j->is_preparing = false;
 	if (!ev->prepared.ok) {
 		rounds_end_job(f, j, END_FAILED, ev->text ? ev->text : "");
 		return;
@@ -249,19 +249,19 @@ void rounds_prepared(struct farm *f, const struct event *ev)
 	rounds_start_rendering(f, j, ev->prepared.black);
 }
 
-void rounds_image_published(struct farm *f, const struct event *ev)
+void rounds_handle_image_published(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->image_published.job);
 	if (j && j->state == JOB_DONE)
 		j->chains_disagree = ev->image_published.chains_disagree;
 }
 
-void rounds_error_estimated(struct farm *f, const struct event *ev)
+void rounds_handle_error_estimated(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->error_estimated.job);
-	if (!j || !job_is_live(j) || !j->evaluating || ev->error_estimated.rounds != j->rounds)
+	if (!j || !job_is_live(j) || !j->is_estimating_error || ev->error_estimated.rounds != j->rounds)
 		return;
-	j->evaluating = false;
+	j->is_estimating_error = false;
 	j->progress_floor = job_progress(j, f->now);
 	j->rel_error = ev->error_estimated.doubtful ? NAN : ev->error_estimated.rel_error;
 	j->rel_error_rounds = j->rounds;

@@ -19,10 +19,10 @@ void rounds_start_rendering(struct farm *f, struct job *j, bool black); /* b and
 /* Checks the bounds after a complete round. elapsed: seconds from the first lease to the end of that round. */
 void rounds_check_bounds(struct farm *f, struct job *j, double elapsed);
 /* A round, or the bootstrap, has become complete. */
-void rounds_round_complete(struct farm *f, struct job *j);
-void rounds_prepared(struct farm *f, const struct event *ev);
-void rounds_error_estimated(struct farm *f, const struct event *ev);
-void rounds_image_published(struct farm *f, const struct event *ev);
+void rounds_handle_round_done(struct farm *f, struct job *j);
+void rounds_handle_prepared(struct farm *f, const struct event *ev);
+void rounds_handle_error_estimated(struct farm *f, const struct event *ev);
+void rounds_handle_image_published(struct farm *f, const struct event *ev);
 void rounds_end_job(struct farm *f, struct job *j, enum job_end end, const char *text);
 
 void rounds_insert_live(struct farm *f, struct job *j); /* into the list of live jobs, sorted by priority, then id */

@@ -9,7 +9,7 @@
 
 bool share_jobs_compete(const struct job *a, const struct job *b)
 {
-	return !a->class || !b->class || a->mixed || b->mixed || a->class == b->class;
+	return !a->class || !b->class || a->is_mixed || b->is_mixed || a->class == b->class;
 }
 
 /* Returns how many machines all open leases of the job would keep busy if each machine takes `leases_each`. */
@@ -17,7 +17,7 @@ static double wanted_machines(const struct job *j, double leases_each)
 {
 	if (job_is_held(j))
 		return 0;
-	uint32_t open = j->rounds + 1 >= j->round_limit ? j->slot_count - j->slots_done : j->slot_count;
+	uint32_t open = j->rounds + 1 >= j->round_limit ? j->slot_count - j->done_slot_count : j->slot_count;
 	return open / leases_each;
 }
 
@@ -30,7 +30,7 @@ static uint32_t count_machines(const struct farm *f, const struct job *j, double
 		if (p->state != PEER_ACTIVE || !job_accepts_class(j, p->class))
 			continue;
 		machines++;
-		leases += p->wanted_leases;
+		leases += p->wanted_lease_count;
 	}
 	*leases_each = leases > 0 ? leases / machines : 1;
 	return machines;
@@ -39,7 +39,7 @@ static uint32_t count_machines(const struct farm *f, const struct job *j, double
 static bool is_first_lease(const struct lease *l)
 {
 	for (const struct lease *k = l->peer->leases; k < l; k++)
-		if (k->in_use && !k->overdue && k->job == l->job)
+		if (k->is_in_use && !k->is_overdue && k->job == l->job)
 			return false;
 	return true;
 }
@@ -49,7 +49,7 @@ static uint32_t count_workers(const struct job *j)
 	uint32_t n = 0;
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		for (const struct lease *l = j->slots[i].leases; l; l = l->next)
-			n += !l->overdue && is_first_lease(l);
+			n += !l->is_overdue && is_first_lease(l);
 	return n;
 }
 
@@ -61,36 +61,36 @@ static const struct job *competitor_at(const struct farm *f, uint32_t i, const s
 	return r->priority == j->priority && share_jobs_compete(r, j) && (!o || r->owner == o) ? r : NULL;
 }
 
-/* Equal division of `machines` machines among takers with different wants ("water filling"). level: what each taker
- * gets at most; allocated: total of the wants below the level; above_count: number of wants above it. */
-struct level {
+/* Equal division of `machines` machines among takers with different wants ("water filling"). fair_level: what each
+ * taker gets at most; allocated: total of the wants below the level; unsatisfied_count: number of wants above it. */
+struct fair_level {
 	double machines, allocated, level;
-	uint32_t above_count;
+	uint32_t unsatisfied_count;
 };
 
-static void level_add(struct level *v, double wanted)
+static void level_add(struct fair_level *v, double wanted)
 {
 	if (wanted > v->level)
-		v->above_count++;
+		v->unsatisfied_count++;
 	else
 		v->allocated += wanted;
 }
 
 /* Raises the level as far as the machines allow and starts a new count. Returns true when the level is final. */
-static bool raise_level(struct level *v)
+static bool raise_level(struct fair_level *v)
 {
-	if (v->above_count == 0)
+	if (v->unsatisfied_count == 0)
 		return true;
-	double next = (v->machines - v->allocated) / v->above_count;
+	double next = (v->machines - v->allocated) / v->unsatisfied_count;
 	if (!(next > v->level))
 		return true;
-	*v = (struct level){.machines = v->machines, .level = next};
+	*v = (struct fair_level){.machines = v->machines, .level = next};
 	return false;
 }
 
 static double machines_due(const struct farm *f, const struct job *j, uint32_t machines, double leases_each)
 {
-	struct level v = {.machines = machines};
+	struct fair_level v = {.machines = machines};
 	for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
 		list_entry(k, struct owner, link)->wanted_machines = 0;
 	for (uint32_t i = 0; i < f->live_job_count; i++) {
@@ -104,13 +104,13 @@ static double machines_due(const struct farm *f, const struct job *j, uint32_t m
 		for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
 			level_add(&v, list_entry(k, struct owner, link)->wanted_machines);
 	while (!raise_level(&v));
-	v = (struct level){.machines = fmin(j->owner->wanted_machines, v.above_count ? v.level : INFINITY)};
+	v = (struct fair_level){.machines = fmin(j->owner->wanted_machines, v.unsatisfied_count ? v.level : INFINITY)};
 	do
 		for (uint32_t i = 0; i < f->live_job_count; i++)
 			if (competitor_at(f, i, j, j->owner))
 				level_add(&v, wanted_machines(f->live_jobs[i], leases_each));
 	while (!raise_level(&v));
-	return fmin(wanted_machines(j, leases_each), v.above_count ? v.level : INFINITY);
+	return fmin(wanted_machines(j, leases_each), v.unsatisfied_count ? v.level : INFINITY);
 }
 
 /* Writes which other jobs go first (higher) or take turns with j, as in "; j4, j7 and 2 more come first".
@@ -174,11 +174,11 @@ bool share_is_limited(const struct farm *f, const struct job *j)
 	return j->owner->limited_until > f->now && !job_has_answers(j);
 }
 
-uint32_t share_unanswered_leases(const struct farm *f, const struct owner *o)
+uint32_t share_count_unanswered_leases(const struct farm *f, const struct owner *o)
 {
 	uint32_t n = 0;
 	for (uint32_t i = 0; i < f->live_job_count; i++)
 		if (f->live_jobs[i]->owner == o && !job_has_answers(f->live_jobs[i]))
-			n += f->live_jobs[i]->outstanding_leases;
+			n += f->live_jobs[i]->outstanding_lease_count;
 	return n;
 }

@@ -30,6 +30,6 @@ bool share_jobs_compete(const struct job *a, const struct job *b); /* whether bo
 /* Whether the job's owner is limited (owner.h) and nothing of the job was computed yet. */
 bool share_is_limited(const struct farm *f, const struct job *j);
 /* Returns how many leases of this owner's jobs that have no result yet are with workers. */
-uint32_t share_unanswered_leases(const struct farm *f, const struct owner *o);
+uint32_t share_count_unanswered_leases(const struct farm *f, const struct owner *o);
 
 #endif

@@ -14,9 +14,9 @@ struct slot;
 
 /* A lease held by one worker. Stored in the worker's table and linked to the slot. */
 struct lease {
-	bool in_use;
-	bool overdue;	/* timed out: no longer counts as held, but an answer still counts */
-	bool delivered; /* its result has arrived but is not judged yet: no longer counts as work to do */
+	bool is_in_use;
+	bool is_overdue;   /* timed out: no longer counts as held, but an answer still counts */
+	bool is_delivered; /* its result has arrived but is not judged yet: no longer counts as work to do */
 	struct peer *peer;
 	struct job *job;
 	/* The lease is for the slot's next epoch, so merging that epoch ends all leases of the slot. */
@@ -40,11 +40,11 @@ struct doubt {
 	uint64_t maker;		     /* worker that made the states; 0: not known */
 	uint64_t previous_maker;     /* worker that made the states one epoch earlier; 0: not known */
 	uint64_t refuser;	     /* first worker that refused the states; 0: none */
-	uint64_t barred;	     /* maker of an epoch that was taken back and is computed again; 0: none */
+	uint64_t barred_maker;	     /* maker of an epoch that was taken back and is computed again; 0: none */
 	uint64_t rollback_watermark; /* highest `next_epoch` from which an epoch was taken back; 0: none, or passed
 					since */
 	uint32_t rollback_count;     /* epochs taken back since the slot last got beyond `rollback_watermark` */
-	bool from_seeds;	     /* its chains start the next epoch from their seeds */
+	bool starts_from_seeds;	     /* its chains start the next epoch from their seeds */
 };
 
 /* Workers that were lost while they held the slot's next lease; see lost_holders.h. */
@@ -60,10 +60,10 @@ struct lost_holders {
 };
 
 struct slot {
-	struct link link;     /* in one of the job's lists; in none with two holders or after the last epoch */
-	struct lease *leases; /* all leases for the next epoch, including overdue ones */
-	uint64_t next_epoch;  /* first epoch that is not merged */
-	double holder_since;  /* when the lease of the remaining holder was sent */
+	struct link link;	    /* in one of the job's lists; in none with two holders or after the last epoch */
+	struct lease *leases;	    /* all leases for the next epoch, including overdue ones */
+	uint64_t next_epoch;	    /* first epoch that is not merged */
+	double last_holder_sent_at; /* when the lease of the remaining holder was sent */
 	struct failure_quorum failure_quorum; /* workers that failed with the next epoch */
 	struct lost_holders lost_holders;     /* workers that were lost while they held the next epoch */
 	struct doubt doubt;		      /* about the states that the next epoch starts from */
@@ -73,7 +73,7 @@ struct slot {
 /* Whether a worker has refused the states and another one is asked about them. */
 static inline bool doubt_is_pending(const struct slot *s)
 {
-	return s->doubt.refuser && !s->doubt.from_seeds;
+	return s->doubt.refuser && !s->doubt.starts_from_seeds;
 }
 
 #endif

@@ -24,7 +24,7 @@ struct job {
 	struct owner *owner;
 	char name[JOB_NAME_SIZE];
 	int priority;
-	bool mixed;
+	bool is_mixed;
 	double verify_fraction;
 	uint64_t verify_seed;
 	struct plan plan;
@@ -32,27 +32,27 @@ struct job {
 	enum job_end end;
 	struct peer_class *class; /* class of workers that the job is pinned to; NULL: not pinned, or ended */
 	char fingerprint[FINGERPRINT_SIZE];
-	double submitted, started, ended;
+	double submitted_at, started_at, ended_at;
 
 	uint32_t slot_count;
-	struct slot *slots;   /* [groups][parts]; NULL once the job has ended */
-	struct proof *proofs; /* [groups][parts]; NULL: not verified, or ended */
-	uint32_t noted_slots; /* slots with an answer that waits for an equal one */
-	enum lease_kind kind; /* kind of the open leases */
-	uint64_t rounds;      /* number of complete rounds of this kind */
-	uint64_t round_limit; /* number of rounds of this kind in the plan */
-	/* slots_done: slots that have merged round `rounds`; slots_ahead: slots that have also merged the round after
-	 * it */
-	uint32_t slots_done, slots_ahead;
-	bool has_slots_far_ahead; /* a slot has merged even more, because an epoch of another slot was taken back */
-	/* Lists of slots: [0] of the first incomplete round, [1] of the next round. Nobody holds slots in `ready`,
-	 * one worker holds those in `leased`. */
-	struct link ready[2], leased[2];
-	struct link awaiting_second[2]; /* like `ready`, for slots that wait for another worker's answer */
-	struct link blocked;		/* slots whose next epoch is beyond both open rounds */
-	uint32_t outstanding_leases;
+	struct slot *slots;	   /* [groups][parts]; NULL once the job has ended */
+	struct proof *proofs;	   /* [groups][parts]; NULL: not verified, or ended */
+	uint32_t noted_slot_count; /* slots with an answer that waits for an equal one */
+	enum lease_kind kind;	   /* kind of the open leases */
+	uint64_t rounds;	   /* number of complete rounds of this kind */
+	uint64_t round_limit;	   /* number of rounds of this kind in the plan */
+	/* done_slot_count: slots that have merged round `rounds`; ahead_slot_count: slots that have also merged the
+	 * round after it */
+	uint32_t done_slot_count, ahead_slot_count;
+	bool has_far_ahead_slot; /* a slot has merged even more, because an epoch of another slot was taken back */
+	/* Lists of slots: [0] of the first incomplete round, [1] of the next round. Nobody holds slots in
+	 * `ready_slots`, one worker holds those in `leased_slots`. */
+	struct link ready_slots[2], leased_slots[2];
+	struct link awaiting_second_answer[2]; /* like `ready_slots`, for slots that wait for another worker's answer */
+	struct link blocked_slots;	       /* slots whose next epoch is beyond both open rounds */
+	uint32_t outstanding_lease_count;
 
-	bool preparing, evaluating;
+	bool is_preparing, is_estimating_error;
 	bool chains_disagree;	  /* see EVENT_IMAGE_PUBLISHED */
 	enum job_end pending_end; /* bound that ends the job after one last estimate of the error; END_NONE: none */
 
@@ -61,7 +61,7 @@ struct job {
 	double median_duration; /* of `durations`; NAN: nothing merged yet */
 	struct rate rate;
 	double progress_floor, rel_error;
-	double opened;		      /* start of the first round; NAN: not yet */
+	double first_round_at;	      /* start of the first round; NAN: not yet */
 	double estimate_requested_at; /* when the last estimate of the error was asked for */
 	struct forecast_history looks;
 	struct forecast_cost target_cost, halving_cost;
@@ -69,7 +69,7 @@ struct job {
 	struct job_counts counts;
 	struct failure_quorum failure_quorum; /* workers that failed with any of the job's leases */
 	uint32_t failed_attempts; /* failures; several leases of one worker that fail at once count as one */
-	char text[256];
+	char explanation[256];
 	char hold_reasons[JOB_HOLD_COUNT][256]; /* why the job is held, by enum job_hold; "": no such reason */
 	double held_since;			/* since when the job is held; NAN: it is not held */
 	/* When a file of the job's scene was found missing or damaged, or was repaired; 0: never. */
@@ -86,9 +86,9 @@ struct peer {
 	char home[IDENTITY_HOME_SIZE];
 	uint64_t restarts;
 	struct peer_class *class;
-	uint32_t threads, wanted_leases;
-	uint32_t held_leases; /* leases that are neither overdue nor delivered */
-	uint32_t delivered_leases;
+	uint32_t threads, wanted_lease_count;
+	uint32_t held_lease_count; /* leases that are neither overdue nor delivered */
+	uint32_t delivered_lease_count;
 	enum peer_state state;
 	struct link waiting_link;
 	uint64_t queue_position; /* place in the order of waiting, see farm.next_queue_position */
@@ -118,9 +118,9 @@ struct farm {
 	struct link classes, owners;
 	uint32_t waiting_count;	      /* workers that want a lease */
 	uint64_t next_queue_position; /* next place in the order of waiting */
-	double expiry_check_at;	      /* nothing can time out before this time */
-	double copy_check_at;	      /* when give_up_copies is due again */
-	double schedule_at;	      /* when a lease may go out even without another event */
+	double next_expiry_check_at;  /* nothing can time out before this time */
+	double next_copy_check_at;    /* when give_up_copies is due again */
+	double next_schedule_at;      /* when a lease may go out even without another event */
 	struct action *actions;
 	size_t action_count, action_capacity;
 	size_t lease_capacity; /* limits of leases of all workers together */

@@ -66,11 +66,11 @@ static const struct job *find_blocking_job(const struct farm *f, const struct jo
 	const struct job *busiest = NULL;
 	for (uint32_t i = 0; i < f->live_job_count; i++) {
 		const struct job *o = f->live_jobs[i];
-		if (o == j || !o->outstanding_leases || !share_jobs_compete(o, j))
+		if (o == j || !o->outstanding_lease_count || !share_jobs_compete(o, j))
 			continue;
 		if (o->priority > j->priority)
 			return o;
-		if (!busiest || o->outstanding_leases > busiest->outstanding_leases)
+		if (!busiest || o->outstanding_lease_count > busiest->outstanding_lease_count)
 			busiest = o;
 	}
 	return busiest;
@@ -80,7 +80,7 @@ static uint32_t count_active_workers(const struct farm *f)
 {
 	uint32_t n = 0;
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next)
-		n += list_entry(k, struct peer_class, link)->active_count;
+		n += list_entry(k, struct peer_class, link)->active_peer_count;
 	return n;
 }
 
@@ -108,12 +108,12 @@ static bool put_memory_wait(const struct farm *f, const struct job *j, char *tex
 /* j->last_fault has the form "worker: why". */
 static void put_last_failure(const struct job *j, char *text, size_t size)
 {
-	const char *colon = strstr(j->text, ": ");
+	const char *colon = strstr(j->explanation, ": ");
 	if (colon)
-		text_print(text, size, "no worker can compute it; worker %.*s failed last%s", (int)(colon - j->text),
-			   j->text, colon);
+		text_print(text, size, "no worker can compute it; worker %.*s failed last%s",
+			   (int)(colon - j->explanation), j->explanation, colon);
 	else
-		text_print(text, size, "no worker can compute it: %s", j->text);
+		text_print(text, size, "no worker can compute it: %s", j->explanation);
 }
 
 /* Names the workers whose own machines are at fault, because somebody has to repair those machines. */
@@ -128,7 +128,7 @@ static void put_failing_workers(const struct farm *f, const struct job *j, char 
 	if (*names)
 		text_print(text, size,
 			   "no worker can compute it, because of a problem on the machines of %s; the last one: %s",
-			   names, j->text);
+			   names, j->explanation);
 	else
 		put_last_failure(j, text, size);
 }
@@ -167,9 +167,9 @@ static bool put_late_leases(const struct farm *f, const struct job *j, char *tex
 	for (uint32_t i = 0; i < j->slot_count; i++) {
 		const struct slot *s = &j->slots[i];
 		for (const struct lease *l = s->leases; l; l = l->next) {
-			if (l->overdue)
+			if (l->is_overdue)
 				continue;
-			if (l->delivered || job_copy_due_time(&f->config, j, s) > f->now)
+			if (l->is_delivered || job_copy_due_time(&f->config, j, s) > f->now)
 				return false;
 			count++;
 			if (!oldest || l->sent_at < oldest->sent_at)
@@ -187,35 +187,36 @@ static bool put_late_leases(const struct farm *f, const struct job *j, char *tex
 static const struct job *describe_wait(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
-	if (!job_is_live(j) || (j->outstanding_leases && !job_is_held(j) && !put_late_leases(f, j, text, size)) ||
+	if (!job_is_live(j) || (j->outstanding_lease_count && !job_is_held(j) && !put_late_leases(f, j, text, size)) ||
 	    *text)
 		return NULL;
 	uint32_t active = count_active_workers(f);
 	const struct job *other = find_blocking_job(f, j);
 	if (job_is_held(j))
 		put_hold_reasons(j, text, size);
-	else if (j->preparing)
+	else if (j->is_preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
-	else if (j->evaluating && (j->pending_end != END_NONE || !job_find_ready_slot(j)))
+	else if (j->is_estimating_error && (j->pending_end != END_NONE || !job_find_ready_slot(j)))
 		snprintf(text, size, "its error is being estimated");
 	else if (f->peer_count == 0)
 		snprintf(text, size, "no worker is connected");
 	else if (active == 0)
 		snprintf(text, size, "no worker responds and is not quarantined (%u connected)", f->peer_count);
-	else if (j->class && !j->mixed && j->class->active_count == 0)
+	else if (j->class && !j->is_mixed && j->class->active_peer_count == 0)
 		snprintf(text, size, "no connected worker has fingerprint %s (%u have others)", j->fingerprint, active);
 	else if (verify_describe_wait(f, j, text, size) || doubt_describe_wait(f, j, text, size))
 		return NULL;
-	else if (share_is_limited(f, j) && share_unanswered_leases(f, j->owner))
+	else if (share_is_limited(f, j) && share_count_unanswered_leases(f, j->owner))
 		snprintf(text, size,
 			 "a job of its owner crashed workers: one lease at a time until a result arrives (for %.0f s)",
 			 j->owner->limited_until - f->now);
-	else if (answer_all_workers_failed(f, j))
+	else if (answer_have_all_workers_failed(f, j))
 		put_failing_workers(f, j, text, size);
 	else if (put_memory_wait(f, j, text, size))
 		return NULL;
 	else if (has_paused_worker(f, j))
-		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
+		text_print(text, size, "its workers failed and pause before they try again; the last one: %s",
+			   j->explanation);
 	else if (!other)
 		snprintf(text, size, "no worker asks for work");
 	else {
@@ -236,7 +237,7 @@ static void fill_waiting(const struct farm *f, const struct job *j, struct job_s
 /* Needs the result of fill_waiting. */
 static void fill_eta(const struct job *j, double now, struct job_status *s)
 {
-	bool idle = *s->waiting && !j->preparing && !j->evaluating;
+	bool idle = *s->waiting && !j->is_preparing && !j->is_estimating_error;
 	struct forecast_range eta = job_eta(j, idle, now);
 	s->eta = eta.middle;
 	s->eta_low = eta.low;
@@ -250,7 +251,7 @@ static void fill_counts(const struct job *j, struct job_status *s)
 	s->leases_merged = j->leases_merged;
 	double slots = (double)j->plan.groups * j->plan.parts;
 	s->mutations = (uint64_t)((double)j->leases_merged * ((double)plan_round_mutations(&j->plan) / slots));
-	s->leases = j->outstanding_leases;
+	s->leases = j->outstanding_lease_count;
 	s->counts = j->counts;
 }
 
@@ -279,21 +280,21 @@ bool farm_job_status(const struct farm *f, uint64_t id, double now, struct job_s
 		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
 		.fingerprint = j->fingerprint,
-		.submitted = j->submitted,
-		.started = j->started,
-		.ended = j->ended,
+		.submitted_at = j->submitted_at,
+		.started_at = j->started_at,
+		.ended_at = j->ended_at,
 		.progress = job_progress(j, now),
 		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
 		.chains_disagree = j->chains_disagree,
 		.rel_error = j->rel_error,
-		.bootstrap_seconds = j->opened - j->started,
+		.bootstrap_seconds = j->first_round_at - j->started_at,
 		.looks = &j->looks,
 		.halving_cpu = j->halving_cost.cpu_seconds,
 		.halving_seconds = job_halving_seconds(j, now),
 	};
 	fill_counts(j, s);
 	fill_share(f, j, s);
-	memcpy(s->why, j->text, sizeof s->why);
+	memcpy(s->why, j->explanation, sizeof s->why);
 	fill_waiting(f, j, s);
 	fill_eta(j, now, s);
 	return true;
@@ -318,8 +319,8 @@ bool farm_job_expects_results(const struct farm *f, uint64_t id, int *priority)
 {
 	const struct job *j = farm_find_job(f, id);
 	*priority = j ? j->priority : 0;
-	return j && job_is_live(j) && !*j->hold_reasons[HOLD_FILES] && !*j->hold_reasons[HOLD_BY_USER] &&
-	       (j->outstanding_leases || *j->hold_reasons[HOLD_STORAGE]);
+	return j && job_is_live(j) && !*j->hold_reasons[HOLD_FILES] && !*j->hold_reasons[HOLD_USER] &&
+	       (j->outstanding_lease_count || *j->hold_reasons[HOLD_STORAGE]);
 }
 
 bool farm_peer_status(const struct farm *f, uint64_t id, struct peer_status *s)
@@ -334,8 +335,8 @@ bool farm_peer_status(const struct farm *f, uint64_t id, struct peer_status *s)
 		.name = p->name,
 		.fingerprint = p->class->fingerprint,
 		.threads = p->threads,
-		.wanted_leases = p->wanted_leases,
-		.held_leases = p->held_leases,
+		.wanted_leases = p->wanted_lease_count,
+		.held_leases = p->held_lease_count,
 		.state = p->state,
 		.joined_at = p->joined_at,
 		.last_seen = p->last_seen,
@@ -360,7 +361,7 @@ uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
 	uint64_t next = 0;
 	for (uint32_t i = 0; i < f->registry_count; i++) {
 		const struct identity *k = f->registry[i];
-		if (k->quarantined && k->id > after && (next == 0 || k->id < next))
+		if (k->is_quarantined && k->id > after && (next == 0 || k->id < next))
 			next = k->id;
 	}
 	return next;
@@ -378,7 +379,7 @@ bool farm_worker_status(const struct farm *f, uint64_t worker_id, struct worker_
 				    .home = k->home,
 				    .last_fault = k->last_fault,
 				    .wrong_results = k->wrong_results,
-				    .quarantined = k->quarantined};
+				    .is_quarantined = k->is_quarantined};
 	return true;
 }
 
@@ -387,12 +388,12 @@ bool farm_lease_status(const struct farm *f, uint64_t peer, uint32_t i, struct l
 	const struct peer *p = farm_find_peer(f, peer);
 	for (uint32_t k = 0; p && k < p->lease_capacity; k++) {
 		const struct lease *l = &p->leases[k];
-		if (!l->in_use || i-- > 0)
+		if (!l->is_in_use || i-- > 0)
 			continue;
 		*s = (struct lease_status){
-			.key = lease_key(l),
+			.key = lease_get_key(l),
 			.sent_at = l->sent_at,
-			.overdue = l->overdue,
+			.is_overdue = l->is_overdue,
 		};
 		return true;
 	}

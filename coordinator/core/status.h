@@ -16,11 +16,11 @@ struct job_status {
 	const struct plan *plan;
 	enum job_state state;
 	enum job_end end;
-	const char *fingerprint;	      /* "": not pinned */
-	double submitted, started, ended;     /* s; started: when the first lease was sent. NAN: not yet */
-	bool chains_disagree;		      /* the chains of its final image disagree */
-	double rel_error;		      /* as last estimated; NAN: no estimate */
-	const struct forecast_history *looks; /* estimates of the error, oldest first */
+	const char *fingerprint;		   /* "": not pinned */
+	double submitted_at, started_at, ended_at; /* s; started_at: when the first lease was sent. NAN: not yet */
+	bool chains_disagree;			   /* the chains of its final image disagree */
+	double rel_error;			   /* as last estimated; NAN: no estimate */
+	const struct forecast_history *looks;	   /* estimates of the error, oldest first */
 	/* Cost of halving the error: CPU seconds and seconds; valid if there are estimates. */
 	struct forecast_range halving_cpu, halving_seconds;
 	uint64_t bootstrap_merged;
@@ -53,7 +53,7 @@ struct peer_status {
 struct lease_status {
 	struct lease_key key;
 	double sent_at;
-	bool overdue; /* handed out again; this worker's answer still counts if it is the first */
+	bool is_overdue; /* handed out again; this worker's answer still counts if it is the first */
 };
 
 /* Returns the smallest id of a connected worker above `after` (start with 0); 0: no more. */
@@ -65,7 +65,7 @@ struct worker_status {
 	uint64_t worker_id, restarts;
 	const char *certificate, *name, *home, *last_fault;
 	uint32_t wrong_results;
-	bool quarantined;
+	bool is_quarantined;
 };
 /* Returns the smallest id of a quarantined worker above `after` (start with 0); 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);

@@ -33,8 +33,8 @@ enum job_end {
 	END_FAILED,
 };
 
-/* What becomes of a result that cannot be judged yet; see answer_delivery (answer.h). */
-enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_USELESS };
+/* What becomes of a result that cannot be judged yet; see answer_judge_delivery (answer.h). */
+enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_REFUSED };
 
 enum action_kind {
 	ACTION_SUBMITTED, /* tag, job: the id of the new job */
@@ -46,10 +46,11 @@ enum action_kind {
 	 * epoch - 1; with epoch 0, send the seeds. The shell keeps one set of states per (job, group, part): that of
 	 * the last merge. */
 	ACTION_SEND_LEASE,
-	ACTION_REVOKE, /* peer, key: the worker may drop the lease; if an answer still comes, handle it as usual */
+	ACTION_REVOKE_LEASE, /* peer, key: the worker may drop the lease; if an answer still comes, handle it as usual
+			      */
 	/* peer, key: merge this event's batch now, exactly once. Comes before all actions that depend on it. */
-	ACTION_MERGE,
-	ACTION_ACK, /* peer, key, ack, text: the answer to this event's batch */
+	ACTION_MERGE_BATCH,
+	ACTION_ACKNOWLEDGE, /* peer, key, ack, text: the answer to this event's batch */
 	/* job: the bootstrap is complete. Compute b, seeds and canvas, and answer with EVENT_PREPARED, at once or
 	 * later. */
 	ACTION_BOOTSTRAP_DONE,
@@ -57,14 +58,14 @@ enum action_kind {
 	/* job, rounds: estimate the error of exactly this prefix and answer with EVENT_ERROR_ESTIMATED. Later batches
 	 * of the job should wait for the answer; a batch that would complete the next round before the answer is
 	 * refused, so the prefix does not change. */
-	ACTION_EVALUATE_ERROR,
+	ACTION_ESTIMATE_ERROR,
 	ACTION_PUBLISH,	      /* job, rounds: write the image of these rounds; the job is done */
 	ACTION_JOB_CHANGED,   /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many jobs have ended; the core no longer knows this one */
 	/* worker_id, job, key, text: take the batch of this lease, the last of its (group, part), out of the films. The
 	 * earlier states are current again, and the lease goes out once more. Occurs only if the event had
 	 * can_roll_back set. */
-	ACTION_ROLL_BACK,
+	ACTION_ROLL_BACK_EPOCH,
 	ACTION_RESTART_CHAINS, /* job, key, text: the chains of this lease start from their seeds (doubt.h) */
 	/* worker_id, job, key, text: a worker has given a wrong result: its noted answer differs from one that two
 	 * others agree on, or it made wrong chain states or refused good ones (doubt.h). */
@@ -73,15 +74,15 @@ enum action_kind {
 	ACTION_CLOSE_PEER, /* peer, text: disconnect; the core has already forgotten the peer */
 };
 
-enum ack { ACK_MERGED, ACK_REPEAT, ACK_REFUSED, ACK_NOTED };
+enum ack { ACK_MERGED, ACK_REPEATED, ACK_REFUSED, ACK_NOTED };
 
 struct action {
 	enum action_kind kind;
 	enum ack ack;
 	enum job_state state;
 	enum job_end end;
-	bool verified;	 /* MERGE: two workers have sent equal results, or a journal contained it */
-	bool from_seeds; /* SEND_LEASE: send seeds, whatever the epoch */
+	bool is_verified;	/* MERGE: two workers have sent equal results, or a journal contained it */
+	bool starts_from_seeds; /* SEND_LEASE: send seeds, whatever the epoch */
 	uint64_t tag, peer;
 	/* MERGE, ROLL_BACK (0: not known), WRONG_RESULT, QUARANTINE: the identity of the worker, whatever its
 	 * connection (see struct peer_status). */

@@ -24,7 +24,7 @@ void verify_forget_worker(struct farm *f, const struct identity *identity);
 void verify_unpin_stranded_jobs(struct farm *f);
 /* Whether workers of this class may begin a job that must be verified: the class has at least two active workers, or
  * no other class has. */
-bool verify_can_begin(const struct farm *f, const struct job *j, const struct peer_class *c);
+bool verify_class_can_begin(const struct farm *f, const struct job *j, const struct peer_class *c);
 /* Writes why the job waits for another worker to verify a lease. Returns false if it does not wait for that. */
 bool verify_describe_wait(const struct farm *f, const struct job *j, char *text, size_t size);
 

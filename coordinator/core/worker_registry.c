@@ -18,7 +18,9 @@ struct identity *worker_registry_find(const struct farm *f, const struct event_j
 static bool is_evicted_before(const struct identity *a, const struct identity *b, const char *certificate)
 {
 	bool a_own = strcmp(a->certificate, certificate) == 0, b_own = strcmp(b->certificate, certificate) == 0;
-	return a->quarantined != b->quarantined ? b->quarantined : a_own != b_own ? a_own : a->last_seen < b->last_seen;
+	return a->is_quarantined != b->is_quarantined ? b->is_quarantined
+	       : a_own != b_own			      ? a_own
+						      : a->last_seen < b->last_seen;
 }
 
 /* Returns an entry for a newcomer that is not in the index, either new or of a worker that is forgotten for it. NULL:
@@ -88,9 +90,9 @@ struct identity *worker_registry_acquire(struct farm *f, const struct event_join
 		return NULL;
 	}
 	/* A quarantined worker stays known by the name and home it had. */
-	if (!k->quarantined || strcmp(k->home, e->home) == 0)
+	if (!k->is_quarantined || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
-	if (!k->quarantined) {
+	if (!k->is_quarantined) {
 		identity_index_remove(&f->identity_index, k);
 		text_copy(k->name, sizeof k->name, e->name);
 		text_copy(k->home, sizeof k->home, e->home);
@@ -124,18 +126,18 @@ void worker_registry_quarantine(struct farm *f, struct identity *identity)
 	uint32_t count = 0;
 	for (uint32_t i = 0; i < f->registry_count; i++) {
 		struct identity *k = f->registry[i];
-		if (!k->quarantined || k == identity || k->certificate_id != identity->certificate_id)
+		if (!k->is_quarantined || k == identity || k->certificate_id != identity->certificate_id)
 			continue;
 		count++;
 		if (k->reference_count == 0 && (!oldest || k->last_seen < oldest->last_seen))
 			oldest = k;
 	}
 	if (count >= IDENTITY_QUARANTINED_MAX && oldest)
-		oldest->quarantined = false;
-	identity->quarantined = true;
+		oldest->is_quarantined = false;
+	identity->is_quarantined = true;
 }
 
-void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text)
+void worker_registry_restore(struct farm *f, const struct event_join *e, const char *text)
 {
 	const char *refusal;
 	struct identity *k = worker_registry_acquire(f, e, &refusal);

@@ -30,6 +30,6 @@ struct identity *worker_registry_find(const struct farm *f, const struct event_j
 /* Marks the worker; quarantine.h does the rest. */
 void worker_registry_quarantine(struct farm *f, struct identity *identity);
 /* Restores a worker that was quarantined in an earlier run of the coordinator. */
-void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text);
+void worker_registry_restore(struct farm *f, const struct event_join *e, const char *text);
 
 #endif

@@ -18,7 +18,7 @@ static const struct option_row option_rows[] = {
 	{"ca", 0, "DIR", "The authority's folder, if not ~/.hslt-ca", OPTION_TEXT(struct arguments, ca),
 	 .environment = "HSLT_CA"},
 	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650), or a time such as 36h",
-	 OPTION_TIME(struct arguments, seconds, 0, 36500, 86400), .min_excluded = true},
+	 OPTION_TIME(struct arguments, seconds, 0, 36500, 86400), .excludes_min = true},
 	{"renew", 0, NULL, "Replace an existing certificate and key of the same name and role",
 	 OPTION_FLAG(struct arguments, renew)},
 	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, authority_name),

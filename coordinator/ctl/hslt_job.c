@@ -6,7 +6,7 @@
  * words, and ends the program with an error.
  */
 #include "common/base/progress.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/exr/output_files.h"
 #include "common/net/client.h"
 #include "coordinator/ctl/job_options.h"
@@ -219,8 +219,8 @@ static int send_control(struct client *cl, const struct job_options *o, struct e
  * no image. */
 static int fetch_preview(struct client *cl, const struct job_options *o, struct error *e)
 {
-	char preview_path[TARGET_PATH_MAX];
-	struct target t;
+	char preview_path[OUTPUT_TARGET_PATH_MAX];
+	struct output_target t;
 	bool is_renamed = false;
 	int rc = client_local_error(client_preview_name(o->output, preview_path, sizeof preview_path, e));
 	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}},
@@ -228,8 +228,8 @@ static int fetch_preview(struct client *cl, const struct job_options *o, struct 
 	if (!rc)
 		rc = client_local_error(output_files_check(&outputs, NULL, 0, e));
 	if (!rc)
-		rc = client_local_error(target_resolve(&t, o->output, e));
-	if (!rc && !t.write_directly)
+		rc = client_local_error(output_target_resolve(&t, o->output, e));
+	if (!rc && !t.writes_directly)
 		rc = client_local_error(output_files_check(&preview_outputs, NULL, 0, e));
 	if (!rc)
 		rc = client_fetch_preview(cl, o->job, o->output, &is_renamed, e);
@@ -238,7 +238,7 @@ static int fetch_preview(struct client *cl, const struct job_options *o, struct 
 			(unsigned long long)o->job, preview_path, o->output);
 	else if (!rc)
 		fprintf(stderr, "j%llu: preview, the image so far, in %s\n", (unsigned long long)o->job,
-			target_display_name(o->output));
+			output_target_display_name(o->output));
 	return rc;
 }
 
@@ -256,7 +256,7 @@ static int fetch_image(struct client *cl, const struct job_options *o, struct er
 	if (!rc)
 		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
 			o->preview ? "preview, the image so far," : "image",
-			o->output ? target_display_name(o->output) : name);
+			o->output ? output_target_display_name(o->output) : name);
 	return rc;
 }
 

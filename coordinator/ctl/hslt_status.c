@@ -37,7 +37,7 @@ struct arguments {
 
 static const struct option_row option_rows[] = {
 	{"socket", 0, "PATH", "The coordinator's status socket", OPTION_TEXT(struct arguments, socket),
-	 .environment = "HSLT_STATUS_SOCKET", .required = true},
+	 .environment = "HSLT_STATUS_SOCKET", .is_required = true},
 	{"all", 0, NULL, "Also list jobs that ended before the last 50", OPTION_FLAG(struct arguments, all)},
 	{"json", 0, NULL, "Print JSON, one object per line", OPTION_FLAG(struct arguments, json)},
 	{"watch", 0, NULL, "Print again on every change, until the job has ended",
@@ -266,7 +266,7 @@ static void print_convergence(const json_t *job)
 	classes_from_json(json_object_get(job, "classes"), classes);
 	if (json_is_number(json_object_get(o, "rHatWorst")))
 		printf("       chains: %s; R-hat %.3g in the median, %.3g in the worst of %u tiles\n",
-		       get_text(o, "verdict"), a.r_hat_median, a.max_r_hat, a.tiles);
+		       get_text(o, "verdict"), a.median_r_hat, a.max_r_hat, a.tiles);
 	convergence_print_table(classes, get_number(job, "b"), &a, text, sizeof text);
 	fputs(text, stdout);
 }

@@ -26,7 +26,7 @@ static const char *state_at(size_t i)
 
 static const struct option_row option_rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
-	 .environment = "HSLT_COORDINATOR", .required = true},
+	 .environment = "HSLT_COORDINATOR", .is_required = true},
 	{"output", 'o', "FILE",
 	 "fetch: the output file, replaced only if it is an image; -: stdout (without -o: a file in the current folder, "
 	 "named by the last part of the name given to hslt-submit; never replaces a file)",
@@ -41,10 +41,10 @@ static const struct option_row option_rows[] = {
 	{"mutations", 0, "+N", "extend: additional mutations or samples",
 	 OPTION_COUNT(struct job_options, more_mutations, 1, 1e18)},
 	{"time", 0, "+SECONDS", "extend: additional time (90, 5m, 2h)",
-	 OPTION_SECONDS(struct job_options, more_seconds, 0, 1e9), .min_excluded = true},
+	 OPTION_SECONDS(struct job_options, more_seconds, 0, 1e9), .excludes_min = true},
 	{"target-error", 0, "E",
 	 "extend: until the estimated relative error is 0.02 or 2%; bounds already reached and not named here no longer apply",
-	 OPTION_RATIO(struct job_options, target_error, 0, 1), .min_excluded = true},
+	 OPTION_RATIO(struct job_options, target_error, 0, 1), .excludes_min = true},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct job_options, tls), .environment = "HSLT_TLS"},
 	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",

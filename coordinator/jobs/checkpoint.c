@@ -2,8 +2,8 @@
 /*
  * Checkpoints: films, seeds, chain states and counters of a job in one file, so that its journal can start over.
  *
- * checkpoint_start_due starts a checkpoint when a job's journal has grown beyond the limit of room_journal_limit, one
- * job at a time. The thread pool writes the next journal (with the last results of each group and part, which may
+ * checkpoint_start_due starts a checkpoint when a job's journal has grown beyond the limit of storage_journal_limit,
+ * one job at a time. The thread pool writes the next journal (with the last results of each group and part, which may
  * still have to be taken back), then checkpoint.tmp, flushes it, renames it to checkpoint and flushes the folder.
  * Results that arrive meanwhile wait in memory. Then the new journal is used and older ones are deleted.
  *
@@ -19,7 +19,7 @@
 #include "coordinator/live_job/rollback.h"
 #include "coordinator/live_job/checkpoint_file.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/store/journal_file.h"
 
@@ -39,7 +39,7 @@ struct checkpoint_task {
 	size_t merged_record_count;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
-	bool rename_uncertain; /* the checkpoint was renamed, but perhaps not durably */
+	bool is_rename_uncertain; /* the checkpoint was renamed, but perhaps not durably */
 	struct error error;
 };
 
@@ -66,10 +66,10 @@ static void write_checkpoint(uv_work_t *work)
 		w->rc = disk_rename(temporary, name) ? error_file(&w->error, errno, name) : 0;
 	if (!w->rc) {
 		w->rc = disk_sync_folder(w->folder, &w->error);
-		w->rename_uncertain = w->rc != 0;
+		w->is_rename_uncertain = w->rc != 0;
 	}
 	if (w->rc) {
-		if (!w->rename_uncertain)
+		if (!w->is_rename_uncertain)
 			disk_unlink(temporary);
 		journal_release(w->journal);
 		w->journal = NULL;
@@ -96,7 +96,7 @@ static void on_cleanup_done(uv_work_t *work, int status)
 {
 	struct journal_cleanup *t = work->data;
 	(void)status;
-	t->jobs->checkpointing = false; /* not earlier, so that journal_delete_others cannot meet a newer journal */
+	t->jobs->is_checkpointing = false; /* not earlier, so that journal_delete_others cannot meet a newer journal */
 	mem_free(t);
 }
 
@@ -107,7 +107,7 @@ static void delete_old_journals(struct jobs *jobs, struct journal *old, const ch
 	if (!t) {
 		journal_release(old);
 		journal_delete_others(folder, kept_generation);
-		jobs->checkpointing = false;
+		jobs->is_checkpointing = false;
 		return;
 	}
 	*t = (struct journal_cleanup){.jobs = jobs, .old_journal = old, .kept_generation = kept_generation};
@@ -124,17 +124,17 @@ static void on_checkpoint_written(uv_work_t *work, int status)
 	assert(status == 0);
 	(void)status;
 	/* A crash may leave this checkpoint with its journal, or the old pair; both contain everything acknowledged. */
-	if (w->rc && (w->rename_uncertain || job->checkpoint_uncertain)) {
-		job->checkpoint_uncertain = true;
+	if (w->rc && (w->is_rename_uncertain || job->is_checkpoint_uncertain)) {
+		job->is_checkpoint_uncertain = true;
 		job->min_generation = w->head.generation + 1;
-		job->checkpoint_not_before = jobs_now(jobs) + jobs->config.retry_seconds;
+		job->min_checkpoint_time = jobs_now(jobs) + jobs->config.retry_seconds;
 	} else if (w->rc) { /* the old checkpoint and journal stay in use */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		bool room = disk_is_full(w->rc) && room_evict(jobs);
-		job->checkpoint_not_before = jobs_now(jobs) + (room ? jobs->config.retry_seconds : retry_pause_seconds);
+		bool room = disk_is_full(w->rc) && storage_evict(jobs);
+		job->min_checkpoint_time = jobs_now(jobs) + (room ? jobs->config.retry_seconds : retry_pause_seconds);
 		journal_delete_others(w->folder, journal_generation(job->journal));
 	} else {
-		job->checkpoint_uncertain = false;
+		job->is_checkpoint_uncertain = false;
 		journal_mark_settled(job->journal);
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
 			  (unsigned long long)canvas_complete_rounds(job->canvas), (unsigned long long)w->bytes,
@@ -145,16 +145,16 @@ static void on_checkpoint_written(uv_work_t *work, int status)
 		mem_free(job->merged_records);
 		job->merged_records = w->merged_records;
 		job->merged_record_count = w->merged_record_count;
-		job->kept_record_bytes = journal_bytes(job->journal);
+		job->merged_record_bytes = journal_bytes(job->journal);
 		w->merged_records = NULL;
 	}
 	mem_free(w->merged_records);
-	job->busy = false;
-	jobs->checkpointing = jobs->checkpointing && !w->rc;
+	job->is_busy = false;
+	jobs->is_checkpointing = jobs->is_checkpointing && !w->rc;
 	/* This ends the job at once if it was cancelled. */
-	if (!jobs->stopping && job->checkpoint_uncertain)
+	if (!jobs->is_stopping && job->is_checkpoint_uncertain)
 		durable_hold_job(jobs, job, "its results cannot be stored", w->error.text);
-	if (!jobs->stopping) {
+	if (!jobs->is_stopping) {
 		jobs_notify_films_free(jobs);
 		jobs->peers.serve_previews(jobs->peers.user, id);
 	}
@@ -168,7 +168,7 @@ static void start_checkpoint(struct jobs *jobs, struct live_job *job, uint64_t m
 	struct checkpoint_task *w = mem_alloc(1, sizeof *w);
 	if (!w || !farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		mem_free(w);
-		job->checkpoint_not_before = jobs_now(jobs) + retry_pause_seconds;
+		job->min_checkpoint_time = jobs_now(jobs) + retry_pause_seconds;
 		return;
 	}
 	w->jobs = jobs;
@@ -176,27 +176,27 @@ static void start_checkpoint(struct jobs *jobs, struct live_job *job, uint64_t m
 	w->max_kept_bytes = max_kept_bytes;
 	spool_job_path(jobs->spool, job->id, NULL, w->folder);
 	checkpoint_head_fill(&w->head, job, &status);
-	job->busy = jobs->checkpointing = true;
+	job->is_busy = jobs->is_checkpointing = true;
 	jobs_queue_work(jobs, &w->work, w, write_checkpoint, on_checkpoint_written);
 }
 
 void checkpoint_start_due(struct jobs *jobs)
 {
 	/* One at a time, because the results of its job wait in memory meanwhile. */
-	if (jobs->stepping || jobs->stopping || jobs->checkpointing)
+	if (jobs->is_stepping || jobs->is_stopping || jobs->is_checkpointing)
 		return;
-	const bool ample = room_is_ample(jobs);
+	const bool ample = storage_is_ample(jobs);
 	for (struct live_job *job = jobs->live_jobs; job; job = job->next) {
-		/* Stored results that wait (late.h) exist only in the journal. */
-		if (!job->canvas || job->busy || job->ended || job->late_count)
+		/* Stored results that wait (late_results.h) exist only in the journal. */
+		if (!job->canvas || job->is_busy || job->has_ended || job->late_result_count)
 			continue;
 		if (canvas_missing_count(job->canvas)) /* a batch that was taken back is being computed again */
 			continue;
-		uint64_t limit = room_journal_limit(jobs, job, ample);
-		if ((journal_bytes(job->journal) - job->kept_record_bytes > limit || job->checkpoint_uncertain) &&
-		    jobs_now(jobs) >= job->checkpoint_not_before)
+		uint64_t limit = storage_journal_limit(jobs, job, ample);
+		if ((journal_bytes(job->journal) - job->merged_record_bytes > limit || job->is_checkpoint_uncertain) &&
+		    jobs_now(jobs) >= job->min_checkpoint_time)
 			start_checkpoint(jobs, job, limit);
-		if (jobs->checkpointing)
+		if (jobs->is_checkpointing)
 			return;
 	}
 }

@@ -18,10 +18,10 @@
 #include "common/plan/plan_text.h"
 #include "coordinator/live_job/rollback.h"
 #include "coordinator/live_job/incoming.h"
-#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/late_results.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/publish.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 
@@ -61,7 +61,7 @@ static void add_submitted_job(struct jobs *jobs, const struct action *a, const s
 	submission->job_id = a->job;
 	do
 		rc = store_submission(jobs, a->job, submission, &job, &e);
-	while (disk_is_full(rc) && room_evict(jobs));
+	while (disk_is_full(rc) && storage_evict(jobs));
 	if (rc) {
 		*in->refusal = e;
 		jobs_defer_failure(jobs, a->job, e.text);
@@ -98,8 +98,9 @@ static void note_job_change(struct jobs *jobs, const struct action *a)
 		     : a->state == JOB_DONE ? LOG_JOB_DONE
 					    : LOG_JOB_STATE,
 		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
-		     a->end == END_NONE ? "none" : job_end_name(a->end), log_u64(a->rounds), log_quote(a->text).text);
-	job->ended = job_state_is_end(a->state);
+		     a->end == END_NONE ? "none" : job_end_name(a->end), log_value_from_u64(a->rounds),
+		     log_quote(a->text).text);
+	job->has_ended = job_state_is_end(a->state);
 }
 
 void dispatch_prepare(struct jobs *jobs, struct live_job *job)
@@ -107,22 +108,22 @@ void dispatch_prepare(struct jobs *jobs, struct live_job *job)
 	struct error e = {""};
 	int rc = live_job_prepare(job, jobs_film_folder(jobs, &job->plan), &e);
 	if (rc && rc != -ENOMEM) {
-		if (!job->prepare_pending)
+		if (!job->is_prepare_pending)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
 				     log_quote(e.text).text);
-		job->prepare_pending = true;
+		job->is_prepare_pending = true;
 		job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
-	job->prepare_pending = false;
+	job->is_prepare_pending = false;
 	if (!rc)
 		live_job_log(job, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d",
-			     job->bootstrap_result.b_pooled, job->bootstrap_result.beyond_share,
-			     (int)job->bootstrap_result.black);
+			     job->bootstrap_result.b_pooled, job->bootstrap_result.overlong_share,
+			     (int)job->bootstrap_result.is_black);
 	struct event ev = {.kind = EVENT_PREPARED,
 			   .job = job->id,
 			   .text = e.text,
-			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->bootstrap_result.black}};
+			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->bootstrap_result.is_black}};
 	jobs_defer_event(jobs, &ev);
 }
 
@@ -133,8 +134,8 @@ static void write_partials(const struct jobs *jobs, const struct lease_key *k, c
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", jobs->config.partials_folder,
-			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
-			 in->batch->tiles[i].y);
+			 log_value_from_u64(k->job), log_value_from_u64(k->epoch), k->group, k->part,
+			 in->batch->tiles[i].x, in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 		int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
 		if (fd >= 0 && disk_close(fd) && !rc)
@@ -149,7 +150,7 @@ static void merge_result(struct jobs *jobs, const struct action *a, const struct
 {
 	struct live_job *job = jobs_find_live(jobs, a->job);
 	struct error e;
-	assert(job && in->batch && !job->busy);
+	assert(job && in->batch && !job->is_busy);
 	if (jobs->config.partials_folder)
 		write_partials(jobs, &a->key, in);
 	uint64_t rounds = live_job_complete_rounds(job);
@@ -165,21 +166,21 @@ static void merge_result(struct jobs *jobs, const struct action *a, const struct
 			"text=\"no memory to merge a result: exiting; after a restart all jobs continue from the disk\"");
 		_exit(1);
 	}
-	job->overflowed = job->overflowed || rc == -ERANGE;
+	job->has_overflowed = job->has_overflowed || rc == -ERANGE;
 	if (rc)
 		jobs_defer_failure(jobs, a->job, e.text);
-	trust_count_merged(job, a);
+	trust_count_unverified(job, a);
 	live_job_note_times(job, farm_job_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
-	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_u64(a->job), log_u64(a->peer),
-		  LEASE_VALUES(&a->key), in->is_stored ? " late=1" : "");
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_value_from_u64(a->job),
+		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key), in->is_stored ? " late=1" : "");
 }
 
 static void roll_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
 	struct live_job *job = jobs_find_live(jobs, a->job);
-	assert(job && !job->busy && in->rollback);
+	assert(job && !job->is_busy && in->rollback);
 	rollback_apply(job, in->rollback);
-	trust_discount_result(job, a->worker_id);
+	trust_discount_unverified(job, a->worker_id);
 	live_job_log(job, LOG_BATCH_TAKEN_BACK, LEASE_FORMAT " text=%s", LEASE_VALUES(&a->key),
 		     log_quote(a->text).text);
 }
@@ -188,34 +189,36 @@ static void acknowledge_result(struct jobs *jobs, const struct action *a)
 {
 	const struct live_job *job = jobs_find_live(jobs, a->job);
 	const char *name = jobs->peers.peer_name(jobs->peers.user, a->peer);
-	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* the original result may not be on disk yet */
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEATED && job)) /* the original result may not be on disk yet */
 		durable_ack(jobs, job, a->peer, &a->key, a->ack);
 	else
 		jobs->peers.acknowledge_result(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
-		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
-			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
-						: LOG_BATCH_REFUSED,
-			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_u64(a->job), log_u64(a->peer),
-			  log_quote(name ? name : "?").text, LEASE_VALUES(&a->key), log_quote(a->text).text);
+		log_event(a->ack == ACK_REPEATED ? LOG_BATCH_REPEATED
+			  : a->ack == ACK_NOTED	 ? LOG_BATCH_NOTED
+						 : LOG_BATCH_REFUSED,
+			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_value_from_u64(a->job),
+			  log_value_from_u64(a->peer), log_quote(name ? name : "?").text, LEASE_VALUES(&a->key),
+			  log_quote(a->text).text);
 }
 
 static void send_lease(struct jobs *jobs, const struct action *a)
 {
 	struct live_job *job = jobs_find_live(jobs, a->job);
-	if (!jobs->peers.peer_name(jobs->peers.user, a->peer) || !job || late_claim_lease(job, &a->key, a->peer))
+	if (!jobs->peers.peer_name(jobs->peers.user, a->peer) || !job ||
+	    late_results_claim_lease(job, &a->key, a->peer))
 		return;
 	live_job_count_worker(job, a->peer);
-	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->from_seeds);
-	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
-		  LEASE_VALUES(&a->key));
+	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->starts_from_seeds);
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->job),
+		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
 }
 
 static void revoke_lease(struct jobs *jobs, const struct action *a)
 {
 	jobs->peers.revoke_lease(jobs->peers.user, a->peer, &a->key);
-	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
-		  LEASE_VALUES(&a->key));
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->job),
+		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
 }
 
 static void close_peer(struct jobs *jobs, const struct action *a)
@@ -242,19 +245,19 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 		case ACTION_SEND_LEASE:
 			send_lease(jobs, a);
 			break;
-		case ACTION_REVOKE:
+		case ACTION_REVOKE_LEASE:
 			revoke_lease(jobs, a);
 			break;
-		case ACTION_MERGE:
+		case ACTION_MERGE_BATCH:
 			merge_result(jobs, a, in);
 			break;
-		case ACTION_ACK:
+		case ACTION_ACKNOWLEDGE:
 			acknowledge_result(jobs, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
 			dispatch_prepare(jobs, jobs_find_live(jobs, a->job));
 			break;
-		case ACTION_EVALUATE_ERROR:
+		case ACTION_ESTIMATE_ERROR:
 			publish_start(jobs, jobs_find_live(jobs, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
@@ -263,7 +266,7 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 		case ACTION_JOB_CHANGED:
 			note_job_change(jobs, a);
 			break;
-		case ACTION_ROLL_BACK:
+		case ACTION_ROLL_BACK_EPOCH:
 			roll_back(jobs, a, in);
 			break;
 		case ACTION_RESTART_CHAINS:

@@ -21,9 +21,9 @@
 #include "common/wire/frame.h"
 #include "coordinator/live_job/incoming.h"
 #include "coordinator/live_job/stored.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
-#include "coordinator/retention/keep.h"
+#include "coordinator/retention/kept_films.h"
 
 #include <assert.h>
 #include <stdlib.h>
@@ -35,10 +35,10 @@ enum {
 enum { NO_PEER = 0 /* no peer: peers are numbered from 1 */ };
 
 /* A job whose end is not recorded on disk yet. */
-struct ending {
-	struct ending *next;
+struct unrecorded_end {
+	struct unrecorded_end *next;
 	struct job_record record;
-	bool films_kept; /* its films are kept (keep.h), and it may be extended meanwhile */
+	bool has_kept_films; /* its films are kept (kept_films.h), and it may be extended meanwhile */
 };
 
 struct durable_ack {
@@ -86,7 +86,7 @@ int durable_add_job(struct jobs *jobs, struct live_job *job, struct error *e)
 			       .name = job->record.name,
 			       .version = HSLT_VERSION,
 			       .priority = job->record.priority,
-			       .mixed = live_job_submission(job)->mixed,
+			       .is_mixed = live_job_submission(job)->mixed,
 			       .submitted = job->record.submitted};
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	int rc = durable_pack_job(job, &j, &submission, &plan, e);
@@ -116,30 +116,30 @@ static int ledger_end_with_reserve(struct jobs *jobs, const struct job_record *r
 		       : rc;
 }
 
-/* Records the end of a job, and deletes its films once the ledger durably contains the end. films_kept: the films stay
- * (keep.h). */
+/* Records the end of a job, and deletes its films once the ledger durably contains the end. has_kept_films: the films
+ * stay (kept_films.h). */
 static int write_end(struct jobs *jobs, const struct job_record *r, bool films_kept, struct error *e)
 {
 	int rc = ledger_end_job(jobs->ledger, r, films_kept, e);
 	if (rc && !r->has_result && !films_kept) /* its films are useless now, and may be what fills the disk */
-		keep_drop_films(jobs, r->id);
+		kept_films_drop(jobs, r->id);
 	if (disk_is_full(rc))
-		keep_drop_all_films(jobs);
+		kept_films_drop_all(jobs);
 	if (rc)
 		rc = ledger_end_with_reserve(jobs, r, films_kept, e);
 	if (!rc && !films_kept)
-		keep_drop_films(jobs, r->id);
+		kept_films_drop(jobs, r->id);
 	return rc;
 }
 
 static void queue_ending(struct jobs *jobs, const struct job_record *r, bool films_kept)
 {
-	struct ending *n = mem_alloc(1, sizeof *n);
+	struct unrecorded_end *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
-	*n = (struct ending){jobs->endings, *r, films_kept};
-	jobs->endings = n;
-	jobs->endings_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
+	*n = (struct unrecorded_end){jobs->unrecorded_ends, *r, films_kept};
+	jobs->unrecorded_ends = n;
+	jobs->unrecorded_ends_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 }
 
 void durable_restore_end(struct jobs *jobs, const struct job_record *r)
@@ -157,7 +157,7 @@ int durable_end_job(struct jobs *jobs, struct live_job *job)
 	struct error e;
 	if (journal_write(job->journal, &e)) /* for an extension; results that are not written are computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(jobs, &job->record, keep_wants_films(jobs, job, &job->record), &e);
+	int rc = write_end(jobs, &job->record, kept_films_are_wanted(jobs, job, &job->record), &e);
 	if (rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
@@ -176,12 +176,12 @@ int durable_end_job(struct jobs *jobs, struct live_job *job)
 
 int durable_end_early(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
 {
-	return ledger_end_with_reserve(jobs, r, keep_wants_films(jobs, job, r), e);
+	return ledger_end_with_reserve(jobs, r, kept_films_are_wanted(jobs, job, r), e);
 }
 
 int durable_check_ended(const struct jobs *jobs, uint64_t job, struct error *e)
 {
-	for (const struct ending *n = jobs->endings; n; n = n->next)
+	for (const struct unrecorded_end *n = jobs->unrecorded_ends; n; n = n->next)
 		if (n->record.id == job)
 			return error_set(e, EIO, "its record cannot be written yet, and is tried again");
 	return 0;
@@ -190,13 +190,13 @@ int durable_check_ended(const struct jobs *jobs, uint64_t job, struct error *e)
 static void retry_endings(struct jobs *jobs)
 {
 	struct error e;
-	if (!jobs->endings || jobs_now(jobs) < jobs->endings_retry_at)
+	if (!jobs->unrecorded_ends || jobs_now(jobs) < jobs->unrecorded_ends_retry_at)
 		return;
-	jobs->endings_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
-	for (struct ending *n; (n = jobs->endings);) {
-		if (write_end(jobs, &n->record, n->films_kept, &e))
+	jobs->unrecorded_ends_retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
+	for (struct unrecorded_end *n; (n = jobs->unrecorded_ends);) {
+		if (write_end(jobs, &n->record, n->has_kept_films, &e))
 			return;
-		jobs->endings = n->next;
+		jobs->unrecorded_ends = n->next;
 		mem_free(n);
 	}
 }
@@ -204,10 +204,10 @@ static void retry_endings(struct jobs *jobs)
 static void set_storage_hold(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
-	if (!*text != !job->held_for_storage) {
+	if (!*text != !job->is_held_for_storage) {
 		live_job_log(job, *text ? LOG_JOB_HELD : LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released",
 			     log_quote(text).text);
-		job->held_for_storage = *text != 0;
+		job->is_held_for_storage = *text != 0;
 	}
 	job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
 	jobs_step(jobs, &ev);
@@ -227,7 +227,7 @@ static int reserve_memory(const struct jobs *jobs, struct live_job *job, const s
 	uint64_t before = chain_states_bytes(current, job->chains_per_lease);
 	uint64_t after = chain_states_bytes(b->states, b->state_count);
 	uint64_t total = job->state_bytes - before + after,
-		 blocker = after > before ? room_states_blocker(jobs, job, total) : 0;
+		 blocker = after > before ? storage_find_states_blocker(jobs, job, total) : 0;
 	job->blocked_state_bytes = blocker ? total : 0;
 	return blocker ? error_set(e, ENOMEM, "memory has no room for its chain states beside those of j%llu",
 				   (unsigned long long)blocker)
@@ -239,17 +239,17 @@ static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct in
 {
 	int rc;
 	do {
-		uint64_t blocker = room_write_blocker(jobs, job);
+		uint64_t blocker = storage_find_write_blocker(jobs, job);
 		rc = blocker ? error_set(e, ENOSPC,
 					 "the disk has no room for its results besides those of j%llu, which go first",
 					 (unsigned long long)blocker)
-		     : room_fits_checkpoint(jobs, job, size)
+		     : storage_fits_checkpoint(jobs, job, size)
 			     ? journal_reserve(job->journal, size + PINNED_RECORD_BYTES, e)
 			     : error_set(e, ENOSPC,
 					 "the space left on the disk is needed for a checkpoint of its results");
 		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 			rc = canvas_reserve(job->canvas, in->batch, e);
-	} while (disk_is_full(rc) && room_evict(jobs));
+	} while (disk_is_full(rc) && storage_evict(jobs));
 	return rc;
 }
 
@@ -259,7 +259,7 @@ int durable_reserve_result(struct jobs *jobs, struct live_job *job, struct incom
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
 	} result = {in->result}; /* generated structures have no const members */
-	if (job->checkpoint_uncertain)
+	if (job->is_checkpoint_uncertain)
 		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, result.to), NULL, 0, &in->frame, &in->frame_size,
 			       e);
@@ -281,10 +281,10 @@ int durable_reserve_result(struct jobs *jobs, struct live_job *job, struct incom
 static int write_pinned(struct jobs *jobs, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
-	if (job->fingerprint_journaled || !farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status) ||
+	if (job->is_fingerprint_journaled || !farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status) ||
 	    !*status.fingerprint)
 		return 0;
-	job->fingerprint_journaled = true;
+	job->is_fingerprint_journaled = true;
 	return journal_append(job->journal, JOURNAL_FINGERPRINT, NULL, elapsed, status.fingerprint,
 			      strlen(status.fingerprint), NULL, e);
 }
@@ -327,7 +327,7 @@ static void drop_ack(struct durable_ack *a)
 /* Keeps an acknowledgement whose flush failed until the journal is replaced. */
 static void park_ack(struct jobs *jobs, struct durable_ack *a)
 {
-	struct live_job *job = jobs->stopping ? NULL : jobs_find_live(jobs, a->key.job);
+	struct live_job *job = jobs->is_stopping ? NULL : jobs_find_live(jobs, a->key.job);
 	if (!job) {
 		drop_ack(a);
 		return;
@@ -337,7 +337,7 @@ static void park_ack(struct jobs *jobs, struct durable_ack *a)
 		return;
 	}
 	STAILQ_INSERT_HEAD(&jobs->parked_acks, a, next);
-	if (!job->held_for_storage)
+	if (!job->is_held_for_storage)
 		durable_hold_job(jobs, job, "its results cannot be stored", strerror(-a->flush_error));
 }
 
@@ -348,9 +348,9 @@ static void finish_ack(struct jobs *jobs, struct durable_ack *a)
 		return;
 	}
 	if (a->ack == ACK_MERGED)
-		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->key.job), log_u64(a->peer),
-			  LEASE_VALUES(&a->key));
-	if (!jobs->stopping && a->peer != NO_PEER)
+		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->key.job),
+			  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
+	if (!jobs->is_stopping && a->peer != NO_PEER)
 		jobs->peers.acknowledge_result(jobs->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);
 }
@@ -361,7 +361,7 @@ static void on_journals_flushed(uv_work_t *work, int status)
 	struct jobs *jobs = w->jobs;
 	assert(status == 0);
 	(void)status;
-	jobs->flushing = false;
+	jobs->is_flushing = false;
 	for (struct durable_ack *a; (a = STAILQ_FIRST(&w->acks));) {
 		STAILQ_REMOVE_HEAD(&w->acks, next);
 		finish_ack(jobs, a);
@@ -372,7 +372,7 @@ static void on_journals_flushed(uv_work_t *work, int status)
 
 static void flush_next(struct jobs *jobs)
 {
-	if (jobs->flushing || STAILQ_EMPTY(&jobs->acks))
+	if (jobs->is_flushing || STAILQ_EMPTY(&jobs->acks))
 		return;
 	struct journal_flush *w = mem_alloc(1, sizeof *w);
 	if (!w) /* as with events: without 200 bytes nothing can continue */
@@ -380,7 +380,7 @@ static void flush_next(struct jobs *jobs)
 	w->jobs = jobs;
 	STAILQ_INIT(&w->acks);
 	STAILQ_CONCAT(&w->acks, &jobs->acks);
-	jobs->flushing = true;
+	jobs->is_flushing = true;
 	jobs_queue_work(jobs, &w->work, w, flush_journals, on_journals_flushed);
 }
 
@@ -401,7 +401,7 @@ static int append_note(struct jobs *jobs, const struct live_job *job, enum journ
 {
 	int rc = journal_append(job->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
-		durable_ack(jobs, job, NO_PEER, &(struct lease_key){.job = job->id}, ACK_REPEAT);
+		durable_ack(jobs, job, NO_PEER, &(struct lease_key){.job = job->id}, ACK_REPEATED);
 	return rc;
 }
 
@@ -413,9 +413,9 @@ void durable_store_look(struct jobs *jobs, uint64_t id)
 	if (!job || !farm_job_status(jobs->farm, id, jobs_now(jobs), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
-	if (l->work <= job->look_written)
+	if (l->work <= job->last_stored_look_work)
 		return;
-	job->look_written = l->work;
+	job->last_stored_look_work = l->work;
 	/* Only forecasts use it: after a restart the estimate itself is made again. */
 	unsigned char note[STORED_NOTE_MAX];
 	size_t size = stored_pack_look(l, note);
@@ -429,7 +429,7 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 {
 	struct job_counts current;
 	struct error e;
-	if (job->ended || job->busy || !farm_job_counts(jobs->farm, job->id, &current) ||
+	if (job->has_ended || job->is_busy || !farm_job_counts(jobs->farm, job->id, &current) ||
 	    memcmp(&current, &job->record.counts, sizeof current) == 0)
 		return;
 	unsigned char note[STORED_NOTE_MAX];
@@ -461,9 +461,9 @@ int durable_retry_job(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	job->retry_at = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (job->checkpoint_uncertain ||
-	    (job->blocked_state_bytes && room_states_blocker(jobs, job, job->blocked_state_bytes)) ||
-	    room_write_blocker(jobs, job))
+	if (job->is_checkpoint_uncertain ||
+	    (job->blocked_state_bytes && storage_find_states_blocker(jobs, job, job->blocked_state_bytes)) ||
+	    storage_find_write_blocker(jobs, job))
 		return -EAGAIN;
 	int rc;
 	do {
@@ -471,11 +471,12 @@ int durable_retry_job(struct jobs *jobs, struct live_job *job)
 		if (rc && rc != -EAGAIN)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 		/* Otherwise the next result would be held again. */
-		if (!rc && !room_fits_checkpoint(jobs, job, 2 * job->blocked_result_bytes))
+		if (!rc && !storage_fits_checkpoint(jobs, job, 2 * job->blocked_result_bytes))
 			rc = -ENOSPC;
 		if (!rc)
 			rc = journal_reserve(job->journal, 2 * job->blocked_result_bytes, &e);
-	} while (disk_is_full(rc) && room_evict(jobs)); /* deletes scene files and films that were kept for later use */
+	} while (disk_is_full(rc) &&
+		 storage_evict(jobs)); /* deletes scene files and films that were kept for later use */
 	if (!rc)
 		set_storage_hold(jobs, job, "");
 	return rc;
@@ -504,13 +505,13 @@ void durable_tick(struct jobs *jobs)
 
 void durable_close(struct jobs *jobs)
 {
-	assert(!jobs->flushing && STAILQ_EMPTY(&jobs->acks));
+	assert(!jobs->is_flushing && STAILQ_EMPTY(&jobs->acks));
 	for (struct durable_ack *a; (a = STAILQ_FIRST(&jobs->parked_acks));) {
 		STAILQ_REMOVE_HEAD(&jobs->parked_acks, next);
 		drop_ack(a);
 	}
-	for (struct ending *n; (n = jobs->endings);) {
-		jobs->endings = n->next;
+	for (struct unrecorded_end *n; (n = jobs->unrecorded_ends);) {
+		jobs->unrecorded_ends = n->next;
 		mem_free(n);
 	}
 	ledger_close(jobs->ledger);

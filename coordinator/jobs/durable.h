@@ -16,8 +16,8 @@ int durable_add_job(struct jobs *jobs, struct live_job *job, struct error *e);
 /* Packs submission and plan for the ledger; both are mem_alloc'd, and NULL on failure. */
 int durable_pack_job(const struct live_job *job, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
 		     struct error *e);
-/* Records that the job has ended, and keeps (keep.h) or deletes its films. Returns an error if the job has a result
- * but its record cannot be written: nobody may be told of the result yet, and the caller tries again. Without a
+/* Records that the job has ended, and keeps (kept_films.h) or deletes its films. Returns an error if the job has a
+ * result but its record cannot be written: nobody may be told of the result yet, and the caller tries again. Without a
  * result it returns 0, and durable_tick tries again if necessary. */
 int durable_end_job(struct jobs *jobs, struct live_job *job);
 /* Records the end of a job whose films are still being read, so that it stays ended if the coordinator is killed

@@ -3,8 +3,8 @@
  * Extensions of jobs: a list of requests until they are answered.
  *
  * extend_job appends a request; extend_handle_waiting handles those whose jobs are not in use. A live job gets its new
- * plan in the ledger and then in the core. A finished job is read from its kept films (keep.h) by a thread of the pool,
- * one job at a time, and continues as after a restart.
+ * plan in the ledger and then in the core. A finished job is read from its kept films (kept_films.h) by a thread of the
+ * pool, one job at a time, and continues as after a restart.
  *
  * Each request is answered once, unless its peer is gone; a job that was read for that peer is then dropped. A
  * request that cannot be fulfilled is answered with a sentence, and the job stays as it was.
@@ -18,9 +18,9 @@
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
-#include "coordinator/retention/keep.h"
+#include "coordinator/retention/kept_films.h"
 
 #include <assert.h>
 #include <math.h>
@@ -30,7 +30,7 @@ static const char *const resubmit_hint = "submit it again with hslt-submit";
 
 static double last_error(const struct forecast_history *h)
 {
-	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
+	return h->count && !h->looks[h->count - 1].is_doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
 /* r: the record of the job's end; NULL: it is live. */
@@ -39,20 +39,21 @@ static struct extension_basis extension_from_job(const struct live_job *job, dou
 	return (struct extension_basis){.rounds = live_job_complete_rounds(job),
 					.seconds = seconds,
 					.error = last_error(&job->record.looks),
-					.ended = r != NULL,
-					.extension_cancelled = r && r->cut};
+					.has_ended = r != NULL,
+					.was_extension_cancelled = r && r->cut};
 }
 
-static int make_plan(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
+static int make_plan(const struct jobs *jobs, const struct requester *requester, const struct live_job *job,
 		     const struct extension *x, const struct extension_basis *basis, struct plan_request *request,
 		     struct plan *plan, struct error *e)
 {
 	int rc = plan_request_from_wire(live_job_submission(job)->plan, request, e);
 	if (!rc)
 		rc = extend_plan(&job->plan, x, basis, request, plan, e);
-	if (rc || by->exempt_from_quota)
+	if (rc || requester->is_exempt_from_quota)
 		return rc;
-	return jobs_check_quota(jobs, by->owner, job->id, jobs->peers.uploading_bytes(jobs->peers.user, by->peer), plan,
+	return jobs_check_quota(jobs, requester->owner, job->id,
+				jobs->peers.uploading_bytes(jobs->peers.user, requester->peer), plan,
 				live_job_submission(job), e);
 }
 
@@ -100,15 +101,15 @@ static void describe_bounds(const struct live_job *job, char *text, size_t size)
 		text_appendf(&t, "%s its error is %.3g %%", comma, 100 * job->plan.target_error);
 }
 
-static void log_extension(const struct requester *by, struct live_job *job, char *text, size_t size)
+static void log_extension(const struct requester *requester, struct live_job *job, char *text, size_t size)
 {
 	describe_bounds(job, text, size);
-	live_job_log(job, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
+	live_job_log(job, LOG_JOB_STATE, "state=extended by=%s text=%s", *requester->owner ? requester->owner : "-",
 		     log_quote(text).text);
 }
 
-static int extend_live(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
-		       char *text, size_t size, struct error *e)
+static int extend_live(struct jobs *jobs, const struct requester *requester, struct live_job *job,
+		       const struct extension *x, char *text, size_t size, struct error *e)
 {
 	struct plan_request request, old_asked;
 	struct plan plan, old = job->plan;
@@ -116,7 +117,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	struct extension_basis basis = extension_from_job(job, isnan(seconds) ? 0 : seconds, NULL);
 	int rc = plan_request_from_wire(live_job_submission(job)->plan, &old_asked, e);
 	if (!rc)
-		rc = make_plan(jobs, by, job, x, &basis, &request, &plan, e);
+		rc = make_plan(jobs, requester, job, x, &basis, &request, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(job, &request, &plan);
@@ -125,8 +126,8 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 		set_bounds(job, &old_asked, &old);
 		return rc;
 	}
-	log_extension(by, job, text, size);
-	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
+	log_extension(requester, job, text, size);
+	struct event ev = {.kind = EVENT_EXTEND, .tag = requester->peer, .job = job->id, .plan = &job->plan};
 	return jobs_try_step(jobs, &ev, &(struct incoming){0}, e);
 }
 
@@ -153,8 +154,8 @@ static void raise_counts(struct job_counts *c, const struct job_record *r)
 }
 
 /* Makes the job live again. r: the record of its end. */
-static int resume_job(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct job_record *r,
-		      struct error *e)
+static int resume_job(struct jobs *jobs, const struct requester *requester, struct live_job *job,
+		      const struct job_record *r, struct error *e)
 {
 	job->record.extended++;
 	int rc = store_bounds(jobs, job, e);
@@ -165,7 +166,7 @@ static int resume_job(struct jobs *jobs, const struct requester *by, struct live
 	job->next = jobs->live_jobs;
 	jobs->live_jobs = job;
 	ended_jobs_remove(jobs, job->id);
-	rc = restore_tell_core(jobs, job, "", by->peer, e);
+	rc = restore_tell_core(jobs, job, "", requester->peer, e);
 	if (!rc)
 		return 0;
 	jobs->live_jobs = job->next;
@@ -183,27 +184,27 @@ static int cannot_continue_error(int rc, struct error *e)
 			    disk_is_full(rc) ? "extend it when the disk has room" : resubmit_hint);
 }
 
-static int extend_read(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
-		       const struct job_record *r, char *text, size_t size, struct error *e)
+static int extend_read(struct jobs *jobs, const struct requester *requester, struct live_job *job,
+		       const struct extension *x, const struct job_record *r, char *text, size_t size, struct error *e)
 {
 	struct plan_request request;
 	struct plan plan;
 	if (live_job_complete_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been deleted: %s", resubmit_hint);
-	uint64_t blocker = job->state_bytes ? room_states_blocker(jobs, job, job->state_bytes) : 0;
+	uint64_t blocker = job->state_bytes ? storage_find_states_blocker(jobs, job, job->state_bytes) : 0;
 	if (blocker)
 		return error_set(
 			e, EAGAIN,
 			"memory has no room for its chain states beside those of j%llu: extend it when that has ended",
 			(unsigned long long)blocker);
 	struct extension_basis basis =
-		extension_from_job(job, isnan(job->times.completed) ? 0 : job->times.completed, r);
-	int rc = make_plan(jobs, by, job, x, &basis, &request, &plan, e);
+		extension_from_job(job, isnan(job->times.last_round_end) ? 0 : job->times.last_round_end, r);
+	int rc = make_plan(jobs, requester, job, x, &basis, &request, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(job, &request, &plan);
-	log_extension(by, job, text, size);
-	return resume_job(jobs, by, job, r, e);
+	log_extension(requester, job, text, size);
+	return resume_job(jobs, requester, job, r, e);
 }
 
 struct extension_request {
@@ -241,12 +242,12 @@ static void on_ended_job_read(uv_work_t *work, int status)
 {
 	struct read_task *w = work->data;
 	struct jobs *jobs = w->jobs;
-	bool is_connected = !jobs->stopping && jobs->peers.peer_name(jobs->peers.user, w->requester.peer);
+	bool is_connected = !jobs->is_stopping && jobs->peers.peer_name(jobs->peers.user, w->requester.peer);
 	char text[256] = "";
 	assert(status == 0);
 	(void)status;
-	jobs->reading_job = NULL;
-	jobs->reading_peer = 0;
+	jobs->extended_job = NULL;
+	jobs->extending_peer = 0;
 	if (w->rc)
 		live_job_log(w->job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	int rc = w->rc ? cannot_continue_error(w->rc, &w->error) : is_connected ? 0 : -ECANCELED;
@@ -257,19 +258,20 @@ static void on_ended_job_read(uv_work_t *work, int status)
 	if (is_connected)
 		answer_request(jobs, w->requester.peer, rc, &w->error, text);
 	mem_free(w);
-	if (!jobs->stopping)
+	if (!jobs->is_stopping)
 		extend_handle_waiting(jobs);
 }
 
 /* Checks the request as far as that is possible without the films. Assumes that no round is complete, so that nothing
  * is refused which the films would allow. */
-static int check_beforehand(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
+static int check_beforehand(const struct jobs *jobs, const struct requester *requester, const struct live_job *job,
 			    const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct plan_request request;
 	struct plan plan;
-	struct extension_basis basis = {.error = last_error(&r->looks), .ended = true, .extension_cancelled = r->cut};
-	return make_plan(jobs, by, job, x, &basis, &request, &plan, e);
+	struct extension_basis basis = {
+		.error = last_error(&r->looks), .has_ended = true, .was_extension_cancelled = r->cut};
+	return make_plan(jobs, requester, job, x, &basis, &request, &plan, e);
 }
 
 static int start_reading(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,
@@ -295,8 +297,8 @@ static int start_reading(struct jobs *jobs, const struct extension_request *q, c
 	w->requester = q->requester;
 	w->extension = q->extension;
 	w->record = *r;
-	jobs->reading_job = w->job;
-	jobs->reading_peer = q->requester.peer;
+	jobs->extended_job = w->job;
+	jobs->extending_peer = q->requester.peer;
 	jobs_queue_work(jobs, &w->work, w, read_ended_job, on_ended_job_read);
 	return 0;
 }
@@ -316,7 +318,7 @@ static int extend_ended(struct jobs *jobs, const struct extension_request *q, co
 static bool must_wait(const struct jobs *jobs, uint64_t id)
 {
 	const struct live_job *job = jobs_find_live(jobs, id);
-	return job ? job->busy || job->ended : jobs->reading_job != NULL;
+	return job ? job->is_busy || job->has_ended : jobs->extended_job != NULL;
 }
 
 static void handle_request(struct jobs *jobs, const struct extension_request *q)
@@ -342,23 +344,23 @@ static bool has_request(const struct jobs *jobs, uint64_t peer)
 	const struct extension_request *q = jobs->extension_requests;
 	while (q && q->requester.peer != peer)
 		q = q->next;
-	return q || jobs->reading_peer == peer;
+	return q || jobs->extending_peer == peer;
 }
 
-void extend_job(struct jobs *jobs, const struct requester *by, const struct extension *x)
+void extend_job(struct jobs *jobs, const struct requester *requester, const struct extension *x)
 {
 	struct extension_request *q = NULL, **at = &jobs->extension_requests;
 	struct error e;
-	int rc = has_request(jobs, by->peer)
+	int rc = has_request(jobs, requester->peer)
 			 ? error_set(&e, EBUSY, "one extension at a time: the previous one is not answered yet")
 			 : extend_check(x, &e);
 	if (!rc && !(q = mem_alloc(1, sizeof *q)))
 		rc = error_set(&e, ENOMEM, "no memory for an extension");
 	if (rc) {
-		answer_request(jobs, by->peer, rc, &e, "");
+		answer_request(jobs, requester->peer, rc, &e, "");
 		return;
 	}
-	*q = (struct extension_request){.requester = *by, .extension = *x};
+	*q = (struct extension_request){.requester = *requester, .extension = *x};
 	while (*at)
 		at = &(*at)->next;
 	*at = q;

@@ -40,7 +40,7 @@ static const Farm__File *find_missing_file(const struct jobs *jobs, const struct
 bool files_update_hold(struct jobs *jobs, struct live_job *job)
 {
 	char text[256];
-	const Farm__File *f = job->ended ? NULL : find_missing_file(jobs, job);
+	const Farm__File *f = job->has_ended ? NULL : find_missing_file(jobs, job);
 	if (!f == !job->has_missing_file)
 		return false;
 	*text = 0;
@@ -105,7 +105,7 @@ static void finish_first_check(struct jobs *jobs)
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	for (struct live_job *job = jobs->live_jobs; rc && job; job = job->next)
-		job->files_suspect = job->files_suspect || needs_file(job, &c->hash);
+		job->has_suspect_files = job->has_suspect_files || needs_file(job, &c->hash);
 	if (rc == -EBADMSG)
 		update_all_holds(jobs);
 	jobs->peers.announce_file_checked(jobs->peers.user, &c->hash, rc, e.text);
@@ -127,7 +127,7 @@ static void on_part_read(uv_work_t *work, int status)
 	struct file_check *c = work->data;
 	struct jobs *jobs = c->jobs;
 	(void)status;
-	if (jobs->stopping)
+	if (jobs->is_stopping)
 		drop_checks(jobs);
 	else if (c->has_more)
 		read_first_file(jobs);
@@ -181,12 +181,12 @@ void files_reread(struct jobs *jobs, struct live_job *job)
 	const Farm__Submit *m = live_job_submission(job);
 	struct error e;
 	bool missing = false;
-	job->files_suspect = false;
+	job->has_suspect_files = false;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		int rc = begin_check(jobs, &h, BLOB_SINCE_OPENED, &e);
 		missing |= rc == -ENOENT;
-		job->files_suspect |= rc && rc != -EINPROGRESS;
+		job->has_suspect_files |= rc && rc != -EINPROGRESS;
 	}
 	if (missing) /* at the end, because the job may be gone afterwards */
 		update_all_holds(jobs);
@@ -194,7 +194,7 @@ void files_reread(struct jobs *jobs, struct live_job *job)
 
 bool files_are_intact(const struct jobs *jobs, const struct live_job *job)
 {
-	return !job->files_suspect && !find_missing_file(jobs, job);
+	return !job->has_suspect_files && !find_missing_file(jobs, job);
 }
 
 void files_tick(struct jobs *jobs)

@@ -36,21 +36,21 @@ static void restore_folder(struct jobs *jobs, struct live_job *job)
 	live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder,
 		     rc ? e.text : "restored, and the job continues");
 	if (rc) {
-		if (!job->ended)
+		if (!job->has_ended)
 			durable_hold_job(jobs, job, "its folder is missing and cannot be restored", e.text);
 		return;
 	}
-	if (job->ended)
+	if (job->has_ended)
 		return;
 	journal_mark_bad(job->journal);
 	if (job->checkpoint_bytes) {
 		/* Results that wait exist only in the old journal, and no checkpoint contains them. */
-		if (!late_drop_all(jobs, job->id))
+		if (!late_results_drop_all(jobs, job->id))
 			return;
-		job->checkpoint_uncertain = true;
+		job->is_checkpoint_uncertain = true;
 		if (job->min_generation <= journal_generation(job->journal))
 			job->min_generation = journal_generation(job->journal) + 1;
-		job->checkpoint_not_before = 0;
+		job->min_checkpoint_time = 0;
 	}
 	durable_hold_job(jobs, job, "its results cannot be stored", "its folder was removed, and is being restored");
 }
@@ -62,7 +62,7 @@ static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
-	if (!journal_is_bad(job->journal) && !job->ended)
+	if (!journal_is_bad(job->journal) && !job->has_ended)
 		return journal_file_is_missing(job->journal);
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
@@ -70,11 +70,11 @@ static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 
 void folder_tick(struct jobs *jobs)
 {
-	if (jobs_now(jobs) < jobs->next_folder_check)
+	if (jobs_now(jobs) < jobs->next_folder_check_at)
 		return;
-	jobs->next_folder_check = jobs_now(jobs) + check_interval_seconds;
+	jobs->next_folder_check_at = jobs_now(jobs) + check_interval_seconds;
 	for (struct live_job *job = jobs->live_jobs; job; job = job->next)
-		if (!job->busy && job->journal && is_gone(jobs, job)) {
+		if (!job->is_busy && job->journal && is_gone(jobs, job)) {
 			restore_folder(jobs, job);
 			return; /* the list may have changed; continue next time */
 		}

@@ -57,7 +57,7 @@ static int import_counter(struct jobs *jobs, struct error *e)
 
 struct old_job {
 	char *record_text; /* NULL: none, or damaged */
-	bool record_damaged;
+	bool is_record_damaged;
 	struct job_record record; /* valid if there is a text */
 	struct old_row row;	  /* copy of the row; its id is 0 if there is none, or it is damaged */
 };
@@ -75,7 +75,7 @@ static int read_record(const struct jobs *jobs, uint64_t id, struct old_job *old
 		return 0;
 	mem_free(old->record_text);
 	old->record_text = NULL;
-	old->record_damaged = true;
+	old->is_record_damaged = true;
 	return rc == -EBADMSG ? 0 : rc;
 }
 
@@ -164,7 +164,7 @@ static int import_job(struct jobs *jobs, uint64_t id, struct old_job *old, struc
 	char path[SPOOL_PATH_MAX], damaged_path[SPOOL_PATH_MAX];
 	*old = (struct old_job){.record_text = NULL};
 	int rc = read_old_job(jobs, id, old, e);
-	if (!rc && (old->record_text || old->record_damaged || old->row.job.id))
+	if (!rc && (old->record_text || old->is_record_damaged || old->row.job.id))
 		rc = store_row(jobs, id, old, e);
 	else if (!rc)
 		rc = -ENOENT;
@@ -174,7 +174,7 @@ static int import_job(struct jobs *jobs, uint64_t id, struct old_job *old, struc
 		return rc == -ENOENT ? 0 : rc;
 	spool_job_path(jobs->spool, id, record_file, path);
 	spool_job_path(jobs->spool, id, "job.json.damaged", damaged_path);
-	if (!old->record_damaged || disk_rename(path, damaged_path))
+	if (!old->is_record_damaged || disk_rename(path, damaged_path))
 		disk_unlink(path);
 	spool_job_path(jobs->spool, id, row_file, path);
 	disk_unlink(path);

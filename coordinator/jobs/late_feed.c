@@ -4,7 +4,7 @@
 #include "common/base/mem.h"
 #include "coordinator/live_job/digest.h"
 #include "coordinator/live_job/incoming.h"
-#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/late_results.h"
 #include "coordinator/jobs/step.h"
 
 /* Gives up a stored result that has been damaged meanwhile or is dropped: if the core had given its lease to a
@@ -20,7 +20,7 @@ static void drop_result(struct jobs *jobs, struct live_job *job, const struct la
 /* Gives a stored result to the core, which decides whether it counts. */
 static int offer_result(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
 {
-	struct event ev = {.kind = EVENT_STORED_BATCH, .job = job->id, .lease = {.key = l->key, .valid = true}};
+	struct event ev = {.kind = EVENT_STORED_BATCH, .job = job->id, .lease = {.key = l->key, .is_valid = true}};
 	struct envelope env;
 	struct batch batch = {0};
 	struct buf copy = {0};
@@ -47,7 +47,7 @@ static int offer_result(struct jobs *jobs, const struct live_job *job, const str
 					    .payload = &copy,
 					    .is_stored = true,
 					    .stored_offset = l->offset};
-		jobs_step_with(jobs, &ev, &in);
+		jobs_step_with_data(jobs, &ev, &in);
 	}
 	buf_fini(&copy);
 	batch_fini(&batch);
@@ -56,11 +56,11 @@ static int offer_result(struct jobs *jobs, const struct live_job *job, const str
 	return rc;
 }
 
-bool late_drop_all(struct jobs *jobs, uint64_t id)
+bool late_results_drop_all(struct jobs *jobs, uint64_t id)
 {
 	struct live_job *job;
-	while ((job = jobs_find_live(jobs, id)) && job->late_count) {
-		struct late_result l = job->late_results[--job->late_count];
+	while ((job = jobs_find_live(jobs, id)) && job->late_result_count) {
+		struct late_result l = job->late_results[--job->late_result_count];
 		drop_result(jobs, job, &l, "a waiting result in the journal is computed again");
 	}
 	return job != NULL;
@@ -70,7 +70,7 @@ bool late_drop_all(struct jobs *jobs, uint64_t id)
  * fit, and any job may be gone. */
 static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
-	for (size_t i = 0; i < job->late_count; i++) {
+	for (size_t i = 0; i < job->late_result_count; i++) {
 		struct late_result l = job->late_results[i];
 		struct error e;
 		const uint64_t id = job->id;
@@ -86,7 +86,7 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 		    replay_readiness(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
 			continue;
 		l = job->late_results[i];
-		late_remove(job, i);
+		late_results_remove(job, i);
 		if (rc)
 			drop_result(jobs, job, &l, e.text);
 		return true;
@@ -94,14 +94,14 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 	return false;
 }
 
-void late_feed(struct jobs *jobs)
+void late_results_feed(struct jobs *jobs)
 {
-	if (jobs->feeding_late_results || jobs->stepping || jobs->stopping)
+	if (jobs->is_feeding_late_results || jobs->is_stepping || jobs->is_stopping)
 		return;
-	jobs->feeding_late_results = true;
+	jobs->is_feeding_late_results = true;
 	for (struct live_job *job = jobs->live_jobs; job;) {
-		bool fed = job->late_count && !job->busy && !job->ended && feed_one(jobs, job);
+		bool fed = job->late_result_count && !job->is_busy && !job->has_ended && feed_one(jobs, job);
 		job = fed ? jobs->live_jobs : job->next; /* the list may have changed */
 	}
-	jobs->feeding_late_results = false;
+	jobs->is_feeding_late_results = false;
 }

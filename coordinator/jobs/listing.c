@@ -8,7 +8,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/retention/keep.h"
+#include "coordinator/retention/kept_films.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -19,11 +19,12 @@ bool jobs_get_end_view(const struct jobs *jobs, const struct live_job *job, stru
 	struct canvas_counts counted;
 	view_from_record(v, &job->record);
 	if (job->canvas) { /* at the end only what the image contains, before that everything received */
-		canvas_sum_counts(job->canvas, !job->ended, &counted);
-		record_set_counters(&v->record, &job->plan, &counted, job->black, job->bootstrap_result.beyond_share);
+		canvas_sum_counts(job->canvas, !job->has_ended, &counted);
+		record_set_counters(&v->record, &job->plan, &counted, job->is_black,
+				    job->bootstrap_result.overlong_share);
 		record_add_note(&v->record, job->quarantine_notes);
 	}
-	if (job->ended)
+	if (job->has_ended)
 		record_add_doubt(&v->record);
 	if (!farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status))
 		return false;
@@ -43,11 +44,11 @@ static void view_live(const struct jobs *jobs, const struct live_job *job, struc
 	if (!jobs_get_end_view(jobs, job, v))
 		return;
 	/* It is not shown as ended before its image and record exist. */
-	if (job->ended && (job->busy || job->publish_pending || job->record_pending)) {
+	if (job->has_ended && (job->is_busy || job->is_publish_pending || job->is_record_pending)) {
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*job->record.why)
 			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",
-				   job->record_pending ? "record" : "image", job->record.why);
+				   job->is_record_pending ? "record" : "image", job->record.why);
 		else
 			text_copy(v->waiting, sizeof v->waiting, "its image is being written");
 		memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);

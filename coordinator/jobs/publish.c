@@ -12,7 +12,7 @@
 #include "common/base/text.h"
 #include "common/exr/image_file.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
 
 #include <assert.h>
@@ -68,7 +68,7 @@ static int write_image(struct publish_task *w)
 				 .camera = m->camera,
 				 .scene_notes = job->record.scene_notes,
 				 .effects = effects,
-				 .mixed_fingerprints = m->mixed,
+				 .has_mixed_fingerprints = m->mixed,
 				 .wall_seconds = w->wall_seconds,
 				 .cpu_seconds = job->record.cpu_seconds,
 				 .worker_count = job->worker_count,
@@ -134,10 +134,10 @@ static void tell_image(const struct publish_task *w)
 static void note_write_failure(struct publish_task *w)
 {
 	struct live_job *job = w->job;
-	job->publish_pending = true;
-	job->publish_rounds = w->rounds;
+	job->is_publish_pending = true;
+	job->pending_publish_rounds = w->rounds;
 	if (disk_is_full(w->rc))
-		room_evict(w->jobs);
+		storage_evict(w->jobs);
 	job->retry_at = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(job->record.why, w->error.text) != 0)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it will be tried again\"",
@@ -162,7 +162,7 @@ static void store_outcome(struct publish_task *w)
 	if (!w->rc)
 		record_set_convergence(&job->record, &w->image, &w->convergence);
 	if (w->kind == PUBLISH_RESULT && !w->rc)
-		job->black = w->image.is_black;
+		job->is_black = w->image.is_black;
 	if (w->kind == PUBLISH_RESULT && w->rc)
 		note_write_failure(w);
 	else if (w->kind == PUBLISH_RESULT)
@@ -182,8 +182,8 @@ static void on_publish_done(uv_work_t *work, int status)
 	assert(status == 0);
 	(void)status;
 	store_outcome(w);
-	w->job->busy = false;
-	if (jobs->stopping)
+	w->job->is_busy = false;
+	if (jobs->is_stopping)
 		return;
 	if (w->kind == PUBLISH_ERROR_ONLY)
 		tell_error(w);
@@ -197,14 +197,14 @@ static void on_publish_done(uv_work_t *work, int status)
 void publish_start(struct jobs *jobs, struct live_job *job, enum publish_kind kind, uint64_t rounds)
 {
 	assert(job && job->canvas);
-	assert(!job->busy);
-	struct publish_task *w = &job->publishing;
+	assert(!job->is_busy);
+	struct publish_task *w = &job->publish_task;
 	*w = (struct publish_task){.jobs = jobs, .job = job, .kind = kind, .rounds = rounds};
 	struct job_status status; /* for the time from the first lease until now */
 	if (farm_job_status(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
-		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;
+		w->wall_seconds = (isnan(status.ended_at) ? jobs_now(jobs) : status.ended_at) - status.started_at;
 	}
-	job->busy = true;
+	job->is_busy = true;
 	jobs_queue_work(jobs, &w->work, w, run_publish_task, on_publish_done);
 }

@@ -18,7 +18,7 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/retention/observed_time.h"
-#include "coordinator/retention/keep.h"
+#include "coordinator/retention/kept_films.h"
 #include "coordinator/store/journal_file.h"
 
 #include <assert.h>
@@ -187,7 +187,7 @@ static int finish_recovery(struct jobs *jobs, struct error *e)
 	jobs->recovery = NULL;
 	jobs->change_count++;
 	uv_idle_start(&jobs->trim_idle, on_trim); /* by now live jobs hold their files */
-	keep_trim_films(jobs);
+	kept_films_trim(jobs);
 	jobs->peers.resume_requests(jobs->peers.user);
 	return 0;
 }
@@ -260,7 +260,7 @@ static void on_films_read(uv_work_t *work, int status)
 	assert(status == 0);
 	(void)status;
 	r->is_reading = false;
-	if (jobs->stopping)
+	if (jobs->is_stopping)
 		return;
 	if (r->rc) {
 		rc = handle_failure(jobs, &e);

@@ -45,7 +45,7 @@ const char *restore_hold_text(const char *holder, char text[256])
 	return text;
 }
 
-int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char *held, uint64_t tag, struct error *e)
+int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char *holder, uint64_t tag, struct error *e)
 {
 	uint32_t slots = job->plan.groups * job->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
@@ -74,17 +74,17 @@ int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char 
 			    .submit = {.plan = &job->plan,
 				       .name = job->record.name,
 				       .priority = job->record.priority,
-				       .mixed = live_job_submission(job)->mixed,
+				       .is_mixed = live_job_submission(job)->mixed,
 				       .owner = job->record.owner,
 				       .verify_fraction = trust_verify_fraction(jobs, live_job_submission(job))},
 			    .fingerprint = job->fingerprint,
 			    .kind = job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 			    .next_epochs = next,
 			    .makers = makers,
-			    .black = job->bootstrap_result.black,
+			    .is_black = job->bootstrap_result.is_black,
 			    .elapsed = job->times.elapsed,
-			    .opened = job->times.opened,
-			    .completed = job->times.completed,
+			    .first_round_at = job->times.first_round_at,
+			    .last_round_end = job->times.last_round_end,
 			    .looks = &job->record.looks,
 			    .counts = job->record.counts}};
 	int rc = jobs_try_step(jobs, &ev, &(struct incoming){0}, e);
@@ -92,11 +92,9 @@ int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char 
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	mem_free(next);
 	mem_free(makers);
-	if (!rc && *held) {
-		ev = (struct event){.kind = EVENT_HOLD,
-				    .job = job->id,
-				    .hold = HOLD_BY_USER,
-				    .text = restore_hold_text(held, text)};
+	if (!rc && *holder) {
+		ev = (struct event){
+			.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_USER, .text = restore_hold_text(holder, text)};
 		jobs_step(jobs, &ev);
 	}
 	return rc;

@@ -19,8 +19,8 @@ int restore_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_
 void restore_drop_job(struct jobs *jobs, struct live_job *job); /* frees it and releases its files */
 /* Writes the sentence that the status shows for a held job. */
 const char *restore_hold_text(const char *holder, char text[256]);
-/* Tells the core of a job in the list of live jobs. held: who holds it, or "". tag: the peer that requested its
+/* Tells the core of a job in the list of live jobs. holder: who holds it, or "". tag: the peer that requested its
  * extension; 0: it continues after a restart. Returns -EPERM if the core refuses, which needs a tag; -ENOMEM. */
-int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char *held, uint64_t tag, struct error *e);
+int restore_tell_core(struct jobs *jobs, const struct live_job *job, const char *holder, uint64_t tag, struct error *e);
 
 #endif

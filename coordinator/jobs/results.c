@@ -46,7 +46,7 @@ static void fail_result(struct jobs *jobs, struct live_job *job, uint64_t peer, 
 
 static void handle_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
-	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
+	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.is_valid = true}};
 	struct error e = {""};
 	struct batch batch = {0};
 	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
@@ -81,19 +81,19 @@ static void handle_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseRes
 		maker.restarts = worker.restarts;
 	}
 	stored.maker = is_known ? &maker : NULL;
-	ev.lease.valid = rc == 0;
+	ev.lease.is_valid = rc == 0;
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
 	/* No room for the result, in memory or on the disk. */
-	if (rc == -ENOMEM || (job && ev.lease.valid && durable_reserve_result(jobs, job, &in, &e)))
+	if (rc == -ENOMEM || (job && ev.lease.is_valid && durable_reserve_result(jobs, job, &in, &e)))
 		refuse_result(jobs, peer, &ev.lease.key, e.text);
 	else
-		jobs_step_with(jobs, &ev, &in);
+		jobs_step_with_data(jobs, &ev, &in);
 	batch_fini(&batch);
 	mem_free(in.frame);
 }
 
-static bool has_room(const struct jobs *jobs, const struct buf *payload)
+static bool has_capacity(const struct jobs *jobs, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
 	for (const struct live_job *job = jobs->live_jobs; job; job = job->next)
@@ -107,14 +107,14 @@ static void defer_result(struct jobs *jobs, struct live_job *job, uint64_t peer,
 			 struct envelope *env, struct buf *payload)
 {
 	struct event ev = {
-		.kind = EVENT_BATCH_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
-	enum farm_delivery awaited = answer_delivery(jobs->farm, peer, k);
+		.kind = EVENT_BATCH_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .is_valid = true}};
+	enum farm_delivery awaited = answer_judge_delivery(jobs->farm, peer, k);
 	const struct waiting_message *w = awaited == DELIVERY_OPEN ? live_job_find_waiting(job, k) : NULL;
 	if (w && w->peer == peer) /* the acknowledgement of the waiting result will do for this one, too */
 		return;
-	if (awaited == DELIVERY_USELESS)
+	if (awaited == DELIVERY_REFUSED)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(jobs, payload) || !live_job_enqueue_message(job, peer, k, env, payload, false)) {
+	else if (w || !has_capacity(jobs, payload) || !live_job_enqueue_message(job, peer, k, env, payload, false)) {
 		refuse_result(jobs, peer, k,
 			      w ? "another worker's result of this lease is waiting"
 				: "no room for more waiting results");
@@ -155,10 +155,10 @@ static void handle_lease_failed(struct jobs *jobs, uint64_t peer, const Farm__Le
 	}
 	ev.job = ev.lease.key.job;
 	struct live_job *job = jobs_find_live(jobs, ev.job);
-	ev.lease.worker_at_fault = f->own;
-	ev.lease.memory_full = f->later;
-	ev.lease.bad_states = f->bad_states;
-	ev.lease.states_outdated = f->bad_states && !(job && live_job_states_match(job, &ev.lease.key, &states));
+	ev.lease.is_worker_at_fault = f->own;
+	ev.lease.is_memory_full = f->later;
+	ev.lease.has_bad_states = f->bad_states;
+	ev.lease.has_outdated_states = f->bad_states && !(job && live_job_states_match(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
 	if (job && *f->text && !blamed && answer_failure_counts(jobs->farm, peer, &ev.lease.key) &&
 	    !files_are_intact(jobs, job)) { /* the spool's fault, not the worker's */
@@ -166,17 +166,17 @@ static void handle_lease_failed(struct jobs *jobs, uint64_t peer, const Farm__Le
 		text[0] = 0;
 	}
 	struct rollback rollback = {0};
-	bool holds_lease = answer_delivery(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
-			   !ev.lease.states_outdated; /* otherwise no batch is read for it */
-	/* Failures with `memory_full` may come every few seconds: the status shows them, but they are not logged. */
+	bool holds_lease = answer_judge_delivery(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
+			   !ev.lease.has_outdated_states; /* otherwise no batch is read for it */
+	/* Failures with `is_memory_full` may come every few seconds: the status shows them, but they are not logged. */
 	if (job && *text && !f->later)
 		log_failure(jobs, jobs->peers.peer_name(jobs->peers.user, peer), job, f, &ev.lease.key, text,
 			    holds_lease);
-	if (job && *text && f->bad_states && holds_lease && !job->busy && !jobs->stepping &&
+	if (job && *text && f->bad_states && holds_lease && !job->is_busy && !jobs->is_stepping &&
 	    journal_write(job->journal, &e) == 0)
 		ev.lease.can_roll_back = rollback_read(job, job->journal, &ev.lease.key, &rollback, &e) == 0;
 	if (ev.lease.can_roll_back)
-		jobs_step_with(jobs, &ev, &(struct incoming){.rollback = &rollback});
+		jobs_step_with_data(jobs, &ev, &(struct incoming){.rollback = &rollback});
 	else
 		jobs_step(jobs, &ev);
 	rollback_fini(&rollback);
@@ -207,11 +207,11 @@ static void handle_failure(struct jobs *jobs, uint64_t peer, struct envelope *en
 	struct error e;
 	bool waits = false;
 	if (job && lease_key_from_wire(m->key, &k, &e) == 0 && answer_failure_counts(jobs->farm, peer, &k))
-		waits = m->bad_states ? job->busy : *m->text && !m->own && must_await_files(jobs, job, &checked);
+		waits = m->bad_states ? job->is_busy : *m->text && !m->own && must_await_files(jobs, job, &checked);
 	if (!waits) {
 		if (jobs->peers.peer_name(jobs->peers.user, peer))
 			handle_lease_failed(jobs, peer, m);
-	} else if (!has_room(jobs, payload) || !live_job_enqueue_message(job, peer, &k, env, payload, checked)) {
+	} else if (!has_capacity(jobs, payload) || !live_job_enqueue_message(job, peer, &k, env, payload, checked)) {
 		refuse_result(jobs, peer, &k, "no room for more waiting results");
 	}
 }
@@ -219,7 +219,7 @@ static void handle_failure(struct jobs *jobs, uint64_t peer, struct envelope *en
 void results_handle_waiting(struct jobs *jobs, struct waiting_message *w)
 {
 	if (w->envelope.message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED)
-		handle_failure(jobs, w->peer, &w->envelope, &w->payload, w->files_checked);
+		handle_failure(jobs, w->peer, &w->envelope, &w->payload, w->has_files_checked);
 	else
 		results_handle(jobs, w->peer, &w->envelope, &w->payload);
 }
@@ -247,7 +247,7 @@ void results_handle(struct jobs *jobs, uint64_t peer, struct envelope *env, stru
 	struct live_job *job = m->key ? jobs_find_live(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
-	if (job && job->busy && lease_key_from_wire(m->key, &k, &e) == 0)
+	if (job && job->is_busy && lease_key_from_wire(m->key, &k, &e) == 0)
 		defer_result(jobs, job, peer, &k, env, payload);
 	else
 		handle_result(jobs, peer, m, payload);

@@ -27,12 +27,12 @@ void jobs_defer_event(struct jobs *jobs, const struct event *ev)
 	d->event = *ev;
 	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
 	d->event.text = d->text;
-	STAILQ_INSERT_TAIL(&jobs->deferred, d, next);
+	STAILQ_INSERT_TAIL(&jobs->deferred_events, d, next);
 }
 
 void jobs_defer_failure(struct jobs *jobs, uint64_t job, const char *text)
 {
-	struct event ev = {.kind = EVENT_JOB_BROKEN, .job = job, .text = text};
+	struct event ev = {.kind = EVENT_JOB_FAILED, .job = job, .text = text};
 	jobs_defer_event(jobs, &ev);
 }
 
@@ -44,14 +44,14 @@ static void run_step(struct jobs *jobs, struct event *ev, const struct incoming 
 {
 	struct update u;
 	ev->time = jobs_now(jobs);
-	ev->unread_seconds = ev->time - jobs->read_until;
+	ev->unread_seconds = ev->time - jobs->messages_read_until;
 	if (ev->unread_seconds <
 	    jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* too short a silence to blame anybody */
 		ev->unread_seconds = 0;
 	farm_step(jobs->farm, ev, &u);
 	jobs->change_count++;
-	jobs->step_handlers->carry_out(jobs, &u, in);
-	if (isfinite(u.wake_time) && !jobs->stopping) {
+	jobs->step_handlers->on_update(jobs, &u, in);
+	if (isfinite(u.wake_time) && !jobs->is_stopping) {
 		double ms = ceil(1000 * (u.wake_time - jobs_now(jobs)));
 		uv_timer_start(&jobs->wake_timer, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
 	} else {
@@ -61,31 +61,31 @@ static void run_step(struct jobs *jobs, struct event *ev, const struct incoming 
 
 void jobs_step(struct jobs *jobs, struct event *ev)
 {
-	if (jobs->stepping) /* messages of sessions may arrive while an update is being carried out */
+	if (jobs->is_stepping) /* messages of sessions may arrive while an update is being carried out */
 		jobs_defer_event(jobs, ev);
 	else
-		jobs_step_with(jobs, ev, &empty_incoming);
+		jobs_step_with_data(jobs, ev, &empty_incoming);
 }
 
-void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in)
+void jobs_step_with_data(struct jobs *jobs, struct event *ev, const struct incoming *in)
 {
-	assert(!jobs->stepping);
-	jobs->stepping = true;
+	assert(!jobs->is_stepping);
+	jobs->is_stepping = true;
 	run_step(jobs, ev, in);
-	for (struct deferred_event *d; (d = STAILQ_FIRST(&jobs->deferred));) {
-		STAILQ_REMOVE_HEAD(&jobs->deferred, next);
+	for (struct deferred_event *d; (d = STAILQ_FIRST(&jobs->deferred_events));) {
+		STAILQ_REMOVE_HEAD(&jobs->deferred_events, next);
 		run_step(jobs, &d->event, &empty_incoming);
 		mem_free(d);
 	}
-	jobs->stepping = false;
-	jobs->step_handlers->step_done(jobs);
+	jobs->is_stepping = false;
+	jobs->step_handlers->on_step_done(jobs);
 }
 
 int jobs_try_step(struct jobs *jobs, struct event *ev, struct incoming *in, struct error *e)
 {
 	*e = (struct error){""};
 	in->refusal = e;
-	jobs_step_with(jobs, ev, in);
+	jobs_step_with_data(jobs, ev, in);
 	return *e->text ? -EPERM : 0;
 }
 
@@ -97,5 +97,5 @@ static void on_wake(uv_timer_t *t)
 
 void jobs_notify_films_free(struct jobs *jobs)
 {
-	jobs->step_handlers->films_free(jobs);
+	jobs->step_handlers->on_films_free(jobs);
 }

@@ -79,7 +79,7 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 static void log_unforgiven(const struct jobs *jobs, const json_t *list)
 {
 	const char *name = jobs->config.forgiven_worker;
-	struct spelling suggestion = {.wanted = name ? name : ""};
+	struct spelling suggestion = {.wanted_name = name ? name : ""};
 	char hint[96], text[160];
 	for (size_t i = 0; name && i < json_array_size(list); i++) {
 		const char *other = string_member(json_array_get(list, i), "name");
@@ -143,29 +143,30 @@ double trust_verify_fraction(const struct jobs *jobs, const Farm__Submit *m)
 							      : jobs->config.min_verify_fraction;
 }
 
-void trust_count_merged(struct live_job *job, const struct action *a)
+void trust_count_unverified(struct live_job *job, const struct action *a)
 {
-	if (a->verified)
+	if (a->is_verified)
 		return;
-	for (size_t i = 0; i < job->credit_count; i++)
-		if (job->credits[i].worker_id == a->worker_id) {
-			job->credits[i].lease_count++;
+	for (size_t i = 0; i < job->unverified_worker_count; i++)
+		if (job->unverified_counts[i].worker_id == a->worker_id) {
+			job->unverified_counts[i].lease_count++;
 			return;
 		}
-	struct live_job_credit *more = list_grow_array(job->credits, job->credit_count, sizeof *more);
+	struct live_job_unverified_count *more =
+		list_grow_array(job->unverified_counts, job->unverified_worker_count, sizeof *more);
 	if (!more) {
 		live_job_log(job, LOG_SPOOL_FAULT, "text=\"no memory to count the unverified results of a worker\"");
 		return;
 	}
-	job->credits = more;
-	job->credits[job->credit_count++] = (struct live_job_credit){a->worker_id, 1};
+	job->unverified_counts = more;
+	job->unverified_counts[job->unverified_worker_count++] = (struct live_job_unverified_count){a->worker_id, 1};
 }
 
-void trust_discount_result(struct live_job *job, uint64_t worker_id)
+void trust_discount_unverified(struct live_job *job, uint64_t worker_id)
 {
-	for (size_t i = 0; i < job->credit_count; i++)
-		if (job->credits[i].worker_id == worker_id && job->credits[i].lease_count > 0)
-			job->credits[i].lease_count--;
+	for (size_t i = 0; i < job->unverified_worker_count; i++)
+		if (job->unverified_counts[i].worker_id == worker_id && job->unverified_counts[i].lease_count > 0)
+			job->unverified_counts[i].lease_count--;
 }
 
 static const char *worker_name(const struct jobs *jobs, uint64_t worker_id, char name[JOIN_NAME_SIZE])
@@ -213,7 +214,8 @@ void trust_record_quarantine(struct jobs *jobs, const struct action *a)
 	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
 	write_quarantined(jobs);
 	for (struct live_job *job = jobs->live_jobs; job; job = job->next)
-		for (size_t i = 0; i < job->credit_count; i++)
-			if (job->credits[i].worker_id == a->worker_id && job->credits[i].lease_count > 0)
-				note_unverified_leases(job, name, a->text, job->credits[i].lease_count);
+		for (size_t i = 0; i < job->unverified_worker_count; i++)
+			if (job->unverified_counts[i].worker_id == a->worker_id &&
+			    job->unverified_counts[i].lease_count > 0)
+				note_unverified_leases(job, name, a->text, job->unverified_counts[i].lease_count);
 }

@@ -19,8 +19,9 @@ int trust_open(struct jobs *jobs, struct error *e);
 double trust_verify_fraction(const struct jobs *jobs, const Farm__Submit *m);
 
 /* Counts a merged result of the worker that was not verified. */
-void trust_count_merged(struct live_job *job, const struct action *a);
-void trust_discount_result(struct live_job *job, uint64_t worker_id); /* one of its results does not count any more */
+void trust_count_unverified(struct live_job *job, const struct action *a);
+void trust_discount_unverified(struct live_job *job,
+			       uint64_t worker_id); /* one of its results does not count any more */
 /* Logs a wrong result in the job's log. */
 void trust_log_wrong_result(struct jobs *jobs, const struct action *a);
 /* chains start again from their seeds: logs and notes that in the job. */

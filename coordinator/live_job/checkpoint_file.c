@@ -31,7 +31,7 @@ void checkpoint_head_fill(struct checkpoint_head *h, const struct live_job *job,
 				      .generation = generation < job->min_generation ? job->min_generation : generation,
 				      .cpu_seconds = job->record.cpu_seconds,
 				      .bootstrap_cpu_seconds = job->record.bootstrap_cpu_seconds,
-				      .look_written = job->look_written,
+				      .look_written = job->last_stored_look_work,
 				      .times = job->times,
 				      .bootstrap_result = job->bootstrap_result,
 				      .counts = job->record.counts,
@@ -110,7 +110,7 @@ static void apply_head(struct live_job *job, const struct checkpoint_head *h)
 	job->worker_count = h->worker_count;
 	job->record.cpu_seconds = h->cpu_seconds;
 	job->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
-	job->look_written = h->look_written;
+	job->last_stored_look_work = h->look_written;
 	job->times = h->times;
 	job->bootstrap_result = h->bootstrap_result;
 	job->record.looks.count = 0;
@@ -195,7 +195,7 @@ int checkpoint_load(const struct spool *spool, struct live_job *job, uint64_t *g
 	int rc = checked_file_open_with_progress(&in, name, progress, user, e);
 	if (rc)
 		return rc;
-	in.bytes_written = in.remaining;
+	in.bytes_written = in.remaining_bytes;
 	rc = read_checkpoint(job, &in, generation, e);
 	checked_file_close(&in);
 	return rc;

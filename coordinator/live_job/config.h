@@ -37,7 +37,7 @@ struct server_config {
 	uint64_t max_waiting_bytes; /* limit on results that wait for films that are being read */
 	uint64_t max_receive_bytes; /* limit on messages that are being received; further ones wait */
 	/* Limit on one job's chain states in memory, supposing that each is as long as possible; for those of all
-	 * jobs see jobs/room.h. */
+	 * jobs see jobs/storage.h. */
 	uint64_t max_state_bytes;
 	/* Limit on data waiting to be sent; beyond it peers that do not read are disconnected. */
 	uint64_t max_send_bytes;

@@ -24,7 +24,7 @@ static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 	const uint64_t counts[] = {b->key.job,	    (uint64_t)b->key.kind, b->key.group,   b->key.part,
 				   b->key.epoch,    b->tile_count,	   b->state_count, b->strategy_count,
 				   b->weight_count, b->moment_count};
-	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum};
+	const double sums[] = {b->independent_sum, b->independent_square, b->overlong_sum};
 	int rc = add_part(p, counts, sizeof counts, e);
 	if (!rc)
 		rc = add_part(p, b->counters, sizeof b->counters, e);

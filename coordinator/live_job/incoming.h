@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Data that accompanies an event for the core but that the core does not need: an argument of jobs_step_with that is
- * passed on to the functions that carry out the core's actions. Fields that do not belong to the event's kind are
- * NULL. The caller keeps everything until jobs_step_with returns.
+ * Data that accompanies an event for the core but that the core does not need: an argument of jobs_step_with_data that
+ * is passed on to the functions that carry out the core's actions. Fields that do not belong to the event's kind are
+ * NULL. The caller keeps everything until jobs_step_with_data returns.
  */
 #ifndef COORDINATOR_LIVE_JOB_INCOMING_H
 #define COORDINATOR_LIVE_JOB_INCOMING_H

@@ -23,7 +23,7 @@ bool jobs_is_reading(const struct jobs *jobs, uint64_t job)
 	for (const struct recovering_job *f = jobs->recovering_jobs; f; f = f->next)
 		if (f->record.id == job)
 			return true;
-	return jobs->reading_job && jobs->reading_job->id == job;
+	return jobs->extended_job && jobs->extended_job->id == job;
 }
 
 static uint64_t recovering_film_bytes(const struct jobs *jobs)
@@ -38,7 +38,7 @@ static uint64_t recovering_film_bytes(const struct jobs *jobs)
 const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p)
 {
 	uint64_t bytes = canvas_bytes(p) + recovering_film_bytes(jobs) +
-			 (jobs->reading_job ? canvas_bytes(&jobs->reading_job->plan) : 0);
+			 (jobs->extended_job ? canvas_bytes(&jobs->extended_job->plan) : 0);
 	for (const struct live_job *job = jobs->live_jobs; job; job = job->next)
 		if (job->canvas && !canvas_is_mapped(job->canvas))
 			bytes += canvas_bytes(&job->plan);
@@ -58,7 +58,7 @@ int jobs_check_quota(const struct jobs *jobs, const char *owner, uint64_t id, ui
 {
 	struct quota_usage usage = {.asset_bytes = uploading};
 	for (const struct live_job *job = jobs->live_jobs; job; job = job->next) {
-		if (job->ended || job->id == id || strcmp(job->record.owner, owner) != 0)
+		if (job->has_ended || job->id == id || strcmp(job->record.owner, owner) != 0)
 			continue;
 		usage.jobs++;
 		usage.asset_bytes += live_job_asset_bytes(live_job_submission(job));

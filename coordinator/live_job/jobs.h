@@ -25,7 +25,7 @@ struct incoming;
 struct clearing;
 struct file_check;
 struct durable_ack;
-struct ending;
+struct unrecorded_end;
 struct extension_request;
 struct recovery;
 
@@ -56,9 +56,9 @@ struct jobs {
 	void *stop_user;
 	uv_loop_t *loop;
 	uv_timer_t wake_timer;
-	uv_idle_t drain_idle; /* runs while results are left that had to wait for a canvas */
-	uv_idle_t trim_idle;  /* runs while the spool has more scene files than allowed */
-	double read_until;    /* s: every message that arrived before this time has been read from its socket */
+	uv_idle_t drain_idle;	    /* runs while results are left that had to wait for a canvas */
+	uv_idle_t trim_idle;	    /* runs while the spool has more scene files than allowed */
+	double messages_read_until; /* s: every message that arrived before this time has been read from its socket */
 	struct farm *farm;
 	struct spool *spool;
 	struct blob_store *blobs;
@@ -68,7 +68,7 @@ struct jobs {
 	/* the jobs that ended last, at most ENDED_JOBS_MAX, in the order of their ends */
 	struct job_record *ended_jobs;
 	size_t ended_job_count;
-	STAILQ_HEAD(, deferred_event) deferred;
+	STAILQ_HEAD(, deferred_event) deferred_events;
 	struct recovering_job *recovering_jobs; /* sorted by id */
 	struct recovery *recovery; /* state of reading the jobs of an earlier run; NULL: all have been read */
 	int fatal_code;		   /* why the coordinator stops by itself; 0: it does not */
@@ -77,22 +77,23 @@ struct jobs {
 	size_t restored_count;
 	STAILQ_HEAD(ack_list, durable_ack) acks; /* acknowledgements that wait for a flush */
 	struct ack_list parked_acks; /* acknowledgements that wait for a new journal in place of a failed one */
-	struct ending *endings;	     /* jobs that have ended and whose records could not be written yet */
-	double endings_retry_at, ledger_retry_at; /* next attempts to write records, and the copy of the ledger */
-	struct age_clock observed_clock;	  /* observed time when this run started */
-	double next_folder_check;		  /* next check of the jobs' folders */
-	double next_clearing;			  /* next round of clearing finished jobs */
-	struct clearing *clearing;		  /* the running round; NULL: none */
-	bool flushing;
-	bool stepping, stopping;
-	bool feeding_late_results;		      /* late_feed is running */
-	bool checkpointing;			      /* a job's checkpoint is being written by the pool */
+	struct unrecorded_end *unrecorded_ends; /* jobs that have ended and whose records could not be written yet */
+	double unrecorded_ends_retry_at,
+		ledger_retry_at;	 /* next attempts to write records, and the copy of the ledger */
+	struct age_clock observed_clock; /* observed time when this run started */
+	double next_folder_check_at;	 /* next check of the jobs' folders */
+	double next_clearing_at;	 /* next round of clearing finished jobs */
+	struct clearing *clearing;	 /* the running round; NULL: none */
+	bool is_flushing;
+	bool is_stepping, is_stopping;
+	bool is_feeding_late_results;		      /* late_results_feed is running */
+	bool is_checkpointing;			      /* a job's checkpoint is being written by the pool */
 	struct extension_request *extension_requests; /* requests that wait, in order of arrival */
 	/* An ended job that is being extended: the pool reads its films, and owns all of it but id and plan. NULL:
 	 * none. */
-	const struct live_job *reading_job;
-	uint64_t reading_peer; /* peer that requested the extension; 0: no job is being read */
-	uint64_t change_count; /* incremented whenever the status may have changed */
+	const struct live_job *extended_job;
+	uint64_t extending_peer; /* peer that requested the extension; 0: no job is being read */
+	uint64_t change_count;	 /* incremented whenever the status may have changed */
 };
 
 /* Calls `work` in a thread of the pool, then `done` in the loop's thread; both find `data` in w->data. Cannot fail:

@@ -67,7 +67,7 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 	job->plan = *plan;
 	job->submission = *submit;
 	memset(submit, 0, sizeof *submit);
-	STAILQ_INIT(&job->waiting);
+	STAILQ_INIT(&job->waiting_messages);
 	job->times = (struct live_job_times){NAN, NAN, NAN};
 	begin_record(job, owner, submitted);
 	job->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->states);
@@ -102,7 +102,7 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 
 void live_job_free(struct live_job *job)
 {
-	assert(!job->busy);
+	assert(!job->is_busy);
 	for (struct waiting_message *w; (w = live_job_pop_waiting(job));)
 		waiting_message_free(w);
 	for (uint32_t i = 0; job->states && i < job->plan.groups * job->plan.parts; i++)
@@ -112,7 +112,7 @@ void live_job_free(struct live_job *job)
 	mem_free(job->is_replacement);
 	mem_free(job->merged_records);
 	mem_free(job->seeds);
-	mem_free(job->credits);
+	mem_free(job->unverified_counts);
 	mem_free(job->late_results);
 	bootstrap_free(job->bootstrap);
 	canvas_free(job->canvas);
@@ -190,9 +190,9 @@ void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
 		return;
 	job->times.elapsed = elapsed;
 	if (!job->canvas)
-		job->times.opened = elapsed; /* remains the time of the last bootstrap batch */
+		job->times.first_round_at = elapsed; /* remains the time of the last bootstrap batch */
 	if (live_job_complete_rounds(job) > rounds)
-		job->times.completed = elapsed;
+		job->times.last_round_end = elapsed;
 }
 
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e)
@@ -258,10 +258,10 @@ bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct 
 	if (!w)
 		return false;
 	*w = (struct waiting_message){
-		.peer = peer, .key = *k, .envelope = *env, .payload = *payload, .files_checked = files_checked};
+		.peer = peer, .key = *k, .envelope = *env, .payload = *payload, .has_files_checked = files_checked};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
-	STAILQ_INSERT_TAIL(&job->waiting, w, next);
+	STAILQ_INSERT_TAIL(&job->waiting_messages, w, next);
 	job->waiting_bytes += waiting_size(w);
 	return true;
 }
@@ -269,7 +269,7 @@ bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct 
 const struct waiting_message *live_job_find_waiting(const struct live_job *job, const struct lease_key *k)
 {
 	const struct waiting_message *w;
-	STAILQ_FOREACH(w, &job->waiting, next) {
+	STAILQ_FOREACH(w, &job->waiting_messages, next) {
 		if (lease_key_equal(&w->key, k))
 			break;
 	}
@@ -280,7 +280,7 @@ static struct waiting_message *remove_waiting(struct live_job *job, struct waiti
 {
 	if (!w)
 		return NULL;
-	STAILQ_REMOVE(&job->waiting, w, waiting_message, next);
+	STAILQ_REMOVE(&job->waiting_messages, w, waiting_message, next);
 	job->waiting_bytes -= waiting_size(w);
 	return w;
 }
@@ -288,7 +288,7 @@ static struct waiting_message *remove_waiting(struct live_job *job, struct waiti
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 {
 	for (struct live_job *job = first; job; job = job->next)
-		for (struct waiting_message *w = STAILQ_FIRST(&job->waiting), *next; w; w = next) {
+		for (struct waiting_message *w = STAILQ_FIRST(&job->waiting_messages), *next; w; w = next) {
 			next = STAILQ_NEXT(w, next);
 			if (w->peer == peer)
 				waiting_message_free(remove_waiting(job, w));
@@ -297,7 +297,7 @@ void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 
 struct waiting_message *live_job_pop_waiting(struct live_job *job)
 {
-	return remove_waiting(job, STAILQ_FIRST(&job->waiting));
+	return remove_waiting(job, STAILQ_FIRST(&job->waiting_messages));
 }
 
 static bool is_failure(const struct waiting_message *w)
@@ -308,7 +308,7 @@ static bool is_failure(const struct waiting_message *w)
 
 struct waiting_message *live_job_pop_failure(struct live_job *job, uint64_t peer)
 {
-	struct waiting_message *w = STAILQ_FIRST(&job->waiting);
+	struct waiting_message *w = STAILQ_FIRST(&job->waiting_messages);
 	while (w && (w->peer != peer || !is_failure(w)))
 		w = STAILQ_NEXT(w, next);
 	return remove_waiting(job, w);

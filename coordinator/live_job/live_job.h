@@ -2,7 +2,7 @@
 /*
  * A running job with its data, apart from the few numbers that the core (coordinator/core) keeps of it: scene files,
  * bootstrap, canvas, seeds, the chain states after the last merged epoch of each (group, part), its log. The loop's
- * thread; while `busy`, a thread of the pool reads the canvas and nobody adds to it.
+ * thread; while `is_busy`, a thread of the pool reads the canvas and nobody adds to it.
  */
 #ifndef COORDINATOR_LIVE_JOB_LIVE_JOB_H
 #define COORDINATOR_LIVE_JOB_LIVE_JOB_H
@@ -51,22 +51,22 @@ struct waiting_message {
 	struct lease_key key;
 	struct envelope envelope;
 	struct buf payload;
-	bool files_checked; /* of a failure: the job's files have been read since it arrived */
+	bool has_files_checked; /* of a failure: the job's files have been read since it arrived */
 };
 
 /* Seconds after the job's first lease, including earlier runs: at the last merged batch, at the start of the first
  * round, and at the end of the last complete round. NAN: not reached yet. */
 struct live_job_times {
-	double elapsed, opened, completed;
+	double elapsed, first_round_at, last_round_end;
 };
 
 /* How many results of a worker were merged without having been verified. */
-struct live_job_credit {
+struct live_job_unverified_count {
 	uint64_t worker_id; /* the core's id of the worker */
 	uint64_t lease_count;
 };
 
-/* A stored result that cannot be merged yet (late.h). */
+/* A stored result that cannot be merged yet (late_results.h). */
 struct late_result {
 	struct lease_key key;
 	uint64_t offset;
@@ -107,45 +107,45 @@ struct live_job {
 	struct merged_record *merged_records;
 	size_t merged_record_count;
 	/* Bytes of JOURNAL_MERGED_BATCH records in the journal; their batches are also in the checkpoint. */
-	uint64_t kept_record_bytes;
+	uint64_t merged_record_bytes;
 	uint32_t chains_per_lease;
 	int log_fd;
 	uint64_t log_bytes;
 	struct journal *journal;
-	bool fingerprint_journaled; /* the journal has a record of the fingerprint */
+	bool is_fingerprint_journaled; /* the journal has a record of the fingerprint */
 	struct live_job_times times;
-	char fingerprint[256];	   /* numeric fingerprint that the job was pinned to when it was read from the spool */
-	uint64_t checkpoint_bytes; /* size of the last checkpoint; 0: none */
-	double checkpoint_not_before; /* s of the loop's clock: no checkpoint before this time */
-	double look_written;	      /* work of the last estimate stored in the journal */
+	char fingerprint[256];	    /* numeric fingerprint that the job was pinned to when it was read from the spool */
+	uint64_t checkpoint_bytes;  /* size of the last checkpoint; 0: none */
+	double min_checkpoint_time; /* s of the loop's clock: no checkpoint before this time */
+	double last_stored_look_work; /* work of the last estimate stored in the journal */
 	bool has_missing_file;	      /* files of its scene are missing or damaged, so it is held */
-	bool files_suspect;	      /* a file could not be read, or was wrong, when the files were last read */
-	bool held_for_storage;	      /* held because its results cannot be stored */
+	bool has_suspect_files;	      /* a file could not be read, or was wrong, when the files were last read */
+	bool is_held_for_storage;     /* held because its results cannot be stored */
 	size_t blocked_result_bytes;  /* size of the result for which there was no space */
 	/* Bytes of chain states for which there was no room when the job was held; 0: states were not the reason. */
 	uint64_t blocked_state_bytes;
 	double retry_at; /* s of the loop's clock: when to try again what the disk refused */
 	/* It is unknown whether the rename of the last checkpoint is durable, so nothing is stored before the next
 	 * checkpoint. */
-	bool checkpoint_uncertain;
+	bool is_checkpoint_uncertain;
 	uint64_t min_generation; /* the next checkpoint has at least this generation */
-	bool prepare_pending;	 /* its bootstrap is complete, but the disk has no room for its films yet */
-	bool publish_pending;	 /* it has ended, but its image could not be written yet */
-	uint64_t publish_rounds;
-	bool record_pending; /* it has ended, but its record could not be written yet */
-	bool overflowed;     /* a sum left the range of the films, which are kept as they are */
-	bool busy, ended;
-	struct publish_task publishing; /* valid while busy */
-	bool black;			/* whether the published image or, without one, the bootstrap is black */
-	double preview_made_at;		/* when preview.exr was last made, s of the loop's clock; 0: never */
-	uint32_t worker_count;		/* number of workers that had leases of the job */
+	bool is_prepare_pending; /* its bootstrap is complete, but the disk has no room for its films yet */
+	bool is_publish_pending; /* it has ended, but its image could not be written yet */
+	uint64_t pending_publish_rounds;
+	bool is_record_pending; /* it has ended, but its record could not be written yet */
+	bool has_overflowed;	/* a sum left the range of the films, which are kept as they are */
+	bool is_busy, has_ended;
+	struct publish_task publish_task; /* valid while busy */
+	bool is_black;			  /* whether the published image or, without one, the bootstrap is black */
+	double preview_made_at;		  /* when preview.exr was last made, s of the loop's clock; 0: never */
+	uint32_t worker_count;		  /* number of workers that had leases of the job */
 	uint64_t last_workers[64];
-	struct live_job_credit *credits;
-	size_t credit_count;
+	struct live_job_unverified_count *unverified_counts;
+	size_t unverified_worker_count;
 	char quarantine_notes[512]; /* notes on results of workers that have been quarantined since; "": none */
 	struct late_result *late_results;
-	size_t late_count;
-	STAILQ_HEAD(waiting_list, waiting_message) waiting;
+	size_t late_result_count;
+	STAILQ_HEAD(waiting_list, waiting_message) waiting_messages;
 	size_t waiting_bytes;
 };
 
@@ -179,8 +179,8 @@ int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, b
 /* Counts the worker in worker_count, unless it is among the last 64 different ones. */
 void live_job_count_worker(struct live_job *job, uint64_t peer);
 
-/* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload. files_checked:
- * as in struct waiting_message. Returns false if out of memory. */
+/* Keeps a message until the canvas is free or the files have been read; takes over envelope and payload.
+ * has_files_checked: as in struct waiting_message. Returns false if out of memory. */
 bool live_job_enqueue_message(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
 			      struct buf *payload, bool files_checked);
 /* Returns a waiting message about this lease; NULL: none. */

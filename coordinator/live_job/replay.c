@@ -3,8 +3,8 @@
  * Reads a job's merged results from the disk into its films.
  *
  * replay_films reads the checkpoint, if there is one, and then the journal that follows it. Each result goes through
- * the same code as results of workers. A result whose predecessor is missing is noted (late.h) and tried again at the
- * end. Other records restore fingerprint, times, estimates of the error and counters.
+ * the same code as results of workers. A result whose predecessor is missing is noted (late_results.h) and tried again
+ * at the end. Other records restore fingerprint, times, estimates of the error and counters.
  *
  * A damaged record is skipped, counted and logged in the job's log: its lease is computed again. A damaged checkpoint
  * is -EBADMSG. An undamaged record that makes no sense was written by another version: -EPROTO. After either of these
@@ -16,7 +16,7 @@
 #include "common/base/text.h"
 #include "coordinator/live_job/rollback.h"
 #include "coordinator/live_job/checkpoint_file.h"
-#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/late_results.h"
 #include "coordinator/live_job/stored.h"
 #include "coordinator/store/journal_file.h"
 
@@ -96,7 +96,7 @@ static int replay_batch(struct replay *r, const struct journal_item *item, struc
 	if (!rc && item->kind == JOURNAL_BATCH_REPLACEMENT)
 		rc = rollback_replay(r->job, item->journal, &batch.key, e);
 	if (!rc && item->kind == JOURNAL_MERGED_BATCH) {
-		r->job->kept_record_bytes += item->body_size;
+		r->job->merged_record_bytes += item->body_size;
 		rollback_note_batch(r->job, &batch.key, item->offset, env.message->lease_result->maker);
 		batch_fini(&batch);
 		envelope_fini(&env);
@@ -108,7 +108,7 @@ static int replay_batch(struct replay *r, const struct journal_item *item, struc
 	if (readiness == REPLAY_READY && !rc)
 		rollback_note_batch(r->job, &batch.key, item->offset, env.message->lease_result->maker);
 	else if (readiness == REPLAY_LATE)
-		rc = late_add(r->job, &batch.key, item->offset, e);
+		rc = late_results_add(r->job, &batch.key, item->offset, e);
 	batch_fini(&batch);
 	envelope_fini(&env);
 	return rc;
@@ -163,7 +163,7 @@ static int replay_record(void *user, const struct journal_item *item, struct err
 		if (rc)
 			return foreign_note_error(r, rc, e);
 		forecast_add_look(&job->record.looks, &look);
-		job->look_written = look.work;
+		job->last_stored_look_work = look.work;
 		return 0;
 	case JOURNAL_COUNTS:
 	case JOURNAL_OLD_COUNTS:
@@ -181,8 +181,8 @@ static int replay_late(struct replay *r, struct error *e)
 	struct live_job *job = r->job;
 	size_t kept = 0;
 	int rc = 0;
-	late_sort(job);
-	for (size_t i = 0; i < job->late_count; i++) {
+	late_results_sort(job);
+	for (size_t i = 0; i < job->late_result_count; i++) {
 		struct late_result l = job->late_results[i];
 		struct journal_item item = {.kind = JOURNAL_BATCH, .offset = l.offset};
 		unsigned char *body = NULL;
@@ -196,7 +196,7 @@ static int replay_late(struct replay *r, struct error *e)
 		if (readiness == REPLAY_LATE)
 			job->late_results[kept++] = l;
 	}
-	job->late_count = kept;
+	job->late_result_count = kept;
 	return rc;
 }
 
@@ -216,7 +216,7 @@ static void log_damage(const struct replay *r, const struct journal_damage *foun
 	live_job_log(
 		job, LOG_SPOOL_FAULT,
 		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; leases to be computed again%s\"",
-		(unsigned long long)found->damaged_count, job->late_count, (unsigned long long)found->lost_count,
+		(unsigned long long)found->damaged_count, job->late_result_count, (unsigned long long)found->lost_count,
 		*text ? text : ": none");
 }
 
@@ -236,14 +236,14 @@ int replay_films(const struct spool *spool, struct live_job *job, struct replay_
 			     folder, (unsigned long long)generation);
 		rc = journal_create(&job->journal, folder, job->id, generation, e);
 	}
-	if (!rc && job->late_count)
+	if (!rc && job->late_result_count)
 		rc = replay_late(&r, e);
 	if (rc)
 		return rc;
 	if (found.lost_count)
 		log_damage(&r, &found);
 	journal_delete_others(folder, generation);
-	job->fingerprint_journaled = *job->fingerprint != 0;
+	job->is_fingerprint_journaled = *job->fingerprint != 0;
 	live_job_log(
 		job, LOG_JOB_STATE,
 		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",

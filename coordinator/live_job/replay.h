@@ -3,7 +3,7 @@
  * Reads a job's merged results from its checkpoint and journal into a live job, with the code that merges results of
  * workers, so the bits are the same. A result is merged if the previous epoch of its chains is merged and its round
  * is open. A damaged result is skipped, and later results that depend on it wait in the journal until it has been
- * computed again (late.h); the image is the same.
+ * computed again (late_results.h); the image is the same.
  */
 #ifndef COORDINATOR_LIVE_JOB_REPLAY_H
 #define COORDINATOR_LIVE_JOB_REPLAY_H

@@ -4,7 +4,7 @@
 #include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/live_job/late.h"
+#include "coordinator/live_job/late_results.h"
 
 #include <assert.h>
 #include <string.h>
@@ -129,7 +129,7 @@ void rollback_fini(struct rollback *b)
 int rollback_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e)
 {
 	int rc = 0;
-	late_remove_from_epoch(job, k);
+	late_results_remove_from_epoch(job, k);
 	if (!job->canvas || k->group >= job->plan.groups || k->part >= job->plan.parts)
 		return 0;
 	while (!rc && canvas_has_lease(job->canvas, k)) {

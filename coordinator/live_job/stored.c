@@ -64,13 +64,13 @@ static void fill_look(const struct forecast_look *l, Stored__Look *m)
 {
 	stored__look__init(m);
 	FORECAST_COPY_LOOK(m, l);
-	m->doubtful = l->doubtful;
+	m->doubtful = l->is_doubtful;
 }
 
 static int take_look(const Stored__Look *m, struct forecast_look *l, struct error *e)
 {
 	FORECAST_COPY_LOOK(l, m);
-	l->doubtful = m->doubtful;
+	l->is_doubtful = m->doubtful;
 	return message_check_fields(&m->base, e);
 }
 
@@ -95,10 +95,10 @@ int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_
 	X(bootstrap_cpu_seconds, bootstrap_cpu_seconds) \
 	X(look_written, look_written)                   \
 	X(times.elapsed, elapsed)                       \
-	X(times.opened, opened)                         \
-	X(times.completed, completed)                   \
+	X(times.first_round_at, opened)                 \
+	X(times.last_round_end, completed)              \
 	X(bootstrap_result.b_pooled, b_pooled)          \
-	X(bootstrap_result.beyond_share, beyond_share)
+	X(bootstrap_result.overlong_share, beyond_share)
 
 size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MAX])
 {
@@ -113,7 +113,7 @@ size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STO
 	memcpy(b, h->bootstrap_result.b, sizeof b);
 	m.b = b;
 	m.n_b = PLAN_GROUPS_MAX;
-	m.black = h->bootstrap_result.black;
+	m.black = h->bootstrap_result.is_black;
 	for (; m.n_looks < h->looks.count; m.n_looks++) {
 		fill_look(&h->looks.looks[m.n_looks], &look[m.n_looks]);
 		looks[m.n_looks] = &look[m.n_looks];
@@ -135,7 +135,7 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 			       m->n_looks);
 	if (rc)
 		return rc;
-	*h = (struct checkpoint_head){.bootstrap_result.black = m->black != 0, .looks.count = (uint32_t)m->n_looks};
+	*h = (struct checkpoint_head){.bootstrap_result.is_black = m->black != 0, .looks.count = (uint32_t)m->n_looks};
 #define X(ours, theirs) h->ours = m->theirs;
 	HEAD_NUMBERS(X)
 #undef X
@@ -210,8 +210,8 @@ void stored_unpack_old_head(const unsigned char bytes[STORED_OLD_HEAD_SIZE], uin
 				      .look_written = get_double(bytes + 32),
 				      .times = {get_double(bytes + 40), get_double(bytes + 48), get_double(bytes + 56)},
 				      .bootstrap_result = {.b_pooled = get_double(bytes + 576),
-							   .beyond_share = get_double(bytes + 584),
-							   .black = bytes[592] != 0},
+							   .overlong_share = get_double(bytes + 584),
+							   .is_black = bytes[592] != 0},
 				      .counts = unpack_old_counts(bytes + COUNTS_OFFSET)};
 	copy_numbers(h->bootstrap_result.b, bytes + 64, sizeof *h->bootstrap_result.b, OLD_GROUPS);
 	for (; h->looks.count < looks && h->looks.count < OLD_LOOKS; h->looks.count++)

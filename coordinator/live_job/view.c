@@ -3,8 +3,9 @@
  * A job as it is displayed: a record, plus values that only a live job has, as a message or JSON.
  *
  * view_from_record starts a view, view_add_status adds the core's values. Users who may see only their own jobs get
- * texts without the ids of other owners' jobs (view_hide_others). Unknown numbers are null in JSON and negative in
- * messages. Messages borrow the view's texts and must be sent while the view exists. JSON is NULL if memory runs out.
+ * texts without the ids of other owners' jobs (view_hide_other_owners). Unknown numbers are null in JSON and negative
+ * in messages. Messages borrow the view's texts and must be sent while the view exists. JSON is NULL if memory runs
+ * out.
  */
 #include "coordinator/live_job/view.h"
 
@@ -71,7 +72,7 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 #undef COUNT
 }
 
-void view_hide_others(struct job_view *v)
+void view_hide_other_owners(struct job_view *v)
 {
 	memcpy(v->place, v->owners_place, sizeof v->place);
 	memcpy(v->waiting, v->owners_waiting, sizeof v->waiting);
@@ -114,7 +115,7 @@ void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm
 		Farm__Look *l = looks->pointers[i] = &looks->items[i];
 		farm__look__init(l);
 		FORECAST_COPY_LOOK(l, &h->looks[i]);
-		l->doubtful = h->looks[i].doubtful != 0;
+		l->doubtful = h->looks[i].is_doubtful != 0;
 	}
 	out->n_looks = h->count;
 	out->looks = looks->pointers;
@@ -162,7 +163,7 @@ static void add_details(json_t *o, const struct job_record *r)
 #define TEXT(member, size, in, by, key, shown, wire) {FIELD_TEXT, offsetof(struct job_view, in member), size, shown},
 #define NUMBER(kind, member, in, by, key, shown, wire) {FIELD_##kind, offsetof(struct job_view, in member), 0, shown},
 #define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_view, record.member), 0, shown},
-static const struct field fields[] = {JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)};
+static const struct job_field fields[] = {JOB_FIELDS(TEXT, NUMBER, COUNT, JOB_NO_FIELD)};
 #undef TEXT
 #undef NUMBER
 #undef COUNT
@@ -215,5 +216,5 @@ json_t *view_lease_to_json(const struct lease_status *l, const char *worker, dou
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)l->key.job);
 	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind", lease_kind_name(l->key.kind), "group",
 			 (int)l->key.group, "part", (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker",
-			 worker, "age", now - l->sent_at, "overdue", (int)l->overdue);
+			 worker, "age", now - l->sent_at, "overdue", (int)l->is_overdue);
 }

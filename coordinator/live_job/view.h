@@ -32,7 +32,7 @@ void view_from_record(struct job_view *v, const struct job_record *r);
 void view_add_status(struct job_view *v, const struct job_status *s);
 
 /* Replaces the texts by those for the owner, who must not learn about other owners' jobs. */
-void view_hide_others(struct job_view *v);
+void view_hide_other_owners(struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
 struct view_looks {

@@ -18,7 +18,7 @@
 #include "common/plan/plan_text.h"
 #include "coordinator/live_job/incoming.h"
 #include "coordinator/jobs/listing.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 #include "coordinator/peers/client_answers.h"
@@ -82,9 +82,9 @@ static void refuse_upload(struct session *p, const struct error *e)
 
 static int check_quota(const struct session *p, struct error *e)
 {
-	if (p->tls_identity.role == TLS_OPERATOR)
+	if (p->tls_peer.role == TLS_OPERATOR)
 		return 0;
-	return jobs_check_quota(p->jobs, p->tls_identity.name, 0, client_uploading_bytes(p), &p->upload->plan,
+	return jobs_check_quota(p->jobs, p->tls_peer.name, 0, client_uploading_bytes(p), &p->upload->plan,
 				p->upload->submission.message->submit, e);
 }
 
@@ -102,7 +102,7 @@ static int check_capacity(const struct session *p, struct error *e)
 				 p->upload->plan.chains, 1e-6 * (double)states,
 				 1e-6 * (double)p->jobs->config.max_state_bytes);
 	int rc = spool_check_capacity(p->jobs->spool, bytes, e);
-	return rc ? rc : room_check_fits(p->jobs, bytes, e);
+	return rc ? rc : storage_check_fits(p->jobs, bytes, e);
 }
 
 /* Gives the submission, whose blobs have all arrived, to the core, and answers the client. */
@@ -122,13 +122,13 @@ static void submit_job(struct session *p)
 			   .submit = {.plan = &p->upload->plan,
 				      .name = name,
 				      .priority = m->priority,
-				      .owner = p->tls_identity.name,
-				      .mixed = m->mixed,
+				      .owner = p->tls_peer.name,
+				      .is_mixed = m->mixed,
 				      .verify_fraction = trust_verify_fraction(p->jobs, m)}};
 	struct submission submission = {.envelope = &p->upload->submission,
 					.plan = &p->upload->plan,
 					.epoch_rule = p->upload->epoch_rule,
-					.owner = p->tls_identity.name,
+					.owner = p->tls_peer.name,
 					.address = p->address};
 	int rc = jobs_try_step(p->jobs, &ev, &(struct incoming){.submission = &submission}, &e);
 	answer_submit(p, rc ? 0 : submission.job_id, e.text, rc ? NULL : p->upload);
@@ -166,14 +166,14 @@ static void on_lookup_idle(uv_idle_t *h)
 	struct peers *s = h->data;
 	struct session *next = NULL;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->state == SESSION_CLIENT && p->upload && p->upload->lookup_pending &&
+		if (p->state == SESSION_CLIENT && p->upload && p->upload->is_lookup_pending &&
 		    (!next || p->turn_number < next->turn_number))
 			next = p;
 	if (!next) {
 		uv_idle_stop(h);
 		return;
 	}
-	next->turn_number = ++s->request_total;
+	next->turn_number = ++s->last_turn_number;
 	look_up_files(next);
 }
 
@@ -197,7 +197,7 @@ static bool evict_other_upload(struct peers *s, const struct session *sender, do
 			continue;
 		if (has_stalled(p) && (!stalled || u->pace.progress_at < stalled->upload->pace.progress_at))
 			stalled = p;
-		if (u->received && !u->flush && u->pace.begun_at > begun) {
+		if (u->received_bytes && !u->flush && u->pace.begun_at > begun) {
 			latest = p;
 			begun = u->pace.begun_at;
 		}
@@ -255,7 +255,7 @@ static void on_flushed(void *user, int rc, const struct error *why)
 {
 	struct session *p = user;
 	struct error e = *why;
-	if (p->state != SESSION_CLIENT || p->jobs->stopping)
+	if (p->state != SESSION_CLIENT || p->jobs->is_stopping)
 		return;
 	if (!rc && p->upload->missing_count == 0)
 		submit_job(p);
@@ -266,9 +266,9 @@ static void on_flushed(void *user, int rc, const struct error *why)
 static void note_progress(const struct session *p)
 {
 	struct upload *u = p->upload;
-	if (u->received - u->pace.progress_bytes < PACE_BYTES)
+	if (u->received_bytes - u->pace.progress_bytes < PACE_BYTES)
 		return;
-	u->pace.progress_bytes = u->received;
+	u->pace.progress_bytes = u->received_bytes;
 	u->pace.progress_at = jobs_now(p->jobs);
 }
 
@@ -321,8 +321,8 @@ static void handle_watch(struct session *p, uint64_t job)
 		return;
 	}
 	p->watched_job = job;
-	mem_free(p->shown_status);
-	p->shown_status = NULL;
+	mem_free(p->last_sent_status);
+	p->last_sent_status = NULL;
 	client_tick(p);
 }
 
@@ -337,17 +337,17 @@ void client_tick(struct session *p)
 		session_fault(p, "the job is no longer known");
 		return;
 	}
-	if (p->shown_status && memcmp(p->shown_status, &v, sizeof v) == 0)
+	if (p->last_sent_status && memcmp(p->last_sent_status, &v, sizeof v) == 0)
 		return;
-	if (!p->shown_status && !(p->shown_status = mem_alloc(1, sizeof v)))
+	if (!p->last_sent_status && !(p->last_sent_status = mem_alloc(1, sizeof v)))
 		return;
-	*p->shown_status = v;
+	*p->last_sent_status = v;
 	view_to_wire(&v, &status);
 	view_looks_to_wire(&v, &looks, &status);
 	conn_send(p->conn, ENVELOPE_OF(JOB_STATUS, job_status, &status), NULL, 0);
 	if (record_is_ended(&v.record)) {
 		p->ended_watch.job = p->watched_job;
-		p->ended_watch.told_at = jobs_now(p->jobs);
+		p->ended_watch.notified_at = jobs_now(p->jobs);
 		p->watched_job = 0;
 	}
 }

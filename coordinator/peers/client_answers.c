@@ -9,10 +9,10 @@
 
 bool client_may_see(const struct session *p, struct job_view *v)
 {
-	if (p->tls_identity.role == TLS_NO_ROLE || p->tls_identity.role == TLS_OPERATOR)
+	if (p->tls_peer.role == TLS_NO_ROLE || p->tls_peer.role == TLS_OPERATOR)
 		return true;
-	view_hide_others(v);
-	return *p->tls_identity.name && strcmp(p->tls_identity.name, v->record.owner) == 0;
+	view_hide_other_owners(v);
+	return *p->tls_peer.name && strcmp(p->tls_peer.name, v->record.owner) == 0;
 }
 
 bool client_find_job(const struct session *p, uint64_t job, struct job_view *v)
@@ -31,7 +31,7 @@ uint64_t client_uploading_bytes(const struct session *p)
 {
 	uint64_t bytes = 0;
 	for (const struct session *other = LIST_FIRST(&p->peers->sessions); other; other = LIST_NEXT(other, next))
-		if (other != p && other->upload && strcmp(other->tls_identity.name, p->tls_identity.name) == 0)
+		if (other != p && other->upload && strcmp(other->tls_peer.name, p->tls_peer.name) == 0)
 			bytes += live_job_asset_bytes(other->upload->submission.message->submit);
 	return bytes;
 }

@@ -13,7 +13,7 @@
 /* The name in the certificate. Without certificates clients could give any name, so none is used. */
 static const char *client_name(const struct session *p)
 {
-	return *p->tls_identity.name ? p->tls_identity.name : "a client";
+	return *p->tls_peer.name ? p->tls_peer.name : "a client";
 }
 
 static int ask_core(struct session *p, struct event *ev, struct error *e)
@@ -35,7 +35,7 @@ static int set_hold(struct session *p, uint64_t id, const char *holder, struct e
 	char text[256];
 	struct event ev = {.kind = EVENT_HOLD,
 			   .job = id,
-			   .hold = HOLD_BY_USER,
+			   .hold = HOLD_USER,
 			   .text = *holder ? restore_hold_text(holder, text) : ""};
 	int rc = ask_core(p, &ev, e);
 	if (rc)
@@ -53,7 +53,7 @@ static int set_hold(struct session *p, uint64_t id, const char *holder, struct e
 static int set_priority(struct session *p, uint64_t id, int priority, struct error *e)
 {
 	struct jobs *jobs = p->jobs;
-	struct event ev = {.kind = EVENT_PRIORITY, .job = id, .priority = priority};
+	struct event ev = {.kind = EVENT_SET_PRIORITY, .job = id, .priority = priority};
 	int rc = ask_core(p, &ev, e);
 	if (rc)
 		return rc;
@@ -97,8 +97,8 @@ void control_apply(struct session *p, const Farm__Control *c)
 {
 	bool extends = c->verb == FARM__VERB__VERB_EXTEND;
 	struct error e;
-	struct requester requester = {.peer = p->id, .exempt_from_quota = p->tls_identity.role == TLS_OPERATOR};
-	text_copy(requester.owner, sizeof requester.owner, p->tls_identity.name);
+	struct requester requester = {.peer = p->id, .is_exempt_from_quota = p->tls_peer.role == TLS_OPERATOR};
+	text_copy(requester.owner, sizeof requester.owner, p->tls_peer.name);
 	int rc = check_job_exists(p, c->job, extends, &e);
 	if (!rc) {
 		switch (c->verb) {

@@ -49,7 +49,7 @@ static void answer_hello(struct session *p, bool accepted, bool is_permanent, co
 }
 
 /* Refuses a peer for a reason that reconnecting does not change. */
-static void refuse_for_good(struct session *p, const char *reason)
+static void refuse_permanently(struct session *p, const char *reason)
 {
 	answer_hello(p, false, true, reason);
 }
@@ -63,7 +63,7 @@ static const char *write_peer_notes(const struct session *p, char *text, size_t 
 		text_print(text, size,
 			   "the coordinator is reading its jobs, %u %%: requests wait until it has finished",
 			   (unsigned)(100 * recovery_progress(p->jobs)));
-	if (p->known_to_core && farm_peer_status(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
+	if (p->is_known_to_core && farm_peer_status(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
 		text_print(text, size, "this worker is quarantined and gets no work: %s", s.last_fault);
 	return text;
 }
@@ -78,12 +78,12 @@ static void join_worker(struct session *p, const Farm__Hello *h)
 				    .name = p->name,
 				    .fingerprint = h->fingerprint,
 				    .threads = h->threads,
-				    .certificate = p->tls_identity.name,
+				    .certificate = p->tls_peer.name,
 				    .home = h->home,
 				    .restarts = h->restarts}};
-	p->known_to_core = true;
+	p->is_known_to_core = true;
 	if (jobs_try_step(p->jobs, &ev, &(struct incoming){0}, &e)) {
-		p->known_to_core = false;
+		p->is_known_to_core = false;
 		answer_hello(p, false, false, e.text);
 		return;
 	}
@@ -92,18 +92,18 @@ static void join_worker(struct session *p, const Farm__Hello *h)
 		LOG_PEER_HELLO,
 		"peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
 		(unsigned long long)p->id, p->address, log_quote(p->name).text,
-		*p->tls_identity.name ? p->tls_identity.name : "-", *h->home ? h->home : "-",
-		(unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
+		*p->tls_peer.name ? p->tls_peer.name : "-", *h->home ? h->home : "-", (unsigned long long)h->restarts,
+		h->threads, log_quote(h->fingerprint).text);
 	answer_hello(p, true, false, write_peer_notes(p, text, sizeof text));
 }
 
-/* Returns what the peer wants to do but its certificate does not allow; NULL: nothing. Sets p->tls_identity. */
-static const char *find_overreach(struct session *p, Farm__Role role, char *text, size_t size)
+/* Returns what the peer wants to do but its certificate does not allow; NULL: nothing. Sets p->tls_peer. */
+static const char *find_forbidden_request(struct session *p, Farm__Role role, char *text, size_t size)
 {
 	const struct tls_peer *who = conn_peer(p->conn);
 	if (!who)
 		return NULL;
-	p->tls_identity = *who;
+	p->tls_peer = *who;
 	bool is_allowed = role == FARM__ROLE__ROLE_WORKER ? who->role == TLS_WORKER
 							  : who->role == TLS_CLIENT || who->role == TLS_OPERATOR;
 	if (is_allowed)
@@ -130,18 +130,18 @@ static void handle_hello(struct session *p, const Farm__Hello *h)
 			"the %s speaks version %u of the protocol, the coordinator version %d: the %s is older and must "
 			"be updated",
 			who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
-		refuse_for_good(p, text);
+		refuse_permanently(p, text);
 		return;
 	}
 	if (!envelope_text_is_valid(h->name, sizeof p->name - 1) || !envelope_text_is_valid(h->fingerprint, 255) ||
 	    !is_valid_home(h->home) || h->threads > 4096) {
-		refuse_for_good(p, "a name or a number in hello is out of bounds");
+		refuse_permanently(p, "a name or a number in hello is out of bounds");
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
-	const char *overreach = find_overreach(p, h->role, text, sizeof text);
+	const char *overreach = find_forbidden_request(p, h->role, text, sizeof text);
 	if (overreach) {
-		refuse_for_good(p, overreach);
+		refuse_permanently(p, overreach);
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER_MAX, 0});
@@ -153,7 +153,7 @@ static void handle_hello(struct session *p, const Farm__Hello *h)
 		p->state = SESSION_CLIENT;
 		answer_hello(p, true, false, write_peer_notes(p, text, sizeof text));
 	} else {
-		refuse_for_good(p, "hello must say whether it is a worker or a client");
+		refuse_permanently(p, "hello must say whether it is a worker or a client");
 	}
 }
 
@@ -204,7 +204,7 @@ void conversations_resume(struct peers *s)
 
 void conversations_tick(struct peers *s)
 {
-	s->request_ms = 0;
+	s->request_ms_this_tick = 0;
 	if (recovery_is_running(s->jobs))
 		return;
 	for (struct session *p; (p = request_queue_next_session(s));)
@@ -215,7 +215,7 @@ static void on_closed(void *user, const char *why)
 {
 	struct session *p = user;
 	struct peers *s = p->peers;
-	if (!p->jobs->stopping)
+	if (!p->jobs->is_stopping)
 		results_release_peer(p->jobs, p->id); /* while the session still has a name */
 	peers_remove_session(s, p);
 	client_abort_upload(p);
@@ -223,7 +223,7 @@ static void on_closed(void *user, const char *why)
 	worker_requests_drop(p);
 	request_queue_drop(p);
 	extend_forget_peer(p->jobs, p->id);
-	s->garbled_count += conn_had_bad_checksum(p->conn);
+	s->bad_checksum_count += conn_had_bad_checksum(p->conn);
 	log_event(conn_had_bad_checksum(p->conn)    ? LOG_PEER_GARBLED
 		  : conn_certificate_error(p->conn) ? LOG_PEER_REFUSED
 		  : conn_was_evicted(p->conn)	    ? LOG_PEER_REFUSED
@@ -231,11 +231,11 @@ static void on_closed(void *user, const char *why)
 						    : LOG_PEER_ACCEPT,
 		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(why).text);
-	if (p->known_to_core && !p->jobs->stopping) {
+	if (p->is_known_to_core && !p->jobs->is_stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
 		jobs_step(p->jobs, &ev);
 	}
-	mem_free(p->shown_status);
+	mem_free(p->last_sent_status);
 	mem_free(p);
 }
 

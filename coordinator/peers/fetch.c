@@ -46,7 +46,7 @@ void fetch_end(struct session *p)
 	if (!p->fetch.job)
 		return;
 	disk_close(p->fetch.fd);
-	p->fetch = (struct fetching){0};
+	p->fetch = (struct file_fetch){0};
 	p->peers->fetch_count--;
 }
 
@@ -81,7 +81,7 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 	}
 	if (st.st_size > CHUNK_BYTES) /* otherwise the first chunk is the only one */
 		drop_idlest_fetch(p->peers);
-	p->fetch = (struct fetching){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
+	p->fetch = (struct file_fetch){.job = f->job, .file_kind = f->what, .fd = fd, .size = (uint64_t)st.st_size};
 	p->peers->fetch_count++;
 	return 0;
 }
@@ -103,10 +103,10 @@ static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view 
 	return open_file(p, f, file, e);
 }
 
-static int read_chunk(const struct fetching *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count,
+static int read_chunk(const struct file_fetch *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count,
 		      struct error *e)
 {
-	if (t->job != f->job || t->what != f->what)
+	if (t->job != f->job || t->file_kind != f->what)
 		return error_set(e, ESTALE,
 				 "j%llu: the fetch was dropped in favour of others, or did not start at the beginning",
 				 (unsigned long long)f->job);
@@ -147,7 +147,7 @@ static void answer_fetch(struct session *p, const Farm__Fetch *f)
  * it takes. */
 static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 {
-	return job && job->canvas && !job->ended &&
+	return job && job->canvas && !job->has_ended &&
 	       (job->preview_made_at <= 0 || jobs_now(jobs) - job->preview_made_at > preview_max_age);
 }
 
@@ -155,7 +155,7 @@ void fetch_serve_previews(struct peers *s, uint64_t id)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		struct live_job *job = jobs_find_live(s->jobs, id);
-		if (p->preview_job != id || (job && job->busy))
+		if (p->preview_job != id || (job && job->is_busy))
 			continue;
 		if (is_preview_old(s->jobs, job)) {
 			publish_start(s->jobs, job, PUBLISH_PREVIEW, 0);
@@ -182,7 +182,7 @@ bool fetch_uses_result(const struct peers *s, uint64_t job)
 	static const double fetching_seconds = 60;
 	double cutoff = jobs_now(s->jobs) - fetching_seconds;
 	for (const struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->watched_job == job || (p->ended_watch.job == job && p->ended_watch.told_at > cutoff) ||
+		if (p->watched_job == job || (p->ended_watch.job == job && p->ended_watch.notified_at > cutoff) ||
 		    (p->fetch.job == job && p->fetch.sent_at > cutoff))
 			return true;
 	return false;

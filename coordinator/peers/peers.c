@@ -31,7 +31,7 @@ static const struct conn_events refused_events = {.closed = on_refused};
 
 /* Closes the oldest connection that has not said hello: strangers that hold connections and say nothing must not
  * block others. Returns false if there is none. */
-static bool close_oldest_stranger(struct peers *s)
+static bool close_oldest_unidentified(struct peers *s)
 {
 	struct session *oldest = NULL;
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
@@ -54,16 +54,16 @@ void peers_accept(struct peers *s, struct listener *source)
 				     &s->receive_pool,
 				     &s->send_pool};
 	struct error e;
-	bool has_room = s->session_count < s->jobs->config.max_connections || close_oldest_stranger(s);
+	bool has_room = s->session_count < s->jobs->config.max_connections || close_oldest_unidentified(s);
 	struct session *p = has_room ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;
-	source->accept_pending = false;
+	source->is_accept_pending = false;
 	if (!p) {
 		log_event(LOG_PEER_REFUSED, "text=\"too many connections\"");
 		if (conn_accept(&c, (uv_stream_t *)&source->tcp, &config, &refused_events, NULL, &e) == 0)
 			conn_close(c, "too many connections");
 		else
-			source->accept_pending = true;
+			source->is_accept_pending = true;
 		return;
 	}
 	p->peers = s;
@@ -73,7 +73,7 @@ void peers_accept(struct peers *s, struct listener *source)
 	STAILQ_INIT(&p->queued_requests);
 	if (conn_accept(&p->conn, (uv_stream_t *)&source->tcp, &config, &conversation_events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
-		source->accept_pending = true;
+		source->is_accept_pending = true;
 		mem_free(p);
 		return;
 	}
@@ -85,7 +85,7 @@ void peers_accept(struct peers *s, struct listener *source)
 void peers_tick(struct peers *s)
 {
 	for (unsigned i = 0; i < s->listener_count; i++)
-		if (s->listeners[i].accept_pending)
+		if (s->listeners[i].is_accept_pending)
 			peers_accept(s, &s->listeners[i]);
 	conversations_tick(s);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
@@ -121,7 +121,7 @@ static void dismiss_peer(struct peers *s, uint64_t peer, const char *text)
 	struct session *p = peers_find_session(s, peer);
 	if (!p)
 		return;
-	p->known_to_core = false;
+	p->is_known_to_core = false;
 	session_fault(p, "%s", text);
 }
 
@@ -142,7 +142,7 @@ static void announce_job_end(struct peers *s, uint64_t job)
 static void release_watchers(struct peers *s)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		if (p->watched_job && p->shown_status && !jobs_find_live(s->jobs, p->watched_job))
+		if (p->watched_job && p->last_sent_status && !jobs_find_live(s->jobs, p->watched_job))
 			client_tick(p);
 }
 

@@ -31,7 +31,7 @@ static bool bypasses_queue(Farm__Envelope__BodyCase what, bool first)
 /* Whether this is a client's request that takes turns with others: an order is flushed on the loop's thread, and
  * listing hundreds of jobs takes milliseconds. Chunks of blobs are excluded, since a client sends them only after it
  * has got an answer. */
-static bool takes_turns(const struct session *p, Farm__Envelope__BodyCase what)
+static bool must_take_turn(const struct session *p, Farm__Envelope__BodyCase what)
 {
 	return p->state == SESSION_CLIENT && what != FARM__ENVELOPE__BODY_BLOB_CHUNK && !bypasses_queue(what, false);
 }
@@ -41,21 +41,21 @@ static bool must_wait(const struct session *p, Farm__Envelope__BodyCase what)
 	bool first = STAILQ_EMPTY(&p->queued_requests);
 	if (recovery_is_running(p->jobs))
 		return !bypasses_queue(what, first);
-	return takes_turns(p, what) && (!first || p->peers->request_ms > REQUESTS_MS_PER_TICK);
+	return must_take_turn(p, what) && (!first || p->peers->request_ms_this_tick > REQUESTS_MS_PER_TICK);
 }
 
 void request_queue_note_handled(struct session *p, Farm__Envelope__BodyCase what, double begun)
 {
-	if (!takes_turns(p, what))
+	if (!must_take_turn(p, what))
 		return;
-	p->peers->request_ms += 1000 * (jobs_now(p->jobs) - begun);
-	p->turn_number = ++p->peers->request_total;
+	p->peers->request_ms_this_tick += 1000 * (jobs_now(p->jobs) - begun);
+	p->turn_number = ++p->peers->last_turn_number;
 }
 
 struct session *request_queue_next_session(const struct peers *s)
 {
 	struct session *next = NULL;
-	for (struct session *p = LIST_FIRST(&s->sessions); p && s->request_ms <= REQUESTS_MS_PER_TICK;
+	for (struct session *p = LIST_FIRST(&s->sessions); p && s->request_ms_this_tick <= REQUESTS_MS_PER_TICK;
 	     p = LIST_NEXT(p, next))
 		if (!STAILQ_EMPTY(&p->queued_requests) && (!next || p->turn_number < next->turn_number))
 			next = p;

@@ -34,10 +34,10 @@ struct session {
 	struct conn *conn;
 	uint64_t id; /* the core's id of the peer, and the tag of its orders */
 	enum session_state state;
-	bool known_to_core; /* the core knows the peer */
+	bool is_known_to_core; /* the core knows the peer */
 	char name[128], address[64];
 	/* Name and role in its certificate; TLS_NO_ROLE without TLS, in which case it may do everything. */
-	struct tls_peer tls_identity;
+	struct tls_peer tls_peer;
 	uint32_t payload_limit;
 	size_t max_lease_bytes; /* bytes of as many leases as the worker wants */
 	/* Requests that wait until the worker has read what was sent, or until a file has been checked. */
@@ -50,17 +50,17 @@ struct session {
 	uint64_t watched_job;	     /* job being watched; 0: none */
 	struct {
 		uint64_t job;
-		double told_at; /* s of the loop's clock: when the client was told */
-	} ended_watch;		/* the watched job whose end the client has been told: it will fetch the result */
-	struct fetching {	/* a file that the client is receiving */
-		uint64_t job;	/* 0: none */
-		Farm__What what;
+		double notified_at; /* s of the loop's clock: when the client was told */
+	} ended_watch;		    /* the watched job whose end the client has been told: it will fetch the result */
+	struct file_fetch {	    /* a file that the client is receiving */
+		uint64_t job;	    /* 0: none */
+		Farm__What file_kind;
 		int fd;
 		uint64_t size;	/* size of the file when it was opened; a log may grow */
 		double sent_at; /* s of the loop's clock: when the last chunk was sent */
 	} fetch;
 	uint64_t preview_job;			       /* job whose preview the client waits for; 0: none */
-	struct job_view *shown_status;		       /* status last sent to the client that watches */
+	struct job_view *last_sent_status;	       /* status last sent to the client that watches */
 	STAILQ_HEAD(, queued_request) queued_requests; /* requests that wait, see request_queue.h */
 	size_t queued_request_bytes;
 	/* Number of the client's last request, in the order of the requests of all sessions; clients with lower
@@ -72,10 +72,10 @@ struct session {
 /* All sessions, and their common limits. */
 struct peers {
 	struct jobs *jobs;
-	struct tls *tls;	     /* NULL: plaintext */
-	struct listener {	     /* listening sockets, on the loop of the jobs */
-		uv_tcp_t tcp;	     /* first member, so that libuv's pointer to it is one to the listener */
-		bool accept_pending; /* a connection could not be accepted; try again at the next tick */
+	struct tls *tls;		/* NULL: plaintext */
+	struct listener {		/* listening sockets, on the loop of the jobs */
+		uv_tcp_t tcp;		/* first member, so that libuv's pointer to it is one to the listener */
+		bool is_accept_pending; /* a connection could not be accepted; try again at the next tick */
 	} listeners[NET_ADDRS_MAX];
 	unsigned listener_count;
 	LIST_HEAD(, session) sessions;
@@ -83,13 +83,13 @@ struct peers {
 	uv_idle_t lookup_idle; /* runs while submissions look for their files */
 	unsigned session_count, fetch_count;
 	size_t queued_request_bytes;
-	uint64_t request_total;	     /* number of requests of clients so far */
-	double request_ms;	     /* ms that requests of clients have taken since the last tick */
+	uint64_t last_turn_number;   /* number of requests of clients so far */
+	double request_ms_this_tick; /* ms that requests of clients have taken since the last tick */
 	size_t submit_message_bytes; /* bytes of the messages of all submissions being received */
 	struct receive_pool receive_pool;
 	struct send_pool send_pool;
 	uint64_t last_peer_id;
-	uint64_t garbled_count; /* connections closed because of a wrong checksum */
+	uint64_t bad_checksum_count; /* connections closed because of a wrong checksum */
 };
 
 struct session *peers_find_session(const struct peers *s, uint64_t id); /* NULL: no such session */

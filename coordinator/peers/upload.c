@@ -312,10 +312,10 @@ bool upload_is_looking_up(const struct upload *u)
 int upload_look_up_files(struct upload *u, struct jobs *jobs, struct error *e)
 {
 	const Farm__Submit *m = u->submission.message->submit;
-	u->lookup_pending = false;
+	u->is_lookup_pending = false;
 	for (int i = 0; upload_is_looking_up(u); i++) {
 		if (i == LOOKUPS_PER_TURN) {
-			u->lookup_pending = true;
+			u->is_lookup_pending = true;
 			return -EAGAIN;
 		}
 		struct blob_hash h = file_hash_from_wire(m->files[u->looked_up_count]);
@@ -408,7 +408,7 @@ int upload_add_chunk(struct upload *u, const Farm__BlobChunk *c, const unsigned 
 		rc = blob_write_append(u->writer, payload, size, e);
 	if (rc)
 		return rc;
-	u->received += size;
+	u->received_bytes += size;
 	if (blob_write_offset(u->writer) < c->size) {
 		blob_write_pause(u->writer); /* closes the file: thousands of clients may stop midway */
 		return 0;

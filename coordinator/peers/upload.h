@@ -24,16 +24,16 @@ struct upload {
 	uint32_t *by_hash;	/* [files]: indices of the files, sorted by hash */
 	bool *has_arrived;	/* [places in by_hash]: the blob has arrived, but may not be flushed yet */
 	size_t looked_up_count; /* number of files that have been looked for in the store */
-	bool lookup_pending;	/* the other files are looked for in a later turn of the loop */
+	bool is_lookup_pending; /* the other files are looked for in a later turn of the loop */
 	size_t missing_count;	/* number of files looked for that are not held */
 	struct blob_writer *writer;
 	struct blob_hash writer_hash;
-	uint64_t received; /* bytes of files received so far */
+	uint64_t received_bytes; /* bytes of files received so far */
 	struct {
 		double begun_at; /* s of the loop's clock: when the submission arrived */
 		/* s of the loop's clock: when enough new bytes had arrived last; INFINITY: none are expected yet. */
 		double progress_at;
-		uint64_t progress_bytes; /* `received` at that time */
+		uint64_t progress_bytes; /* `received_bytes` at that time */
 	} pace;				 /* set and used by the session */
 	struct blob_batch *batch;	 /* blobs that have arrived and wait for the next flush; NULL: none */
 	struct upload_flush *flush;	 /* the running flush; NULL: none */

@@ -44,7 +44,7 @@ void worker_note_partial(void *session)
 {
 	struct session *p = session;
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
-	if (!p->known_to_core || p->state != SESSION_WORKER ||
+	if (!p->is_known_to_core || p->state != SESSION_WORKER ||
 	    jobs_now(p->jobs) < p->partial_heartbeat_at + p->jobs->config.heartbeat_seconds)
 		return;
 	p->partial_heartbeat_at = jobs_now(p->jobs);
@@ -62,13 +62,13 @@ void worker_handle_message(struct session *p, struct envelope *env)
 		jobs_step(p->jobs, &ev);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_REQUEST:
-		ev.kind = EVENT_REQUEST;
+		ev.kind = EVENT_LEASE_REQUEST;
 		ev.wanted_leases = m->lease_request->want;
 		jobs_step(p->jobs, &ev);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_RESULT:
 		jobs_step(p->jobs, &ev);
-		if (p->known_to_core)
+		if (p->is_known_to_core)
 			handle_lease_result(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_FAILED:

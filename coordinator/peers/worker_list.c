@@ -8,7 +8,7 @@
 /* Whether this client may read what workers say of jobs, its own or not. */
 static bool can_read_faults(const struct session *p)
 {
-	return p->tls_identity.role == TLS_NO_ROLE || p->tls_identity.role == TLS_OPERATOR;
+	return p->tls_peer.role == TLS_NO_ROLE || p->tls_peer.role == TLS_OPERATOR;
 }
 
 /* Copies the status of each connected worker. false: no memory. */

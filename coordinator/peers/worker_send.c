@@ -52,7 +52,7 @@ void worker_send_revoke(struct peers *s, uint64_t peer, const struct lease_key *
 void worker_send_ack(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
 {
 	static const Farm__Verdict verdicts[] = {[ACK_MERGED] = FARM__VERDICT__VERDICT_MERGED,
-						 [ACK_REPEAT] = FARM__VERDICT__VERDICT_REPEATED,
+						 [ACK_REPEATED] = FARM__VERDICT__VERDICT_REPEATED,
 						 [ACK_REFUSED] = FARM__VERDICT__VERDICT_REFUSED,
 						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
 	char copy[512];

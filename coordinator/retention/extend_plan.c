@@ -10,7 +10,7 @@ static uint64_t requested_total(const struct plan *p, const struct plan_request 
 				const struct extension_basis *basis)
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0, rounds = basis->rounds;
-	if (p->rounds == UINT64_MAX || basis->extension_cancelled)
+	if (p->rounds == UINT64_MAX || basis->was_extension_cancelled)
 		return p->kind == PLAN_CHAINS ? rounds * plan_round_mutations(p)
 					      : rounds * p->groups * p->epoch * pixels;
 	if (request->spp)
@@ -22,7 +22,7 @@ static int add_samples(const struct plan *p, const struct extension *x, const st
 		       struct plan_request *request, struct error *e)
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, added, total;
-	if (p->rounds == UINT64_MAX && !basis->ended)
+	if (p->rounds == UINT64_MAX && !basis->has_ended)
 		return error_set(e, EINVAL, "it has no bound on samples: give a time or an error");
 	if (__builtin_mul_overflow(x->spp, pixels, &added) || __builtin_add_overflow(added, x->mutations, &added) ||
 	    __builtin_add_overflow(added, requested_total(p, request, basis), &total))
@@ -66,37 +66,37 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 	int rc = extend_check(x, e);
 	if (rc)
 		return rc;
-	if (sets_error && basis->ended && basis->error <= x->target_error)
+	if (sets_error && basis->has_ended && basis->error <= x->target_error)
 		return error_set(e, EINVAL, "its error is already %.3g %%", 100 * basis->error);
 	uint64_t total = requested_total(p, request, basis);
-	bool bounded = p->rounds != UINT64_MAX && !basis->extension_cancelled;
+	bool bounded = p->rounds != UINT64_MAX && !basis->was_extension_cancelled;
 	request->spp = 0;
 	request->mutations = bounded ? total : 0;
 	rc = adds_samples ? add_samples(p, x, basis, request, e) : 0;
 	if (rc)
 		return rc;
-	if (!adds_samples && basis->ended && bounded && basis->rounds >= p->rounds)
+	if (!adds_samples && basis->has_ended && bounded && basis->rounds >= p->rounds)
 		request->mutations = 0; /* this bound is met, and lifted */
 	request->seconds = p->seconds;
 	if (adds_time)
 		request->seconds =
-			(p->seconds > 0 && !basis->extension_cancelled ? p->seconds : basis->seconds) + x->seconds;
-	else if (basis->extension_cancelled || (basis->ended && p->seconds > 0 && basis->seconds >= p->seconds))
+			(p->seconds > 0 && !basis->was_extension_cancelled ? p->seconds : basis->seconds) + x->seconds;
+	else if (basis->was_extension_cancelled || (basis->has_ended && p->seconds > 0 && basis->seconds >= p->seconds))
 		request->seconds = 0;
 	request->target_error = p->target_error;
 	if (sets_error)
 		request->target_error = x->target_error;
-	else if (basis->extension_cancelled || (basis->ended && basis->error <= p->target_error))
+	else if (basis->was_extension_cancelled || (basis->has_ended && basis->error <= p->target_error))
 		request->target_error = 0;
 	keep_chosen_counts(p, request);
 	rc = plan_make(request, out, e);
 	if (!rc && !has_same_bits(p, out))
 		rc = error_set(e, EINVAL, "its plan was made by a version with different rules: submit it again");
-	if (!rc && out->rounds < p->rounds && !basis->ended)
+	if (!rc && out->rounds < p->rounds && !basis->has_ended)
 		rc = error_set(e, EINVAL, "it would end earlier than it does");
 	if (!rc && out->rounds <= basis->rounds)
 		rc = error_set(e, EINVAL, "it already has as many samples");
-	if (!rc && out->seconds > 0 && basis->ended && basis->seconds >= out->seconds)
+	if (!rc && out->seconds > 0 && basis->has_ended && basis->seconds >= out->seconds)
 		rc = error_set(e, EINVAL, "it has already taken %.3g s", basis->seconds);
 	return rc;
 }

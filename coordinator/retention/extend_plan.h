@@ -18,10 +18,10 @@ struct extension { /* a member that is 0 is not named */
 
 /* The state of the job to be extended. */
 struct extension_basis {
-	uint64_t rounds;		 /* complete rounds */
-	double seconds;			 /* s of the job's time used so far */
-	double error;			 /* relative error as last estimated; NAN: none */
-	bool ended, extension_cancelled; /* extension_cancelled: so its bounds no longer apply */
+	uint64_t rounds;			 /* complete rounds */
+	double seconds;				 /* s of the job's time used so far */
+	double error;				 /* relative error as last estimated; NAN: none */
+	bool has_ended, was_extension_cancelled; /* was_extension_cancelled: so its bounds no longer apply */
 };
 
 /* Returns -EINVAL with a sentence if no bound is named or a number is invalid. */

@@ -19,7 +19,7 @@
 #include "common/net/notify.h"
 #include "common/net/uv_pool.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/jobs/start.h"
+#include "coordinator/jobs/lifecycle.h"
 #include "coordinator/server/limits.h"
 #include "coordinator/status/status.h"
 
@@ -31,7 +31,7 @@ enum { BACKLOG = 4096 };
 static void on_connection(uv_stream_t *listener, int status)
 {
 	struct server *s = listener->data;
-	if (status == 0 && !s->jobs.stopping)
+	if (status == 0 && !s->jobs.is_stopping)
 		peers_accept(&s->peers, (struct listener *)listener);
 }
 
@@ -138,7 +138,7 @@ static void on_before_poll(uv_prepare_t *h)
 static void on_after_poll(uv_check_t *h)
 {
 	struct server *s = h->data;
-	s->jobs.read_until = s->polled_at;
+	s->jobs.messages_read_until = s->polled_at;
 }
 
 static void on_tick(uv_timer_t *t)
@@ -159,7 +159,7 @@ static void on_tick(uv_timer_t *t)
 static void stop_server(void *server)
 {
 	struct server *s = server;
-	if (s->jobs.stopping)
+	if (s->jobs.is_stopping)
 		return;
 	notify_send("STOPPING=1");
 	jobs_stop(&s->jobs);
@@ -251,7 +251,7 @@ int server_open(struct server **out, const struct server_config *c, struct error
 
 int server_await_jobs(struct server *s, struct error *e)
 {
-	while (recovery_is_running(&s->jobs) && !s->jobs.stopping)
+	while (recovery_is_running(&s->jobs) && !s->jobs.is_stopping)
 		uv_run(&s->loop, UV_RUN_ONCE);
 	*e = s->jobs.fatal_error;
 	return s->jobs.fatal_code;

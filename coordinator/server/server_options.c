@@ -9,12 +9,12 @@
 
 #define CONFIG struct server_config
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"listen", 'l', "HOST:PORT",
 	 "Address for workers and clients; a name means all its addresses, port 0 any free port",
 	 OPTION_TEXT(CONFIG, listen_address), .default_value = "127.0.0.1:7700"},
 	{"spool", 0, "DIR", "Folder for scene files, jobs and results", OPTION_TEXT(CONFIG, spool_folder),
-	 .required = true},
+	 .is_required = true},
 	{"status-socket", 0, "PATH", "Unix socket for hslt-status", OPTION_TEXT(CONFIG, status_socket),
 	 .environment = "HSLT_STATUS_SOCKET"},
 	{"status-group", 0, "GROUP", "Group that may connect to the status socket, besides this user (none)",
@@ -92,7 +92,7 @@ const struct program server_program = {
 		"Unix socket as its status socket.\nSizes may also be written as 500M, 20G or 2T, times 90s, 5m, 2h or 3d, and "
 		"counts 1.5k, 2M or 1G.",
 	.exit_codes = "0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
 };
 
 /* Returns a quarter of the memory that this process may use. */

@@ -16,7 +16,7 @@
 #include "common/base/text.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/status/lines.h"
+#include "coordinator/status/status_line.h"
 
 struct worker_snapshot {
 	struct peer_status peer; /* its name and fingerprint are in the arrays that follow */
@@ -31,12 +31,12 @@ struct snapshot {
 	double wall_time, now; /* s of the wall clock, and of jobs_now */
 	struct job_view *jobs;
 	size_t job_count;
-	uint64_t ended_others;
+	uint64_t hidden_ended_count;
 	struct list workers; /* struct worker_snapshot */
 	/* struct lease_status: those of the first worker, then those of the second one, and so on. */
 	struct list leases;
 	json_t *quarantined, *tls;
-	uint64_t garbled_count;
+	uint64_t bad_checksum_count;
 	double recovery_progress; /* fraction read of the jobs of an earlier run; -1: all have been read */
 };
 
@@ -46,11 +46,11 @@ struct snapshot {
 static void copy_certificate(const struct peers *s, struct worker_snapshot *w)
 {
 	const struct session *p = s->tls ? peers_find_session(s, w->peer.id) : NULL;
-	if (!p || !*p->tls_identity.name)
+	if (!p || !*p->tls_peer.name)
 		return;
-	text_copy(w->certificate, sizeof w->certificate, p->tls_identity.name);
-	w->certificate_until = p->tls_identity.expiry_time;
-	if (!tls_describe_expiry(&p->tls_identity, time(NULL), w->warning, sizeof w->warning))
+	text_copy(w->certificate, sizeof w->certificate, p->tls_peer.name);
+	w->certificate_until = p->tls_peer.expiry_time;
+	if (!tls_describe_expiry(&p->tls_peer, time(NULL), w->warning, sizeof w->warning))
 		w->warning[0] = 0;
 }
 
@@ -82,7 +82,7 @@ static void copy_jobs(struct snapshot *n, struct jobs *jobs)
 	n->job_count = jobs_list_views(jobs, LINES_ENDED_MAX, &n->jobs);
 	for (size_t i = 0; i < n->job_count; i++)
 		shown += record_is_ended(&n->jobs[i].record);
-	n->ended_others = ended > shown ? ended - shown : 0;
+	n->hidden_ended_count = ended > shown ? ended - shown : 0;
 }
 
 /* Lists quarantined workers, connected or not. */
@@ -116,7 +116,7 @@ struct snapshot *snapshot_new(const struct peers *s)
 			       .now = jobs_now(s->jobs),
 			       .workers.item_size = sizeof(struct worker_snapshot),
 			       .leases.item_size = sizeof(struct lease_status),
-			       .garbled_count = s->garbled_count,
+			       .bad_checksum_count = s->bad_checksum_count,
 			       .recovery_progress = recovery_is_running(s->jobs) ? recovery_progress(s->jobs) : -1};
 	if (!copy_workers(n, s)) {
 		snapshot_free(n);
@@ -174,7 +174,7 @@ static void add_workers(const struct snapshot *n, json_t *o)
 
 static json_t *begin_object(const struct snapshot *n, const char *type)
 {
-	json_t *o = line_object(type);
+	json_t *o = line_new(type);
 	json_object_set_new(o, "time", json_real(n->wall_time));
 	return o;
 }
@@ -192,11 +192,11 @@ json_t *snapshot_to_json(const struct snapshot *n)
 	for (size_t i = 0; i < n->job_count; i++)
 		json_array_append_new(list, view_to_json(&n->jobs[i], !record_is_ended(&n->jobs[i].record)));
 	json_object_set_new(o, "jobs", list);
-	json_object_set_new(o, "endedOthers", json_integer((json_int_t)n->ended_others));
+	json_object_set_new(o, "endedOthers", json_integer((json_int_t)n->hidden_ended_count));
 	add_workers(n, o);
 	if (n->tls)
 		json_object_set(o, "tls", n->tls);
-	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)n->garbled_count));
+	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)n->bad_checksum_count));
 	if (n->recovery_progress >= 0)
 		json_object_set_new(o, "reading", json_real(n->recovery_progress));
 	return o;

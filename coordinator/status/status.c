@@ -21,7 +21,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
-#include "coordinator/status/lines.h"
+#include "coordinator/status/status_line.h"
 #include "coordinator/status/snapshot.h"
 #include "coordinator/status/socket_file.h"
 
@@ -42,7 +42,7 @@ struct reader {
 	struct status_socket *socket;
 	uv_pipe_t pipe;
 	unsigned topics;
-	bool closing;
+	bool is_closing;
 	bool has_snapshot; /* it has been sent its first snapshot; only then are its lines read */
 	/* Something changed while lines were waiting for this reader: it gets a snapshot once it has read them. */
 	bool is_behind;
@@ -61,7 +61,7 @@ struct snapshot_task {
 	struct status_socket *socket; /* NULL: the socket has been closed */
 	struct snapshot *snapshot;
 	unsigned changed_topics;			  /* topics of which there is news */
-	bool snapshot_needed;				  /* some reader needs the snapshot */
+	bool needs_snapshot;				  /* some reader needs the snapshot */
 	struct shared_line *snapshot_line, *workers_line; /* their texts; NULL: not needed, or out of memory */
 };
 
@@ -72,21 +72,21 @@ struct status_socket {
 	uv_pipe_t *listener;
 	LIST_HEAD(, reader) readers; /* including those that are being closed */
 	unsigned reader_count;	     /* readers not being closed */
-	bool accept_pending;
+	bool is_accept_pending;
 	/* NULL: none. Nothing else is published while it is being made. */
 	struct snapshot_task *task;
 	/* A tick found a snapshot being made: the next one is made by a tick, before the first snapshots of new
 	 * readers. */
-	bool tick_pending;
-	struct job_view *shown_jobs; /* jobs as last sent to subscribers */
-	size_t shown_count;
-	uint64_t shown_changes; /* jobs.change_count at the last tick that published */
-	char *path;		/* NULL: the socket was inherited */
-	char *group;		/* group that may connect; NULL: none */
+	bool is_tick_pending;
+	struct job_view *published_jobs; /* jobs as last sent to subscribers */
+	size_t published_job_count;
+	uint64_t published_change_count; /* jobs.change_count at the last tick that published */
+	char *path;			 /* NULL: the socket was inherited */
+	char *group;			 /* group that may connect; NULL: none */
 	struct socket_file file;
-	double file_checked_at; /* s of jobs_now: when the file was last checked */
-	bool fault_reported; /* a fault of the file has been logged: it cannot be made anew, or another file is at its
-				path */
+	double file_checked_at;	 /* s of jobs_now: when the file was last checked */
+	bool has_reported_fault; /* a fault of the file has been logged: it cannot be made anew, or another file is at
+				its path */
 };
 
 /* A line for several readers, whose text is made once; reference-counted. */
@@ -133,9 +133,9 @@ static void on_reader_closed(uv_handle_t *h)
 
 static void drop_reader(struct reader *r)
 {
-	if (r->closing)
+	if (r->is_closing)
 		return;
-	r->closing = true;
+	r->is_closing = true;
 	r->socket->reader_count--;
 	send_pool_close_share(&r->send_share);
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
@@ -151,7 +151,7 @@ static uint64_t unsent_bytes(const struct send_share *s)
 	return queued_bytes((const struct reader *)((const char *)s - offsetof(struct reader, send_share)));
 }
 
-static void drop_for_others(struct send_share *s)
+static void evict_reader(struct send_share *s)
 {
 	drop_reader((struct reader *)((char *)s - offsetof(struct reader, send_share)));
 }
@@ -181,7 +181,7 @@ static void send_line(struct reader *r, struct shared_line *l, bool answer)
 	size_t size = l ? l->size : 0;
 	if (!s || (answer && r->unread_bytes > UNREAD_BYTES_MAX))
 		drop_reader(r);
-	if (r->closing || !send_pool_add(&r->send_share, size, loop_ms(r))) {
+	if (r->is_closing || !send_pool_add(&r->send_share, size, loop_ms(r))) {
 		mem_free(s);
 		return;
 	}
@@ -247,7 +247,7 @@ static void handle_line(struct reader *r, size_t size)
 	else if (json_is_string(job))
 		send_answer(r, line_job(r->socket->jobs, json_string_value(job)));
 	else if (json_is_string(before) || json_is_null(before))
-		send_answer(r, line_ended(r->socket->jobs, json_string_value(before)));
+		send_answer(r, line_ended_jobs(r->socket->jobs, json_string_value(before)));
 	else
 		send_answer(r, line_error("expected {\"subscribe\":[...]} with jobs, workers, snapshot, "
 					  "{\"job\":\"j1\"}, or {\"endedBefore\":\"j1\"}"));
@@ -270,13 +270,13 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 		return;
 	}
 	r->line_size += (size_t)count;
-	for (char *end; !r->closing && (end = memchr(r->line, '\n', r->line_size));) {
+	for (char *end; !r->is_closing && (end = memchr(r->line, '\n', r->line_size));) {
 		size_t n = (size_t)(end - r->line);
 		handle_line(r, n);
 		r->line_size -= n + 1;
 		memmove(r->line, end + 1, r->line_size);
 	}
-	if (!r->closing && r->line_size == LINE_BYTES)
+	if (!r->is_closing && r->line_size == LINE_BYTES)
 		drop_reader(r);
 }
 
@@ -288,14 +288,14 @@ static void on_connection(uv_stream_t *listener, int status)
 	if (!t)
 		return;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
-	t->accept_pending = !r && !status; /* until it is accepted, it blocks all other readers */
+	t->is_accept_pending = !r && !status; /* until it is accepted, it blocks all other readers */
 	if (!r)
 		return;
 	uv_pipe_init(listener->loop, &r->pipe, 0);
 	r->pipe.data = r;
 	r->socket = t;
-	r->send_share = (struct send_share){
-		.pool = &t->peers->send_pool, .unsent_bytes = unsent_bytes, .evict = drop_for_others};
+	r->send_share =
+		(struct send_share){.pool = &t->peers->send_pool, .unsent_bytes = unsent_bytes, .evict = evict_reader};
 	LIST_INSERT_HEAD(&t->readers, r, next);
 	t->reader_count++;
 	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
@@ -312,15 +312,15 @@ static void on_connection(uv_stream_t *listener, int status)
 		return;
 	}
 	r->is_behind = true;
-	if (!t->tick_pending)
+	if (!t->is_tick_pending)
 		start_snapshot(t, 0);
 }
 
-static const struct job_view *find_shown_job(const struct status_socket *t, uint64_t id)
+static const struct job_view *find_published_job(const struct status_socket *t, uint64_t id)
 {
-	for (size_t i = 0; i < t->shown_count; i++)
-		if (t->shown_jobs[i].record.id == id)
-			return &t->shown_jobs[i];
+	for (size_t i = 0; i < t->published_job_count; i++)
+		if (t->published_jobs[i].record.id == id)
+			return &t->published_jobs[i];
 	return NULL;
 }
 
@@ -335,13 +335,13 @@ static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 
 static bool wants_snapshot(const struct reader *r, unsigned changed_topics)
 {
-	return !r->closing && (r->is_behind ? queued_bytes(r) == 0 : changed_topics & r->topics & TOPIC_SNAPSHOT);
+	return !r->is_closing && (r->is_behind ? queued_bytes(r) == 0 : changed_topics & r->topics & TOPIC_SNAPSHOT);
 }
 
 static void run_snapshot_task(void *making)
 {
 	struct snapshot_task *m = making;
-	if (m->snapshot_needed)
+	if (m->needs_snapshot)
 		m->snapshot_line = shared_line_new(snapshot_to_json(m->snapshot));
 	if (m->changed_topics & TOPIC_WORKERS)
 		m->workers_line = shared_line_new(snapshot_workers_to_json(m->snapshot));
@@ -362,11 +362,11 @@ static void on_snapshot_done(uv_async_t *done)
 	for (struct reader *r = t ? LIST_FIRST(&t->readers) : NULL; r; r = LIST_NEXT(r, next)) {
 		if ((m->changed_topics & r->topics & TOPIC_WORKERS) && !r->is_behind)
 			send_line(r, m->workers_line, false);
-		if (!m->snapshot_needed || !wants_snapshot(r, m->changed_topics))
+		if (!m->needs_snapshot || !wants_snapshot(r, m->changed_topics))
 			continue;
 		r->is_behind = false;
 		send_line(r, m->snapshot_line, false);
-		if (!r->has_snapshot && !r->closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
+		if (!r->has_snapshot && !r->is_closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
 			drop_reader(r);
 		r->has_snapshot = true;
 	}
@@ -399,7 +399,7 @@ static void start_snapshot(struct status_socket *t, unsigned changed_topics)
 		return;
 	}
 	*m = (struct snapshot_task){
-		.socket = t, .snapshot = n, .changed_topics = changed_topics, .snapshot_needed = snapshot_needed};
+		.socket = t, .snapshot = n, .changed_topics = changed_topics, .needs_snapshot = snapshot_needed};
 	t->task = m;
 	m->done_async.data = m;
 	uv_async_init(t->jobs->loop, &m->done_async, on_snapshot_done);
@@ -414,17 +414,17 @@ static void publish_changes(struct status_socket *t)
 	struct job_view *views;
 	size_t count = jobs_list_views(t->jobs, LINES_ENDED_MAX, &views);
 	for (size_t i = 0; i < count; i++) {
-		const struct job_view *before = find_shown_job(t, views[i].record.id);
+		const struct job_view *before = find_published_job(t, views[i].record.id);
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
 			continue;
 		bool details = !record_is_ended(&views[i].record) || (before && !record_is_ended(&before->record));
-		json_t *o = line_object("job");
+		json_t *o = line_new("job");
 		json_object_set_new(o, "job", view_to_json(&views[i], details));
 		publish_object(t, TOPIC_JOBS, o);
 	}
-	mem_free(t->shown_jobs);
-	t->shown_jobs = views;
-	t->shown_count = count;
+	mem_free(t->published_jobs);
+	t->published_jobs = views;
+	t->published_job_count = count;
 }
 
 static void on_listener_closed(uv_handle_t *h)
@@ -473,9 +473,9 @@ static void log_report(const struct status_socket *t, const char *text)
 /* Logs a fault once, although every check finds it again. */
 static void report_once(struct status_socket *t, const char *text)
 {
-	if (!t->fault_reported)
+	if (!t->has_reported_fault)
 		log_report(t, text);
-	t->fault_reported = true;
+	t->has_reported_fault = true;
 }
 
 /* Checks the socket's file. It may be removed while the coordinator runs, by a program that clears old files away or
@@ -491,7 +491,7 @@ static void check_socket_file(struct status_socket *t)
 	if (state == SOCKET_FILE_REPLACED)
 		report_once(t, "another file is where the status socket was: nobody can ask for the status");
 	if (state == SOCKET_FILE_INTACT)
-		t->fault_reported = false;
+		t->has_reported_fault = false;
 	if (state != SOCKET_FILE_MISSING)
 		return;
 	int fd = socket_file_open(&t->file, &e), rc = fd < 0 ? fd : listen_on(t, fd, &e);
@@ -502,7 +502,7 @@ static void check_socket_file(struct status_socket *t)
 		return;
 	}
 	log_report(t, "the status socket's file was removed, and has been made anew");
-	t->fault_reported = false;
+	t->has_reported_fault = false;
 }
 
 void status_tick(struct status_socket *t)
@@ -511,18 +511,18 @@ void status_tick(struct status_socket *t)
 	if (!t)
 		return;
 	check_socket_file(t);
-	if (t->accept_pending && t->listener)
+	if (t->is_accept_pending && t->listener)
 		on_connection((uv_stream_t *)t->listener, 0);
-	t->tick_pending = t->task;
+	t->is_tick_pending = t->task;
 	if (t->task) /* changes are looked for after the snapshot has been sent, so that no newer line precedes it */
 		return;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		topics |= r->topics;
-	bool changed = topics && t->shown_changes != t->jobs->change_count;
+	bool changed = topics && t->published_change_count != t->jobs->change_count;
 	for (struct reader *r = LIST_FIRST(&t->readers); changed && r; r = LIST_NEXT(r, next))
 		r->is_behind = r->is_behind || (r->topics && queued_bytes(r));
 	if (changed)
-		t->shown_changes = t->jobs->change_count;
+		t->published_change_count = t->jobs->change_count;
 	if (changed && (topics & TOPIC_JOBS))
 		publish_changes(t);
 	start_snapshot(t, changed ? topics : 0);
@@ -532,7 +532,7 @@ static void free_socket(struct status_socket *t)
 {
 	if (!t)
 		return;
-	mem_free(t->shown_jobs);
+	mem_free(t->published_jobs);
 	mem_free(t->path);
 	mem_free(t->group);
 	mem_free(t);

@@ -151,7 +151,7 @@ static int write_parts(int fd, off_t offset, struct iovec *part, int count)
 static int write_record(const struct journal *j, int fd, uint64_t offset, struct queued_record *n)
 {
 	unsigned char head[JOURNAL_RECORD_HEAD_SIZE];
-	n->record.durable_before = j->durable_records;
+	n->record.durable_count_before = j->durable_records;
 	journal_record_pack(&n->record, head, &n->copied, &n->owned);
 	struct iovec parts[3] = {
 		{head, sizeof head}, {n->copied.bytes, n->copied.size}, {n->owned.bytes, n->owned.size}};

@@ -60,7 +60,7 @@ void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_R
 	put32(bytes + 8, r->body_crc);
 	put32(bytes + 12, r->kind);
 	put64(bytes + 16, r->number);
-	put64(bytes + 24, r->durable_before);
+	put64(bytes + 24, r->durable_count_before);
 	put_double(bytes + 32, r->elapsed);
 	put32(bytes + 40, r->lease.kind);
 	put32(bytes + 44, r->lease.group);
@@ -77,7 +77,7 @@ static bool unpack_record_head(const unsigned char bytes[JOURNAL_RECORD_HEAD_SIZ
 				     .body_crc = get32(bytes + 8),
 				     .kind = get32(bytes + 12),
 				     .number = get64(bytes + 16),
-				     .durable_before = get64(bytes + 24),
+				     .durable_count_before = get64(bytes + 24),
 				     .elapsed = get_double(bytes + 32),
 				     .lease = {.kind = (enum lease_kind)get32(bytes + 40),
 					       .group = get32(bytes + 44),
@@ -235,7 +235,8 @@ int journal_scan_next(struct journal_scan *s, struct journal_segment *p)
 	s->has_next = false;
 	s->offset = p->end;
 	s->next_number++;
-	s->durable_count = p->record.durable_before > s->durable_count ? p->record.durable_before : s->durable_count;
+	s->durable_count =
+		p->record.durable_count_before > s->durable_count ? p->record.durable_count_before : s->durable_count;
 	return 1;
 }
 

@@ -52,9 +52,9 @@ struct journal_head {
 
 struct journal_record { /* head of a record */
 	uint32_t body_size, body_crc;
-	uint32_t kind;		 /* enum journal_kind (journal.h) */
-	uint64_t number;	 /* number of the record in its file, from 0 */
-	uint64_t durable_before; /* number of records of the file that were durable when this one was written */
+	uint32_t kind;		       /* enum journal_kind (journal.h) */
+	uint64_t number;	       /* number of the record in its file, from 0 */
+	uint64_t durable_count_before; /* number of records of the file that were durable when this one was written */
 	double elapsed;
 	/* Its kind is 0 if the record belongs to no lease; its job is not stored in the record. */
 	struct lease_key lease;

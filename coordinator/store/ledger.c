@@ -10,7 +10,7 @@
  *
  * A row that is damaged in both files is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that
  * is no database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. If the copy cannot be written, the call
- * succeeds, `copy_is_behind` is set, and nothing is written to the copy before ledger_repair_copy has compared the
+ * succeeds, `is_copy_behind` is set, and nothing is written to the copy before ledger_repair_copy has compared the
  * files again.
  */
 #include "coordinator/store/ledger.h"
@@ -39,10 +39,10 @@ struct ledger {
 	struct ledger_replica jobs, copy;
 	uint64_t next_id; /* id of the next job */
 	bool is_new;
-	bool copy_is_behind;  /* changes are missing in the copy */
+	bool is_copy_behind;  /* changes are missing in the copy */
 	bool has_ended_count; /* ended_count is valid */
 	uint64_t ended_count;
-	double last_end; /* latest end in all rows; 0: not read yet */
+	double last_end_time; /* latest end in all rows; 0: not read yet */
 };
 
 /* Commits the transaction if rc is 0, otherwise rolls it back. Returns rc or the error of the commit. */
@@ -57,7 +57,7 @@ static int end_transaction(struct ledger *l, int rc, struct error *e)
 
 static void mark_copy_behind(struct ledger *l, const struct error *e)
 {
-	l->copy_is_behind = true;
+	l->is_copy_behind = true;
 	log_event(LOG_SPOOL_FAULT, "file=%s text=%s action=\"it will be tried again\"", file_names[1],
 		  log_quote(e->text).text);
 }
@@ -144,21 +144,21 @@ static int merge_files(struct ledger *l, struct error *e)
 	if (rc)
 		return rc;
 	rc = merge_rows(l, e);
-	if (!rc && !l->copy_is_behind)
+	if (!rc && !l->is_copy_behind)
 		rc = delete_damaged_notes(l, 0, e);
 	if (!rc)
 		rc = delete_damaged_notes(l, 1, e);
 	if (!rc)
 		rc = merge_notes(l, schemas[0], schemas[1], e);
-	if (!rc && !l->copy_is_behind)
+	if (!rc && !l->is_copy_behind)
 		rc = merge_notes(l, schemas[1], schemas[0], e);
 	return end_transaction(l, rc, e);
 }
 
 int ledger_repair_copy(struct ledger *l, struct error *e)
 {
-	int rc = l->copy_is_behind ? merge_files(l, e) : 0;
-	l->copy_is_behind = rc != 0;
+	int rc = l->is_copy_behind ? merge_files(l, e) : 0;
+	l->is_copy_behind = rc != 0;
 	return rc;
 }
 
@@ -265,11 +265,11 @@ static int write_both(struct ledger *l, const struct ledger_job *j, struct error
 {
 	struct error fault;
 	int rc = ledger_replica_bind(&l->jobs, j, e);
-	int behind = l->copy_is_behind ? 0 : ledger_replica_bind(&l->copy, j, &fault);
+	int behind = l->is_copy_behind ? 0 : ledger_replica_bind(&l->copy, j, &fault);
 	ledger_replica_release(&l->jobs); /* j's texts may have come from there */
 	if (!rc)
 		rc = ledger_replica_put(&l->jobs, e);
-	if (!rc && !l->copy_is_behind && !behind)
+	if (!rc && !l->is_copy_behind && !behind)
 		behind = ledger_replica_put(&l->copy, &fault);
 	if (!rc && behind)
 		mark_copy_behind(l, &fault);
@@ -374,7 +374,7 @@ int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 	live.holder = "";
 	ledger_replica_release(&l->jobs);
 	rc = add_row(l, &l->jobs, &live, e);
-	if (!rc && !l->copy_is_behind && add_row(l, &l->copy, &live, &fault))
+	if (!rc && !l->is_copy_behind && add_row(l, &l->copy, &live, &fault))
 		mark_copy_behind(l, &fault);
 	return rc;
 }
@@ -415,11 +415,11 @@ static double next_end_time(struct ledger *l)
 	static const char sql[] = "SELECT max(ended) FROM main.jobs";
 	sqlite3_stmt *s = NULL;
 	double now = clock_wall_seconds();
-	if (l->last_end == 0 && sqlite3_prepare_v2(l->db, sql, -1, &s, NULL) == SQLITE_OK &&
+	if (l->last_end_time == 0 && sqlite3_prepare_v2(l->db, sql, -1, &s, NULL) == SQLITE_OK &&
 	    sqlite3_step(s) == SQLITE_ROW)
-		l->last_end = sqlite3_column_double(s, 0);
+		l->last_end_time = sqlite3_column_double(s, 0);
 	sqlite3_finalize(s);
-	return fmax(now, fmax(1, nextafter(l->last_end, INFINITY)));
+	return fmax(now, fmax(1, nextafter(l->last_end_time, INFINITY)));
 }
 
 int ledger_end_job(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
@@ -436,7 +436,7 @@ int ledger_end_job(struct ledger *l, const struct job_record *r, bool extendable
 		clear_submission(&j);
 	double end = j.end_time;
 	rc = change_record(l, &j, r, e);
-	l->last_end = rc ? l->last_end : end;
+	l->last_end_time = rc ? l->last_end_time : end;
 	l->ended_count += !rc && !ended;
 	return rc;
 }
@@ -590,7 +590,7 @@ int ledger_set_note(struct ledger *l, const char *name, const char *text, struct
 	struct error fault;
 	ledger_replica_release(&l->jobs);
 	int rc = ledger_replica_set_note(&l->jobs, name, text, e);
-	if (!rc && !l->copy_is_behind && ledger_replica_set_note(&l->copy, name, text, &fault))
+	if (!rc && !l->is_copy_behind && ledger_replica_set_note(&l->copy, name, text, &fault))
 		mark_copy_behind(l, &fault);
 	return rc;
 }

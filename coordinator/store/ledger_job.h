@@ -14,7 +14,7 @@ struct ledger_job {
 	const char *record;		    /* JSON (record.h); "": none */
 	uint64_t extended;		    /* number of extensions after its end. Ignored by ledger_add */
 	int priority;
-	bool mixed;
+	bool is_mixed;
 	double submitted;			/* seconds since 1970 */
 	const unsigned char *submission, *plan; /* frames, as common/wire packs them; an ended job may have none */
 	size_t submission_size, plan_size;

@@ -80,7 +80,7 @@ static uint32_t row_checksum(const struct ledger_job *j)
 	put_double(numbers + 40, j->submitted);
 	put_double(numbers + 48, j->end_time);
 	put32(numbers + 56, (uint32_t)j->priority);
-	put32(numbers + 60, j->mixed);
+	put32(numbers + 60, j->is_mixed);
 	uint32_t crc = crc32c(0, numbers, sizeof numbers);
 	crc = add_text_to_crc(crc, j->owner);
 	crc = add_text_to_crc(crc, j->name);
@@ -116,7 +116,7 @@ static int read_row(struct ledger_replica *side, enum ledger_statement which, ui
 				 .name = column_text(s, 2),
 				 .version = column_text(s, 3),
 				 .priority = sqlite3_column_int(s, 4),
-				 .mixed = sqlite3_column_int(s, 5),
+				 .is_mixed = sqlite3_column_int(s, 5),
 				 .submitted = sqlite3_column_double(s, 6),
 				 .holder = column_text(s, 9),
 				 .extended = (uint64_t)sqlite3_column_int64(s, 10),
@@ -169,7 +169,7 @@ int ledger_replica_bind(struct ledger_replica *side, const struct ledger_job *j,
 	sqlite3_clear_bindings(s);
 	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
 	sqlite3_bind_int(s, 5, j->priority);
-	sqlite3_bind_int(s, 6, j->mixed);
+	sqlite3_bind_int(s, 6, j->is_mixed);
 	sqlite3_bind_double(s, 7, j->submitted);
 	sqlite3_bind_int64(s, 11, (sqlite3_int64)j->extended);
 	if (j->end_time > 0)

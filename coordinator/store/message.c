@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 /* Notes in *out that memory ran out, to distinguish this from a damaged message. */
-static void *allocate(void *out, size_t size)
+static void *allocate_block(void *out, size_t size)
 {
 	void *p = mem_alloc(size, 1);
 	if (!p)
@@ -14,7 +14,7 @@ static void *allocate(void *out, size_t size)
 	return p;
 }
 
-static void release(void *out, void *p)
+static void release_block(void *out, void *p)
 {
 	(void)out;
 	mem_free(p);
@@ -24,7 +24,7 @@ ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsi
 				 struct error *e)
 {
 	bool out_of_memory = false;
-	ProtobufCAllocator memory = {allocate, release, &out_of_memory};
+	ProtobufCAllocator memory = {allocate_block, release_block, &out_of_memory};
 	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
 	*rc = m		      ? 0
 	      : out_of_memory ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
@@ -34,7 +34,7 @@ ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsi
 
 void message_free(ProtobufCMessage *m)
 {
-	ProtobufCAllocator memory = {allocate, release, NULL};
+	ProtobufCAllocator memory = {allocate_block, release_block, NULL};
 	if (m)
 		protobuf_c_message_free_unpacked(m, &memory);
 }

@@ -44,9 +44,9 @@ int old_spool_read_text(const char *path, size_t max_size, char **text, size_t *
 /* Reads the rest of the file into f->memory, and returns its size. */
 static int read_rest(struct checked_file *in, struct old_row *f, size_t *size, struct error *e)
 {
-	if (in->remaining > PIECE_COUNT * max_piece_size)
+	if (in->remaining_bytes > PIECE_COUNT * max_piece_size)
 		return error_set(e, EBADMSG, "%s: damaged", in->path);
-	*size = (size_t)in->remaining;
+	*size = (size_t)in->remaining_bytes;
 	f->memory = mem_alloc(*size, 1);
 	return f->memory ? checked_file_read(in, f->memory, *size, e) : error_set(e, ENOMEM, "no memory for a job");
 }
@@ -68,7 +68,7 @@ static int parse_row(struct old_row *f, size_t size, const char *path, struct er
 				     .extended = m->extended,
 				     .revision = m->revision,
 				     .priority = m->priority,
-				     .mixed = m->mixed,
+				     .is_mixed = m->mixed,
 				     .submitted = m->submitted,
 				     .submission = m->submission.data,
 				     .plan = m->plan.data,
@@ -98,7 +98,7 @@ static int parse_old_row(struct old_row *f, size_t size, const char *path, struc
 				     .extended = get64(p + 8),
 				     .revision = get64(p + 16),
 				     .priority = (int)get32(p + 32),
-				     .mixed = get32(p + 36) != 0,
+				     .is_mixed = get32(p + 36) != 0,
 				     .submitted = get_double(p + 24),
 				     .submission = pieces[4],
 				     .plan = pieces[5],

@@ -27,7 +27,7 @@ enum { SCHEMA = 1 };
 #define IN_VIEW(...)
 #define TEXT(member, size, in, by, key, shown, wire) in(FIELD_TEXT, offsetof(struct job_record, member), size, key)
 #define NUMBER(kind, member, in, by, key, shown, wire) in(FIELD_##kind, offsetof(struct job_record, member), 0, key)
-static const struct field record_fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)};
+static const struct job_field record_fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIELD, JOB_NO_FIELD)};
 #undef IN_RECORD
 #undef IN_VIEW
 #undef TEXT
@@ -36,7 +36,7 @@ static const struct field record_fields[] = {JOB_FIELDS(TEXT, NUMBER, JOB_NO_FIE
 /* The members of the object "counts". */
 #define COUNT(member, by, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key},
 #define COUNTER(member, key, wire) {FIELD_u64, offsetof(struct job_record, counts.member), 0, key},
-static const struct field count_fields[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
+static const struct job_field count_fields[] = {JOB_FIELDS(JOB_NO_FIELD, JOB_NO_FIELD, COUNT, COUNTER)};
 #undef COUNT
 #undef COUNTER
 
@@ -52,7 +52,7 @@ void record_set_counters(struct job_record *r, const struct plan *p, const struc
 	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
 	memcpy(r->strategies, n->strategies, sizeof r->strategies);
 	strategy_print_note(p, n, black, r->note, sizeof r->note);
-	strategy_append_beyond(beyond_share, r->note, sizeof r->note);
+	strategy_append_overlong(beyond_share, r->note, sizeof r->note);
 	convergence_append_note(&r->convergence, r->note, sizeof r->note);
 }
 

@@ -13,7 +13,7 @@
 #include "common/estimate/strategy.h"
 #include "common/exr/header.h"
 #include "coordinator/core/job_fields.h"
-#include "coordinator/store/fields.h"
+#include "coordinator/store/job_field.h"
 
 #include <jansson.h>
 #include <stdbool.h>

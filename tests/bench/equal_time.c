@@ -26,9 +26,9 @@
 #include "tests/support/random_scene.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 #include "worker/render/render.h"
-#include "worker/render/choose.h"
+#include "worker/render/choose_integrator.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -51,11 +51,11 @@ static struct figures run_subject(const struct subject *s)
 			    .mutations = (double)b.counters[COUNT_SAMPLES],
 			    .rays = (double)batch_ray_count(b.counters),
 			    .accepted = (double)b.counters[COUNT_ACCEPTED],
-			    .walks = sum_range(forward, WALK_OK, WALK_ITERATIONS),
-			    .failed_walks = sum_range(forward, WALK_OK + 1, WALK_ITERATIONS),
+			    .walks = sum_range(forward, WALK_OK, WALK_ITERATION_LIMIT),
+			    .failed_walks = sum_range(forward, WALK_OK + 1, WALK_ITERATION_LIMIT),
 			    .occluded_walks = (double)record_walks.occluded,
-			    .walks_back = sum_range(backward, WALK_OK, WALK_ITERATIONS),
-			    .failed_walks_back = sum_range(backward, WALK_OK + 1, WALK_ITERATIONS)};
+			    .walks_back = sum_range(backward, WALK_OK, WALK_ITERATION_LIMIT),
+			    .failed_walks_back = sum_range(backward, WALK_OK + 1, WALK_ITERATION_LIMIT)};
 	batch_fini(&b);
 	return f;
 }

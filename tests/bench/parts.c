@@ -147,7 +147,7 @@ static void time_color(struct part_inputs *s)
 static void time_bsdf(struct part_inputs *s, const char *text)
 {
 	struct arena arena = {.limit = 1 << 20};
-	struct bsdf_build build = {.arena = &arena, .dialect_3 = true};
+	struct bsdf_build build = {.arena = &arena, .is_dialect_3 = true};
 	struct bsdf b;
 	struct error e;
 	char name[96];

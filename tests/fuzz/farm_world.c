@@ -46,9 +46,9 @@ void farm_world_run_once(struct farm_world *w)
 static bool is_at_work(const struct server *s)
 {
 	for (const struct live_job *job = s->jobs.live_jobs; job; job = job->next)
-		if (job->busy)
+		if (job->is_busy)
 			return true;
-	return s->jobs.flushing || s->peers.session_count;
+	return s->jobs.is_flushing || s->peers.session_count;
 }
 
 void farm_world_settle(struct farm_world *w)

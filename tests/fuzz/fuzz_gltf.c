@@ -64,7 +64,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	build_shapes(&s, &assets);
 	struct render_options options = {.width = 32, .height = 32, .max_depth = 8};
 	struct render_summary summary;
-	render_check(&s, &assets, &options, &summary, &e);
+	world_check(&s, &assets, &options, &summary, &e);
 	scene_fini(&s);
 	return 0;
 }

@@ -77,7 +77,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	struct render_options options = {.width = SIDE, .height = SIDE, .max_depth = 8};
 	struct render_summary summary;
 	if (is_moderate(&s))
-		render_check(&s, &assets, &options, &summary, &e);
+		world_check(&s, &assets, &options, &summary, &e);
 	scene_fini(&s);
 	return 0;
 }

@@ -107,7 +107,7 @@ static void add_image(const struct reference *r, const struct canvas_image *img,
 	f->estimated_sum += img->rel_mse;
 	if (img->rel_mse_doubt == ERROR_DOUBT_NONE) {
 		f->stated++;
-		f->covered += img->rel_mse_95[0] <= x && x <= img->rel_mse_95[1];
+		f->covered += img->rel_mse_interval_95[0] <= x && x <= img->rel_mse_interval_95[1];
 	}
 	for (uint32_t i = 0; i < VALUES; i++)
 		f->far_values += fabs((double)img->rgb[i] - r->rgb[i]) > 3 * (double)img->error[i];
@@ -251,7 +251,7 @@ static const struct option_row rows[] = {
 	 .default_value = "1"},
 	{"scene", 0, "NAME", "Only scenes whose names begin with it", OPTION_TEXT(OF, scene), .default_value = ""},
 	{"reference", 0, "TIMES", "References so many times as long", OPTION_NUMBER(OF, times, 0, 1e6),
-	 .min_excluded = true, .default_value = "1"},
+	 .excludes_min = true, .default_value = "1"},
 	{"integrator", 'i', "NAME", "Only this one", OPTION_TEXT(OF, integrator), .values = integrator_name},
 	{0}};
 #undef OF

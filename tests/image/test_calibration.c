@@ -6,10 +6,10 @@
  *
  * Checked for each case:
  *
- * - The interval. rel_mse_95, where it is stated, contains the realised relMSE of at least 90 % of the renders. Level
- *   and power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with
- *   0.9 %, at 92 % with 12 %; a coverage of 85 % is found with 97 %, one of 80 % with 99.99 %. Seeds are fixed, so the
- *   result is always the same.
+ * - The interval. rel_mse_interval_95, where it is stated, contains the realised relMSE of at least 90 % of the
+ * renders. Level and power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %,
+ * at 94 % with 0.9 %, at 92 % with 12 %; a coverage of 85 % is found with 97 %, one of 80 % with 99.99 %. Seeds are
+ * fixed, so the result is always the same.
  * - The median. The median of realised over estimated relMSE is within 10 % of 1, or as far as the case allows.
  * - The pixels. The share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is between
  *   0.87 and 0.975: Student's t with 15 degrees of freedom gives 93.1 %, skewed pixels have less.
@@ -138,8 +138,8 @@ static struct figures compute_figures(const struct reference *r, const struct re
 		ratio[i] = realised / img->rel_mse * shrink_square;
 		estimated += img->rel_mse / shrink_square / RENDERS;
 		f.stated += img->rel_mse_doubt == ERROR_DOUBT_NONE;
-		f.covered += img->rel_mse_95[0] / shrink_square <= realised &&
-			     realised <= img->rel_mse_95[1] / shrink_square;
+		f.covered += img->rel_mse_interval_95[0] / shrink_square <= realised &&
+			     realised <= img->rel_mse_interval_95[1] / shrink_square;
 		f.upper_bounds_held +=
 			img->rel_mse_doubt == ERROR_DOUBT_NONE && img->rel_mse_upper / shrink_square >= realised;
 		f.b_covered += fabs(img->b - b) <= 2.131 * img->b_error / shrink;

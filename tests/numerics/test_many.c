@@ -56,7 +56,7 @@ static void test_many(void **state)
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		scenes++;
 	for (int i = 0; i < TEST_SCENES; i++)
-		run_chains(test_world(test_scenes[i].name), test_scenes[i].name, 12, total / scenes + 1);
+		run_chains(make_test_world(test_scenes[i].name), test_scenes[i].name, 12, total / scenes + 1);
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		run_chains(h->build(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
 	struct rows rows = {0, 0};

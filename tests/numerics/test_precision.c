@@ -109,7 +109,7 @@ static void run_case(const struct precision_case *p, unsigned max_proposals, str
 	m = (struct mutation_ctx){
 		.path = &c, .seed = seed, .counters = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; e->count < max_proposals && i < 400 * max_proposals; i++) {
-		struct move move = {0};
+		struct proposal_move move = {0};
 		bool is_refracted = false;
 		if (!path_choose_seed(&c, seed, i, &x) || x.edges == 0)
 			continue;
@@ -121,8 +121,9 @@ static void run_case(const struct precision_case *p, unsigned max_proposals, str
 		m.chain = i;
 		if (ops->propose(ops, &m, &setting, &x, &y, &move))
 			continue;
-		double to_y = ops->log_weight(&m, &y, &move, X_TO_Y), to_x = ops->log_weight(&m, &x, &move, Y_TO_X);
-		double program = to_y - to_x + move.log_density[X_TO_Y] - move.log_density[Y_TO_X];
+		double to_y = ops->log_weight(&m, &y, &move, MUTATION_FORWARD),
+		       to_x = ops->log_weight(&m, &x, &move, MUTATION_REVERSE);
+		double program = to_y - to_x + move.log_density[MUTATION_FORWARD] - move.log_density[MUTATION_REVERSE];
 		if (isfinite(program))
 			record_errors(e, program, w, &x, &y);
 	}

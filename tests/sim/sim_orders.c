@@ -30,20 +30,20 @@ void sim_restore_job(struct sim_world *w, struct sim_job *j, double elapsed)
 				       .submit = {.plan = &j->plan,
 						  .name = "sim",
 						  .priority = j->priority,
-						  .mixed = j->mixed,
+						  .is_mixed = j->mixed,
 						  .verify_fraction = j->verify},
 				       .fingerprint = j->mixed ? "" : j->fingerprint,
 				       .kind = is_render ? LEASE_RENDER : LEASE_BOOTSTRAP,
 				       .next_epochs = next,
 				       .elapsed = elapsed,
-				       .opened = elapsed,
-				       .completed = j->completed_seconds,
+				       .first_round_at = elapsed,
+				       .last_round_end = j->completed_seconds,
 				       .looks = &no_looks}};
-	bool held = j->held[HOLD_BY_USER]; /* a hold for want of storage is not remembered: there may be room by now */
+	bool held = j->held[HOLD_USER]; /* a hold for want of storage is not remembered: there may be room by now */
 	memset(j->held, 0, sizeof j->held);
 	sim_step(w, &ev, 0);
 	if (held)
-		hold_job(w, j, HOLD_BY_USER, true);
+		hold_job(w, j, HOLD_USER, true);
 }
 
 /* Replaces the coordinator by one that remembers only merged results. Messages still under way to the old one reach
@@ -90,7 +90,7 @@ void sim_release_all_jobs(struct sim_world *w)
 
 static void set_priority(struct sim_world *w, struct sim_job *j)
 {
-	struct event ev = {.kind = EVENT_PRIORITY, .job = j->id, .priority = (int)sim_uniform_below(w, 5) - 2};
+	struct event ev = {.kind = EVENT_SET_PRIORITY, .job = j->id, .priority = (int)sim_uniform_below(w, 5) - 2};
 	if (j->ended)
 		return;
 	j->priority = ev.priority;
@@ -136,10 +136,10 @@ void sim_give_order(struct sim_world *w)
 		return;
 	switch (sim_uniform_below(w, 4)) {
 	case 0:
-		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_BY_USER : HOLD_STORAGE, true);
+		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_USER : HOLD_STORAGE, true);
 		break;
 	case 1:
-		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_BY_USER : HOLD_STORAGE, false);
+		hold_job(w, j, sim_chance(w, 0.5) ? HOLD_USER : HOLD_STORAGE, false);
 		break;
 	case 2:
 		set_priority(w, j);

@@ -31,7 +31,7 @@ static void check_holders(struct sim_world *w, struct lease_key key)
 	struct lease_status s;
 	for (uint64_t p = farm_next_peer(w->farm, 0); p; p = farm_next_peer(w->farm, p))
 		for (uint32_t i = 0; farm_lease_status(w->farm, p, i, &s); i++)
-			holders += !s.overdue && sim_same_key(s.key, key);
+			holders += !s.is_overdue && sim_same_key(s.key, key);
 	if (holders > 2)
 		sim_report_violation(w, "%d workers hold one lease", holders);
 }
@@ -45,7 +45,7 @@ static void send_lease(struct sim_world *w, const struct action *a)
 		sim_report_violation(w, "a lease of an ended job or to an unknown worker");
 		return;
 	}
-	if (j->held[HOLD_STORAGE] || j->held[HOLD_BY_USER])
+	if (j->held[HOLD_STORAGE] || j->held[HOLD_USER])
 		sim_report_violation(w, "a lease of a job that is held");
 	if (p.state != PEER_ACTIVE)
 		sim_report_violation(w, "a lease for a worker that is silent or quarantined");
@@ -80,9 +80,9 @@ static void merge_result(struct sim_world *w, const struct action *a, uint64_t v
 	snprintf(j->fingerprint, sizeof j->fingerprint, "%s", p.fingerprint);
 	uint32_t slot = slot_index(j, a->key);
 	if (value != sim_correct_result(a->key, j->state[slot]))
-		sim_report_violation(w, "a wrong result is merged, verified: %d", (int)a->verified);
-	if (a->verified != (j->verify >= 1) && (j->verify >= 1 || j->verify <= 0))
-		sim_report_violation(w, "verified with a share of %g: %d", j->verify, (int)a->verified);
+		sim_report_violation(w, "a wrong result is merged, verified: %d", (int)a->is_verified);
+	if (a->is_verified != (j->verify >= 1) && (j->verify >= 1 || j->verify <= 0))
+		sim_report_violation(w, "verified with a share of %g: %d", j->verify, (int)a->is_verified);
 	j->answered_by[slot] = 0;
 	if (a->key.kind == LEASE_BOOTSTRAP) {
 		if (j->bootstrap_slots & 1u << slot)
@@ -217,15 +217,15 @@ static void perform_action(struct sim_world *w, const struct action *a, uint64_t
 	case ACTION_SEND_LEASE:
 		send_lease(w, a);
 		break;
-	case ACTION_REVOKE:
+	case ACTION_REVOKE_LEASE:
 		if (find_worker(w, a->peer, &index))
 			sim_post_message(w, (struct sim_message){
 						    .kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key});
 		break;
-	case ACTION_MERGE:
+	case ACTION_MERGE_BATCH:
 		merge_result(w, a, value);
 		break;
-	case ACTION_ACK:
+	case ACTION_ACKNOWLEDGE:
 		if (a->ack == ACK_NOTED && find_worker(w, a->peer, &index))
 			j->answered_by[slot_index(j, a->key)] |= 1u << index;
 		break;
@@ -240,7 +240,7 @@ static void perform_action(struct sim_world *w, const struct action *a, uint64_t
 	case ACTION_BOOTSTRAP_DONE:
 		prepare_job(w, a, j);
 		break;
-	case ACTION_EVALUATE_ERROR:
+	case ACTION_ESTIMATE_ERROR:
 		evaluate_error(w, a, j);
 		break;
 	case ACTION_ROUND_DONE:

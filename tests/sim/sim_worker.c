@@ -63,13 +63,13 @@ void sim_finish_lease(struct sim_world *w, const struct sim_message *m)
 		return;
 	}
 	k->busy_threads--;
-	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = m->key, .valid = true}, .text = "trouble"};
+	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = m->key, .is_valid = true}, .text = "trouble"};
 	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate)) {
 		ev.kind = EVENT_LEASE_FAILED;
-		ev.lease.worker_at_fault = w->draw_count % 3 == 0;
-		ev.lease.memory_full = ev.lease.worker_at_fault && w->draw_count % 2 == 0;
+		ev.lease.is_worker_at_fault = w->draw_count % 3 == 0;
+		ev.lease.is_memory_full = ev.lease.is_worker_at_fault && w->draw_count % 2 == 0;
 	} else if (!sim_is_calm(w) && sim_chance(w, k->invalid_rate))
-		ev.lease.valid = false;
+		ev.lease.is_valid = false;
 	else if (!sim_is_calm(w) && sim_chance(w, 0.01))
 		ev.kind = EVENT_LEASE_RETURNED;
 	uint64_t value = sim_correct_result(m->key, m->value);
@@ -97,7 +97,7 @@ static void send_unleased_result(struct sim_world *w, const struct sim_worker *k
 		key.epoch++;
 		value = sim_correct_result(key, value);
 	}
-	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = key, .valid = true}};
+	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = key, .is_valid = true}};
 	post_to_core(w, k, ev, value);
 }
 
@@ -110,7 +110,7 @@ void sim_heartbeat(struct sim_world *w, const struct sim_message *m)
 		k->wanted = sim_is_calm(w) || !sim_chance(w, 0.02) ? k->threads + (k->threads > 1) : 0;
 		if (k->is_hoarding && !sim_is_calm(w))
 			k->wanted = HOARDED_THREADS;
-		post_to_core(w, k, (struct event){.kind = EVENT_REQUEST, .wanted_leases = k->wanted}, 0);
+		post_to_core(w, k, (struct event){.kind = EVENT_LEASE_REQUEST, .wanted_leases = k->wanted}, 0);
 		if (!sim_is_calm(w) && sim_chance(w, 0.05))
 			send_unleased_result(w, k);
 	}

@@ -95,7 +95,7 @@ static void submit_job(struct sim_world *w, uint32_t index)
 			   .submit = {.plan = &j->plan,
 				      .name = "sim",
 				      .priority = j->priority,
-				      .mixed = j->mixed,
+				      .is_mixed = j->mixed,
 				      .verify_fraction = j->verify}};
 	sim_step(w, &ev, 0);
 	if (!j->submitted)

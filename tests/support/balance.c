@@ -84,7 +84,7 @@ enum { WAY_BACK_INTERVAL = 4 };
 /* Returns |h_j| and its accuracy; 0 at exactly specular vertices and events in a medium. */
 static double half_vector_length(const struct full_path *x, unsigned j, double *tolerance)
 {
-	if (j == 0 || j >= x->edges || x->v[j].delta || x->v[j].kind == VERTEX_MEDIUM)
+	if (j == 0 || j >= x->edges || x->v[j].is_delta || x->v[j].kind == VERTEX_MEDIUM)
 		return 0;
 	vec2 h = halfvec_of(x, j);
 	*tolerance = WALK_TOLERANCE * fmin(x->v[j].bsdf->min_alpha, 1);
@@ -99,7 +99,7 @@ static void evaluate_functions(struct path_context *c, struct full_path *x, doub
 		lengths += log(x->edge[e].distance2);
 	for (unsigned j = 1; j < k; j++)
 		if (x->v[j].kind == VERTEX_SURFACE)
-			roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->mean_alpha, 1);
+			roughness += x->v[j].is_delta ? 0 : fmin(x->v[j].bsdf->mean_alpha, 1);
 	double first_tolerance = 0, last_tolerance = 0;
 	double first = half_vector_length(x, 1, &first_tolerance), last = half_vector_length(x, k - 1, &last_tolerance);
 	vec3 last_point = x->v[k - 1].x.p, first_point = x->v[k > 1 ? 1 : 0].x.p, light_point = x->v[0].x.p;
@@ -160,16 +160,16 @@ static bool is_positive_weight(const struct balance_trial *t, double log_weight)
 }
 
 /* Computes the acceptance probability as the chain does. */
-static double acceptance_probability(struct trial_run *r, struct balance_trial *t, struct move *move)
+static double acceptance_probability(struct trial_run *r, struct balance_trial *t, struct proposal_move *move)
 {
 	enum proposal_result end = t->ops->propose(t->ops, r->m, &t->setting, r->x, r->y, move);
-	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
+	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, MUTATION_FORWARD);
 	if (!end && !is_positive_weight(t, to_y))
-		end = PROPOSAL_DARK;
+		end = PROPOSAL_BLACK;
 	t->counters[proposal_counter(end)]++;
 	if (end)
 		return 0;
-	double to_x = t->ops->log_weight(r->m, r->x, move, Y_TO_X);
+	double to_x = t->ops->log_weight(r->m, r->x, move, MUTATION_REVERSE);
 	if (!is_positive_weight(t, to_x))
 		fail_msg("%s: from y the path x is black", t->ops->name);
 	return exp(fmin(to_y - to_x, 0));
@@ -194,21 +194,23 @@ static void check_accepted(struct trial_run *r, struct balance_trial *t)
 
 static bool is_same_media(const struct path_edge *a, const struct path_edge *b)
 {
-	return a->medium == b->medium && a->previous_medium == b->previous_medium && a->media_match == b->media_match &&
-	       memcmp(&a->free_flight, &b->free_flight, sizeof a->free_flight) == 0;
+	return a->medium == b->medium && a->previous_medium == b->previous_medium &&
+	       a->has_matching_media == b->has_matching_media &&
+	       memcmp(&a->scattering_transmittance, &b->scattering_transmittance, sizeof a->scattering_transmittance) ==
+		       0;
 }
 
 /* Turns y back into x, by the vertices that the move names. */
-static void restore_path(struct trial_run *r, const struct balance_trial *t, const struct move *move)
+static void restore_path(struct trial_run *r, const struct balance_trial *t, const struct proposal_move *move)
 {
 	const struct full_path *x = r->x;
 	struct full_path *y = r->y;
-	bool all = t->ops->independent || y->edges != x->edges;
+	bool all = t->ops->is_independent || y->edges != x->edges;
 	full_path_copy(y, x, all ? 0 : move->first, all ? x->edges : move->last);
 	for (unsigned i = 0; i <= x->edges; i++) {
 		const struct path_vertex *a = &x->v[i], *b = &y->v[i];
 		bool same = memcmp(&a->x.p, &b->x.p, sizeof a->x.p) == 0 && a->kind == b->kind && a->mode == b->mode &&
-			    a->delta == b->delta && a->bsdf == b->bsdf && a->emitter == b->emitter &&
+			    a->is_delta == b->is_delta && a->bsdf == b->bsdf && a->emitter == b->emitter &&
 			    (i == x->edges || (memcmp(&x->edge[i], &y->edge[i], sizeof x->edge[i]) == 0 &&
 					       is_same_media(&a->edge, &b->edge)));
 		if (!same)
@@ -235,7 +237,7 @@ static void compare_functions(const struct trial_run *r, const double *g, const 
 }
 
 /* Returns log P(b) P(c | b) by the heuristic. */
-static double log_choice_probability(struct trial_run *r, const struct full_path *x, const struct move *move)
+static double log_choice_probability(struct trial_run *r, const struct full_path *x, const struct proposal_move *move)
 {
 	double weight[FULL_PATH_VERTICES_MAX], p;
 	heuristic_roughness.weigh_b(r->c, x, weight);
@@ -247,16 +249,16 @@ static double log_choice_probability(struct trial_run *r, const struct full_path
 	return log(p);
 }
 
-static double log_fixed_part(struct trial_run *r, struct full_path *x, const struct move *move)
+static double log_fixed_part(struct trial_run *r, struct full_path *x, const struct proposal_move *move)
 {
 	double sum = 0;
 	for (unsigned j = 0; j < move->c; j++)
-		sum += log(spectrum_max(full_path_f(r->c, x, j)));
+		sum += log(spectrum_max(full_path_eval_f(r->c, x, j)));
 	return sum;
 }
 
 /* Returns whether a walk from y towards the half vectors of x fails to lead to x: there is no way back. */
-static bool has_no_way_back(struct trial_run *r, const struct move *move)
+static bool has_no_way_back(struct trial_run *r, const struct proposal_move *move)
 {
 	static struct full_path back;
 	static struct walk_scratch scratch;
@@ -271,9 +273,9 @@ static bool has_no_way_back(struct trial_run *r, const struct move *move)
 	double max_distance = 0;
 	for (unsigned j = c + 1; j < b; j++) {
 		max_distance = fmax(max_distance, vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)));
-		bool delta = x->v[j].delta;
+		bool delta = x->v[j].is_delta;
 		target[j].h = delta ? (vec2){0, 0} : halfvec_of(x, j);
-		const double *sigma = r->m->scratch.step[X_TO_Y][j].sigma;
+		const double *sigma = r->m->scratch.step[MUTATION_FORWARD][j].sigma;
 		target[j].tolerance =
 			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->min_alpha, 1), fmin(sigma[0], sigma[1]));
 	}
@@ -287,18 +289,19 @@ static bool has_no_way_back(struct trial_run *r, const struct move *move)
 
 /* Adds the differences of the parts of the densities, in which an omission from the ratio shows first, and whether
  * there is a way back: if there is none phi is 1, and the pair for which it is -1 is never proposed. */
-static void compare_densities(struct trial_run *r, const struct balance_trial *t, double log_f, const struct move *move,
-			      double *phi)
+static void compare_densities(struct trial_run *r, const struct balance_trial *t, double log_f,
+			      const struct proposal_move *move, double *phi)
 {
 	for (int i = FUNCTION_TRANSFER; i < BALANCE_FUNCTIONS; i++)
 		phi[i] = 0;
 	phi[FUNCTION_F] = clamp_to_unit(log_f - r->values[FUNCTION_INTENSITY]);
 	double emitter = log(path_pdf_emitter(r->c, &r->y->v[0]) / path_pdf_emitter(r->c, &r->x->v[0]));
 	phi[FUNCTION_EMITTER] = fabs(emitter) > ROUNDING ? clamp_to_unit(emitter) : 0;
-	if (t->ops->independent)
+	if (t->ops->is_independent)
 		return;
-	phi[FUNCTION_TRANSFER] = clamp_to_unit(move->log_transfer[X_TO_Y] - move->log_transfer[Y_TO_X]);
-	phi[FUNCTION_STEPS] = clamp_to_unit(move->log_density[X_TO_Y] - move->log_density[Y_TO_X]);
+	phi[FUNCTION_TRANSFER] =
+		clamp_to_unit(move->log_transfer[MUTATION_FORWARD] - move->log_transfer[MUTATION_REVERSE]);
+	phi[FUNCTION_STEPS] = clamp_to_unit(move->log_density[MUTATION_FORWARD] - move->log_density[MUTATION_REVERSE]);
 	phi[FUNCTION_CHOICE] =
 		clamp_to_unit(log_choice_probability(r, r->y, move) - log_choice_probability(r, r->x, move));
 	phi[FUNCTION_FIXED] = clamp_to_unit(log_fixed_part(r, r->y, move) - log_fixed_part(r, r->x, move));
@@ -308,12 +311,12 @@ static void compare_densities(struct trial_run *r, const struct balance_trial *t
 
 static void test_proposal(struct trial_run *r, struct balance_trial *t, unsigned group)
 {
-	struct move move = {0};
+	struct proposal_move move = {0};
 	double u[4], h[BALANCE_FUNCTIONS], tolerance[BALANCE_FUNCTIONS];
 	r->m->counters = t->counters;
 	r->m->step++;
 	t->pairs++;
-	double a = acceptance_probability(r, t, &move), w = a * (t->ops->independent ? r->strict_weight : r->weight);
+	double a = acceptance_probability(r, t, &move), w = a * (t->ops->is_independent ? r->strict_weight : r->weight);
 	if (a > 0) {
 		double phi[BALANCE_FUNCTIONS];
 		t->acceptance_sum += a;
@@ -324,7 +327,7 @@ static void test_proposal(struct trial_run *r, struct balance_trial *t, unsigned
 			t->phi_sum[group][i] += w * phi[i];
 			t->abs_phi_sum[group][i] += w * fabs(phi[i]);
 		}
-		mutation_random(r->m, BLOCK_STRATEGY, u);
+		mutation_draw_uniforms(r->m, BLOCK_STRATEGY, u);
 		if (u[1] < a)
 			check_accepted(r, t);
 	}

@@ -41,7 +41,7 @@ static struct {
 	_Atomic unsigned count, max_batches;
 } * loop_turns; /* turns of its loop, shared with the child */
 
-/* While the folder contains a file `busy`, access to the films of jobs is forbidden. */
+/* While the folder contains a file `is_busy`, access to the films of jobs is forbidden. */
 static void on_poll(uv_timer_t *t)
 {
 	static bool is_held;
@@ -57,7 +57,7 @@ static void on_poll(uv_timer_t *t)
 	is_held = is_wanted;
 	snprintf(path, sizeof path, "%s/held", server_folder);
 	for (struct live_job *job = s->jobs.live_jobs; job; job = job->next)
-		job->busy = is_wanted;
+		job->is_busy = is_wanted;
 	if (!is_wanted)
 		jobs_notify_films_free(&s->jobs);
 	if (is_wanted && fclose(fopen(path, "w")))
@@ -73,7 +73,7 @@ static void on_turn(uv_prepare_t *h)
 	unsigned current_count = 0;
 	const struct waiting_message *w;
 	for (struct live_job *job = s->jobs.live_jobs; job; job = job->next)
-		STAILQ_FOREACH(w, &job->waiting, next)
+		STAILQ_FOREACH(w, &job->waiting_messages, next)
 			current_count++;
 	if (previous_count > current_count && previous_count - current_count > loop_turns->max_batches)
 		loop_turns->max_batches = previous_count - current_count;

@@ -99,7 +99,8 @@ static spectrum optical_depth(const struct path_context *c, const struct path_ve
 	spectrum depth = spectrum_constant(0);
 	struct camera moved_camera;
 	if (eye->kind == VERTEX_CAMERA)
-		camera_clip_range(world_camera(c->w, &eye->x, &moved_camera), direction_to(eye, other), &t_min, &t_max);
+		camera_clip_range(world_camera_at(c->w, &eye->x, &moved_camera), direction_to(eye, other), &t_min,
+				  &t_max);
 	const struct grid_ray r = {eye->x.p, direction_to(eye, other), t_min, length};
 	for (int k = 0; k < (g ? g->channels : 1); k++) {
 		double along = g ? slow_grid_integral(g, &r, k) : length - t_min;
@@ -269,7 +270,7 @@ static void assemble_route(const struct path_context *c, unsigned s, unsigned t,
 	for (unsigned i = 0; i < t; i++)
 		r->x[r->edges - i] = c->camera[i];
 	for (unsigned i = 1; i < r->edges; i++)
-		r->is_delta[i] = r->x[i].delta && i + 1 != s && i != s;
+		r->is_delta[i] = r->x[i].is_delta && i + 1 != s && i != s;
 }
 
 static void compute_densities(const struct path_context *c, struct route *r)
@@ -314,7 +315,7 @@ static double scattering_factor(const struct path_context *c, const struct path_
 		return medium_scattering(&c->w->media[0], vertex->x.p, direction_to(vertex, camera), &c->wl).v[0] *
 		       phase_eval(&c->w->media[0].phase, vertex->x.p, direction_to(vertex, camera),
 				  direction_to(vertex, light));
-	if (vertex->delta) {
+	if (vertex->is_delta) {
 		struct bsdf_sample s = specular_lobe(c, camera, vertex, light, TRANSPORT_RADIANCE);
 		return s.f.v[0] * fabs(s.wi.z);
 	}
@@ -396,7 +397,8 @@ static bool can_join(const struct path_context *c, const struct route *r, unsign
 	if (j == 1 && end == r->edges)
 		return c->joins_emitters_to_lens && r->x[0].kind != VERTEX_INFINITE &&
 		       !is_on_delta_emitter(c, &r->x[0]) &&
-		       direct_light_pdf(c, r) >= PATH_LENS_DENSITY_RATIO * (c->light_every ? c->light_every : 1) *
+		       direct_light_pdf(c, r) >= PATH_LENS_DENSITY_RATIO *
+							 (c->light_subpath_interval ? c->light_subpath_interval : 1) *
 							 path_pdf(c, NULL, &r->x[end], &r->x[0], TRANSPORT_RADIANCE);
 	return !r->is_delta[j - 1] && !r->is_delta[end];
 }
@@ -424,10 +426,10 @@ static double log_technique_pdf(const struct path_context *c, const struct route
 static struct path_edge make_edge(const struct path_context *c, const struct path_vertex *a,
 				  const struct path_vertex *b)
 {
-	struct path_edge e = {.medium = 1, .previous_medium = 1, .media_match = true, .d = direction_to(a, b)};
+	struct path_edge e = {.medium = 1, .previous_medium = 1, .has_matching_media = true, .d = direction_to(a, b)};
 	spectrum depth = optical_depth(c, a, b);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		e.free_flight.v[i] = exp(-depth.v[i]);
+		e.scattering_transmittance.v[i] = exp(-depth.v[i]);
 	return e;
 }
 
@@ -436,17 +438,17 @@ static void relabel_vertices(const struct path_context *c, struct route *r, unsi
 			     struct path_edge *joint)
 {
 	p->edges = r->edges;
-	p->s = s;
+	p->light_count = s;
 	p->passed_count = s > 0 ? joined_vertex(c, r, s) - s : 0;
 	p->mismatched_edge = 0;
-	p->joint = joint;
+	p->joint_vertices = joint;
 	for (unsigned i = 1; i <= r->edges && c->w->effects.scattering; i++) {
 		struct path_edge *edge = i == s ? joint : i < s ? &r->x[i].edge : &r->x[i - 1].edge;
 		*edge = make_edge(c, &r->x[i], &r->x[i - 1]);
 	}
 	for (unsigned i = 0; i <= r->edges; i++) {
 		struct path_vertex *v = &r->x[i];
-		v->delta = r->is_delta[i];
+		v->is_delta = r->is_delta[i];
 		v->pdf = i < s ? r->pdf_from_light[i] : r->pdf_from_camera[i];
 		/* The sub-path does not reach far enough to know this. */
 		v->pdf_rev = NAN;
@@ -464,16 +466,16 @@ static void check_rare_light(struct path_context *c, const struct route *r, cons
 			     const double *ratio)
 {
 	double sum = 0;
-	c->light_every = 8;
-	bool is_made = can_join(c, r, p->s);
+	c->light_subpath_interval = 8;
+	bool is_made = can_join(c, r, p->light_count);
 	for (unsigned j = 0; j <= p->edges; j++)
 		if (can_join(c, r, j))
 			sum += j < (joined_vertex(c, r, 1) == p->edges ? 1 : 2) ? ratio[j] : 0.125 * ratio[j];
 	double weight = is_made ? path_balance_weight(c, p, PATH_EDGES_MAX) : 1 / sum;
-	c->light_every = 1;
+	c->light_subpath_interval = 1;
 	if (!(relative_difference(weight, 1 / sum) < 1e-12))
-		fail_msg("made by %u of %u, light in one of eight: weight %.12g, not %.12g", p->s, p->edges, weight,
-			 1 / sum);
+		fail_msg("made by %u of %u, light in one of eight: weight %.12g, not %.12g", p->light_count, p->edges,
+			 weight, 1 / sum);
 }
 
 static void check_ratios(struct path_context *c, struct route *r, struct density_tally *tally)
@@ -527,7 +529,7 @@ static bool can_join_subpaths(struct path_context *c, unsigned s, unsigned t)
 	vec3 w = direction_to(z, y);
 	double film[2];
 	struct camera moved_camera;
-	if (t == 1 && !camera_project(world_camera(c->w, &z->x, &moved_camera), z->x.p, w, 1, &film[0], &film[1]))
+	if (t == 1 && !camera_project(world_camera_at(c->w, &z->x, &moved_camera), z->x.p, w, 1, &film[0], &film[1]))
 		return false;
 	if (t > 1 && spectrum_is_zero(path_scatter(c, z, z->to_prev, w)))
 		return false;
@@ -565,7 +567,7 @@ static void check_film_position(struct path_context *c, unsigned s)
 	if (spectrum_is_zero(path_connect(c, s, 1, PATH_EDGES_MAX, film)))
 		return;
 	struct camera moved_camera;
-	vec3 w = camera_direction(world_camera(c->w, &c->camera[0].x, &moved_camera), c->camera[0].x.p, film[0],
+	vec3 w = camera_direction(world_camera_at(c->w, &c->camera[0].x, &moved_camera), c->camera[0].x.p, film[0],
 				  film[1]);
 	assert_true(vec3_length(vec3_sub(w, direction_to(&c->camera[0], &c->light[s - 1]))) < 1e-12);
 }

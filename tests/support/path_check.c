@@ -36,8 +36,10 @@ static struct full_path *copy_path(const struct full_path *x)
 
 static bool check_media(const struct path_edge *a, const struct path_edge *b, spectrum cached, spectrum fresh)
 {
-	return a->medium == b->medium && a->previous_medium == b->previous_medium && a->media_match == b->media_match &&
-	       is_same_spectrum(a->free_flight, b->free_flight) && is_same_spectrum(cached, fresh);
+	return a->medium == b->medium && a->previous_medium == b->previous_medium &&
+	       a->has_matching_media == b->has_matching_media &&
+	       is_same_spectrum(a->scattering_transmittance, b->scattering_transmittance) &&
+	       is_same_spectrum(cached, fresh);
 }
 
 static bool check_edges(struct path_context *c, const struct full_path *x, char *text, size_t size)
@@ -86,9 +88,9 @@ static bool check_vertices(const struct path_context *c, const struct full_path 
 			snprintf(text, size, "vertex %u of %u does not scatter in its mode", j, x->edges);
 			return false;
 		}
-		if (j > 0 && v->delta && !check_specular(x, j, text, size))
+		if (j > 0 && v->is_delta && !check_specular(x, j, text, size))
 			return false;
-		spectrum f = full_path_f(c, fresh, j);
+		spectrum f = full_path_eval_f(c, fresh, j);
 		if (spectrum_is_zero(f) || !spectrum_is_valid(f) ||
 		    (vertex_set_has(&x->cached_f, j) && !is_same_spectrum(f, x->f[j]))) {
 			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0],
@@ -96,7 +98,7 @@ static bool check_vertices(const struct path_context *c, const struct full_path 
 			return false;
 		}
 		if (j > 0 && vertex_set_has(&x->cached_fh, j) &&
-		    !is_same_spectrum(full_path_fh(c, fresh, j), x->fh[j])) {
+		    !is_same_spectrum(full_path_eval_fh(c, fresh, j), x->fh[j])) {
 			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh->fh[j].v[0],
 				 x->fh[j].v[0]);
 			return false;

@@ -2,7 +2,7 @@
 #include "tests/support/repeats.h"
 
 #include "tests/support/stats.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 #include "worker/render/render.h"
 #include "worker/render/world/effects.h"
 

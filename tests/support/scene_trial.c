@@ -94,7 +94,7 @@ static int try_in_child(const struct memory_file *files)
 	struct render_summary summary;
 	int rc = scene_read(&s, &assets, files[0].name, render_plugins(), NULL, 0, &e);
 	if (!rc)
-		rc = render_check(&s, &assets, &o, &summary, &e);
+		rc = world_check(&s, &assets, &o, &summary, &e);
 	if (rc)
 		return report_end(has_file_and_line(e.text) ? TRIAL_REFUSED : TRIAL_REFUSED_WITHOUT_PLACE, e.text);
 	o.width = o.height = 24; /* a larger film costs only memory, and its numbers have been checked already */
@@ -103,8 +103,9 @@ static int try_in_child(const struct memory_file *files)
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct integrator_properties *integrator = render_integrator_at(i);
-		bool is_unsupported = (integrator->only_from_camera ? summary.has_beam : summary.has_rolling_shutter) ||
-				      (integrator->ends_on_emitters && render_effect_is_on(&summary, "medium-light"));
+		bool is_unsupported =
+			(integrator->is_camera_only ? summary.has_beam : summary.has_rolling_shutter) ||
+			(integrator->must_end_on_emitter && render_effect_is_on(&summary, "medium-light"));
 		if (!is_unsupported && render_with_integrator(w, &summary, integrator, &e))
 			return report_end(TRIAL_FAILED, e.text);
 	}

@@ -188,7 +188,7 @@ uint64_t coord_expect_lease_failed(const char *why)
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_LEASE_FAILED);
 	if (!strstr(m->lease_failed->text, why))
 		fail_msg("it says: %s", m->lease_failed->text);
-	coord.failed_own = m->lease_failed->own;
+	coord.worker_at_fault = m->lease_failed->own;
 	return m->lease_failed->key->job;
 }
 
@@ -197,7 +197,7 @@ void coord_expect_built_jobs(int count)
 	unsigned jobs = 0;
 	for (int i = 0; i < count; i++) {
 		jobs |= 1u << coord_expect_lease_failed("scene");
-		assert_false(coord.failed_own);
+		assert_false(coord.worker_at_fault);
 	}
 	assert_int_equal(__builtin_popcount(jobs), count);
 }

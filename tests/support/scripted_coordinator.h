@@ -25,7 +25,7 @@ struct coord_state {
 	struct scripted_peer *connection; /* from the coordinator's side */
 	struct coord_file mesh, scenes[4];
 	unsigned char mesh_bytes[COORD_MESH_BYTES];
-	bool failed_own; /* of the last LeaseFailed */
+	bool worker_at_fault; /* of the last LeaseFailed */
 };
 extern struct coord_state coord;
 

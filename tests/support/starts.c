@@ -24,7 +24,7 @@ static void walk_subpaths(struct starts *s, uint64_t index, unsigned *camera, un
 	double film[2];
 	struct path_context *c = s->c;
 	sampler_random_init(&r, s->seed, RNG_BOOTSTRAP, index, 0);
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	*camera = path_walk_camera(c, &r.base, c->max_depth + 1, film);
 	*light = path_walk_light(c, &r.base, c->max_depth);
 }
@@ -39,7 +39,7 @@ static double technique_contribution(struct path_context *c, unsigned s, unsigne
 	struct path_sample sample = {.splat_count = 0, .intensity = 0};
 	spectrum l = path_connect(c, s, t, PATH_EDGES_MAX, film);
 	if (!spectrum_is_zero(l))
-		path_add_splat(c, &sample, 0, 0, l);
+		path_sample_add_splat(c, &sample, 0, 0, l);
 	return sample.intensity;
 }
 

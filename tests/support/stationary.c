@@ -159,14 +159,14 @@ static double log_geometry(const struct full_path *x, unsigned b)
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
 }
 
-static double planted_log_factor(enum stationary_fault fault, const struct move *m, const struct full_path *x,
+static double planted_log_factor(enum stationary_fault fault, const struct proposal_move *m, const struct full_path *x,
 				 const struct full_path *y)
 {
 	switch (fault) {
 	case STATIONARY_NO_TRANSFER:
-		return m->log_transfer[Y_TO_X] - m->log_transfer[X_TO_Y];
+		return m->log_transfer[MUTATION_REVERSE] - m->log_transfer[MUTATION_FORWARD];
 	case STATIONARY_NO_DENSITY:
-		return m->log_density[X_TO_Y] - m->log_density[Y_TO_X];
+		return m->log_density[MUTATION_FORWARD] - m->log_density[MUTATION_REVERSE];
 	case STATIONARY_NO_GEOMETRY:
 		return log_geometry(x, m->b) - log_geometry(y, m->b);
 	case STATIONARY_NO_FAULT:
@@ -185,19 +185,19 @@ static void count_invalid(struct group *g, double log_weight, bool is_state)
 }
 
 /* Proposes y and returns its acceptance probability. */
-static double propose_path(struct group *g, struct full_path *x, struct full_path *y, struct move *move)
+static double propose_path(struct group *g, struct full_path *x, struct full_path *y, struct proposal_move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
 	enum proposal_result end = ops->propose(ops, &g->mutation, &g->entry->forced, x, y, move);
-	double to_y = end ? -INFINITY : ops->log_weight(&g->mutation, y, move, X_TO_Y);
+	double to_y = end ? -INFINITY : ops->log_weight(&g->mutation, y, move, MUTATION_FORWARD);
 	if (!end && !(to_y > -INFINITY))
-		end = PROPOSAL_DARK;
+		end = PROPOSAL_BLACK;
 	count_invalid(g, to_y, false);
 	if (end) {
 		g->strategy[proposal_counter(end)]++;
 		return 0;
 	}
-	double to_x = ops->log_weight(&g->mutation, x, move, Y_TO_X);
+	double to_x = ops->log_weight(&g->mutation, x, move, MUTATION_REVERSE);
 	count_invalid(g, to_x, true);
 	return exp(fmin(to_y - to_x + planted_log_factor(g->options->fault, move, x, y), 0));
 }
@@ -217,7 +217,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 	memcpy(now, first, sizeof now);
 	g->mutation.chain = chain;
 	for (unsigned n = 1; n <= STATIONARY_STEPS; n++) {
-		struct move move = {0};
+		struct proposal_move move = {0};
 		g->mutation.step = n;
 		g->proposals++;
 		double a = propose_path(g, x, y, &move);
@@ -225,7 +225,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 			evaluate_functions(&g->context, y, next);
 		for (int f = 0; f < STATIONARY_FUNCTIONS; f++)
 			g->change[f] += (a > 0 ? a * next[f] + (1 - a) * now[f] : now[f]) - first[f];
-		mutation_random(&g->mutation, BLOCK_STRATEGY, r);
+		mutation_draw_uniforms(&g->mutation, BLOCK_STRATEGY, r);
 		if (r[1] < a) {
 			struct full_path *swap = x;
 			x = y;
@@ -233,7 +233,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 			memcpy(now, next, sizeof now);
 			g->accepted++;
 		}
-		if (y->edges != x->edges || g->entry->ops->independent)
+		if (y->edges != x->edges || g->entry->ops->is_independent)
 			full_path_copy(y, x, 0, x->edges);
 		else
 			full_path_copy(y, x, move.first, move.last);

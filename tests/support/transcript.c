@@ -67,16 +67,16 @@ static void append_action(struct answer_text *s, const struct action *a)
 		append_words(s, "rejected: %s", a->text);
 		break;
 	case ACTION_SEND_LEASE:
-	case ACTION_REVOKE:
-		append_words(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
+	case ACTION_REVOKE_LEASE:
+		append_words(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE_LEASE ? "loses" : "gets");
 		append_key(s, &a->key);
-		if (a->from_seeds)
+		if (a->starts_from_seeds)
 			append_words(s, " anew");
 		break;
-	case ACTION_MERGE:
+	case ACTION_MERGE_BATCH:
 		append_words(s, "merge");
 		break;
-	case ACTION_ACK:
+	case ACTION_ACKNOWLEDGE:
 		append_ack(s, a);
 		break;
 	case ACTION_BOOTSTRAP_DONE:
@@ -85,7 +85,7 @@ static void append_action(struct answer_text *s, const struct action *a)
 	case ACTION_ROUND_DONE:
 		append_words(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds);
 		break;
-	case ACTION_EVALUATE_ERROR:
+	case ACTION_ESTIMATE_ERROR:
 		append_words(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds);
 		break;
 	case ACTION_PUBLISH:
@@ -100,7 +100,7 @@ static void append_action(struct answer_text *s, const struct action *a)
 	case ACTION_RESTART_CHAINS:
 		append_words(s, "anew");
 		break;
-	case ACTION_ROLL_BACK:
+	case ACTION_ROLL_BACK_EPOCH:
 		append_words(s, "back ");
 		append_key(s, &a->key);
 		break;
@@ -195,7 +195,7 @@ static void parse_submit(const char **cursor, struct event *ev, struct plan *p, 
 		if (skip_word(cursor, "priority="))
 			ev->submit.priority = (int)parse_number(cursor);
 		else if (skip_word(cursor, "mixed"))
-			ev->submit.mixed = true;
+			ev->submit.is_mixed = true;
 		else if (skip_word(cursor, "samples"))
 			p->kind = PLAN_SAMPLES;
 		else if (skip_word(cursor, "owner="))
@@ -262,7 +262,7 @@ static void parse_worker(const char **cursor, struct event *ev, char *name, char
 	} else if (skip_word(cursor, "heartbeat")) {
 		ev->kind = EVENT_HEARTBEAT;
 	} else if (skip_word(cursor, "wants")) {
-		ev->kind = EVENT_REQUEST;
+		ev->kind = EVENT_LEASE_REQUEST;
 		ev->wanted_leases = (uint32_t)parse_count(cursor);
 	} else {
 		bool lacks = skip_word(cursor, "lacks"), lost = !lacks && skip_word(cursor, "denies"),
@@ -278,12 +278,12 @@ static void parse_worker(const char **cursor, struct event *ev, char *name, char
 		if (ev->kind == EVENT_LEASE_RETURNED && !skip_word(cursor, "returns"))
 			fail_msg("no such event: %s", *cursor);
 		ev->lease.key = parse_key(cursor);
-		ev->lease.worker_at_fault = lacks || later;
-		ev->lease.memory_full = later;
-		ev->lease.bad_states = refuses;
+		ev->lease.is_worker_at_fault = lacks || later;
+		ev->lease.is_memory_full = later;
+		ev->lease.has_bad_states = refuses;
 		ev->lease.can_roll_back = refuses && !lost;
-		ev->lease.states_outdated = late;
-		ev->lease.valid = !skip_word(cursor, "bad");
+		ev->lease.has_outdated_states = late;
+		ev->lease.is_valid = !skip_word(cursor, "bad");
 		if (skip_word(cursor, "says "))
 			memset(&ev->lease.digest, *(*cursor)++, sizeof ev->lease.digest);
 		skip_word(cursor, " ");
@@ -300,8 +300,8 @@ static void parse_restore(const char **cursor, struct event *ev, struct plan *p,
 				  .next_epochs = next,
 				  .fingerprint = fingerprint,
 				  .elapsed = NAN,
-				  .opened = NAN,
-				  .completed = NAN,
+				  .first_round_at = NAN,
+				  .last_round_end = NAN,
 				  .looks = history};
 	r.kind = skip_word(cursor, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
 	if (r.kind == LEASE_RENDER && !skip_word(cursor, "render"))
@@ -317,10 +317,10 @@ static void parse_restore(const char **cursor, struct event *ev, struct plan *p,
 		skip_word(cursor, " ");
 	}
 	if (skip_word(cursor, "elapsed="))
-		r.elapsed = r.opened = parse_number(cursor);
+		r.elapsed = r.first_round_at = parse_number(cursor);
 	if (skip_word(cursor, "completed="))
-		r.completed = parse_number(cursor);
-	r.black = skip_word(cursor, "black");
+		r.last_round_end = parse_number(cursor);
+	r.is_black = skip_word(cursor, "black");
 	parse_submit(cursor, ev, p, owner);
 	r.submit = ev->submit;
 	ev->kind = EVENT_RESTORE;
@@ -360,12 +360,12 @@ static void parse_job(const char **cursor, struct event *ev)
 	} else if (skip_word(cursor, "hold") || skip_word(cursor, "release")) {
 		ev->kind = EVENT_HOLD;
 		ev->tag = 7;
-		ev->hold = skip_word(cursor, "order")	? HOLD_BY_USER
+		ev->hold = skip_word(cursor, "order")	? HOLD_USER
 			   : skip_word(cursor, "files") ? HOLD_FILES
 							: HOLD_STORAGE;
 		ev->job = parse_id(cursor, "j");
 	} else if (skip_word(cursor, "priority")) {
-		ev->kind = EVENT_PRIORITY;
+		ev->kind = EVENT_SET_PRIORITY;
 		ev->tag = 7;
 		ev->job = parse_id(cursor, "j");
 		ev->priority = (int)parse_number(cursor);
@@ -373,7 +373,7 @@ static void parse_job(const char **cursor, struct event *ev)
 		ev->kind = EVENT_QUARANTINED;
 		parse_identity(cursor, &ev->join);
 	} else if (skip_word(cursor, "broken")) {
-		ev->kind = EVENT_JOB_BROKEN;
+		ev->kind = EVENT_JOB_FAILED;
 		ev->job = parse_id(cursor, "j");
 	} else if (!skip_word(cursor, "tick")) {
 		fail_msg("no such event: %s", *cursor);

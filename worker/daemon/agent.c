@@ -30,7 +30,7 @@ enum { HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
 static const double initial_backoff = 0.2, max_backoff = 10, stall_seconds = 30, linger_seconds = 5;
 
 static void resolve_and_connect(struct agent *a);
-static void disconnect_for_good(struct agent *a);
+static void disconnect_permanently(struct agent *a);
 
 /* ---- connection ---- */
 
@@ -42,7 +42,7 @@ static void on_retry(uv_timer_t *t)
 /* Reconnects after a pause that doubles each time, with jitter, so that a hundred workers do not reconnect at once. */
 static void schedule_reconnect(struct agent *a)
 {
-	double wait = jitter(a->backoff_seconds);
+	double wait = jitter_seconds(a->backoff_seconds);
 	a->backoff_seconds = a->backoff_seconds * 2 < max_backoff ? a->backoff_seconds * 2 : max_backoff;
 	uv_timer_start(&a->retry_timer, on_retry, (uint64_t)(1000 * wait), 0);
 }
@@ -132,7 +132,7 @@ static void on_closed(void *user, const char *why)
 	a->is_accepted = false;
 	uv_timer_stop(&a->heartbeat_timer);
 	if (a->is_refused)
-		disconnect_for_good(a);
+		disconnect_permanently(a);
 	else if (!a->has_left)
 		schedule_reconnect(a);
 	agent_leave_if_idle(a);
@@ -187,7 +187,7 @@ static void resolve_and_connect(struct agent *a)
 
 /* ---- leaving ---- */
 
-static void disconnect_for_good(struct agent *a)
+static void disconnect_permanently(struct agent *a)
 {
 	if (a->has_left)
 		return;
@@ -208,7 +208,7 @@ static void disconnect_for_good(struct agent *a)
 
 static void on_linger_over(uv_timer_t *t)
 {
-	disconnect_for_good(t->data);
+	disconnect_permanently(t->data);
 }
 
 static void on_grace_over(uv_timer_t *t)
@@ -223,7 +223,7 @@ static void on_grace_over(uv_timer_t *t)
 void agent_leave_if_idle(struct agent *a)
 {
 	if (a->is_leaving && !a->has_left && lease_queue_is_idle(a))
-		disconnect_for_good(a);
+		disconnect_permanently(a);
 }
 
 static void begin_leaving(struct agent *a)
@@ -362,7 +362,7 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 
 void agent_close(struct agent *a)
 {
-	disconnect_for_good(a);
+	disconnect_permanently(a);
 	thread_pool_close(a->thread_pool);
 	uv_run(&a->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&a->loop);

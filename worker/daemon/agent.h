@@ -9,7 +9,7 @@
  * that scene are. A thread cannot be killed, so the worker then leaves as on SIGTERM, and the program exits with
  * AGENT_EXIT_HUNG. A leaving worker does not wait for scenes being built. The worker runs in a process that a signal
  * may end at any time (supervise.h); the leases of the previous process are returned as failed as soon as the next one
- * is connected (work.h).
+ * is connected (crash_record.h).
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H

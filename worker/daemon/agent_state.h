@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The daemon's state, shared by agent.c (connection and shutdown), lease_queue.c (messages of the coordinator about
- * jobs and leases), lease_list.c (the list of leases), scenes_kept.c (scenes in memory), fetch.c (files), outgoing.c
+ * jobs and leases), lease_list.c (the list of leases), scene_limit.c (scenes in memory), fetch.c (files), outgoing.c
  * (messages to the coordinator) and hang_watch.c (threads that make no progress). */
 #ifndef WORKER_DAEMON_AGENT_STATE_H
 #define WORKER_DAEMON_AGENT_STATE_H
@@ -12,7 +12,7 @@
 
 enum { IDLE_WORLDS_MAX = 2 /* number of scenes kept in memory for jobs without leases here */ };
 
-/* The job whose scene may be in memory while only one scene may (scenes_kept_admit). Times are of clock_seconds. */
+/* The job whose scene may be in memory while only one scene may (scene_limit_admit). Times are of clock_seconds. */
 struct scene_turn {
 	uint64_t job;
 	bool has_waiter; /* another job waits for its turn */

@@ -14,7 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "common/wire/batch_wire.h"
-#include "worker/daemon/work.h"
+#include "worker/daemon/crash_record.h"
 #include "worker/render/settings/accuracy_settings.h"
 
 #include <assert.h>
@@ -208,7 +208,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	struct stat st;
 	if (fd < 0 || fstat(fd, &st)) {
 		int rc = error_set(e, errno, "%s: %s", name, strerror(errno));
-		b->worker_at_fault = true;
+		b->is_worker_at_fault = true;
 		if (fd >= 0)
 			close(fd);
 		return rc;
@@ -220,7 +220,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	close(fd);
 	if (!map || (st.st_size > 0 && address == MAP_FAILED)) {
 		mem_free(map);
-		b->worker_at_fault = true;
+		b->is_worker_at_fault = true;
 		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
 	}
 	*map = (struct mapping){st.st_size > 0 ? address : NULL, (size_t)st.st_size};
@@ -323,12 +323,12 @@ static void run_build(struct task *t)
 	struct job_cache *b = (struct job_cache *)t; /* its first member */
 	uint64_t begun = uv_hrtime();
 	if (b->waiting_lease.job)
-		work_begin(&b->waiting_lease, get_info(b)->scene);
+		crash_record_begin(&b->waiting_lease, get_info(b)->scene);
 	int rc = build_world(b, &b->error);
 	if (rc)
 		b->world = NULL;
-	b->out_of_memory = rc == -ENOMEM;
-	work_end();
+	b->is_out_of_memory = rc == -ENOMEM;
+	crash_record_end();
 	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
 }
 
@@ -376,5 +376,5 @@ void job_cache_note_other_worlds(struct job_cache *b, struct job_cache *all, boo
 void job_cache_note_memory_failure(const struct job_cache *b)
 {
 	if (b->had_other_worlds)
-		work_note_memory_short(clock_seconds());
+		crash_record_note_memory_short(clock_seconds());
 }

@@ -53,15 +53,15 @@ struct job_cache {
 	struct lease_key waiting_lease;	   /* one of the leases that wait for the world; job 0: none */
 	unsigned lease_count;		   /* number of leases that need the world */
 	uint64_t last_used;		   /* value of agent.use_counter at the last use */
-	bool ended;			   /* the job has ended at the coordinator */
-	bool confirmed; /* on this connection, the coordinator has said that this number is still this job's */
+	bool has_ended;			   /* the job has ended at the coordinator */
+	bool is_confirmed; /* on this connection, the coordinator has said that this number is still this job's */
 	double build_seconds;
 	void *owner;
 	void (*on_built)(struct job_cache *); /* called on the loop's thread when the state is READY or FAILED */
 	struct error error;
-	bool worker_at_fault;  /* FAILED because of this machine, not the job */
-	bool out_of_memory;    /* FAILED because there was not enough memory for the world */
-	bool had_other_worlds; /* other worlds have been in memory since the build, or since the last lease, began */
+	bool is_worker_at_fault; /* FAILED because of this machine, not the job */
+	bool is_out_of_memory;	 /* FAILED because there was not enough memory for the world */
+	bool had_other_worlds;	 /* other worlds have been in memory since the build, or since the last lease, began */
 };
 
 struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL if none has this number */
@@ -83,7 +83,7 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 
 /* Call when a lease of b begins, or the building of its world does: notes whether other worlds are in memory. */
 void job_cache_note_other_worlds(struct job_cache *b, struct job_cache *all, bool building);
-/* Call when an allocation has failed for b. If other worlds were in memory, tells work_note_memory_short. */
+/* Call when an allocation has failed for b. If other worlds were in memory, tells crash_record_note_memory_short. */
 void job_cache_note_memory_failure(const struct job_cache *b);
 
 #endif

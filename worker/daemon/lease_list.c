@@ -21,13 +21,13 @@ void lease_list_drop(struct agent *a, struct lease_task *l)
 
 void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e)
 {
-	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64(b->job), log_quote(e->text).text);
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_value_from_u64(b->job), log_quote(e->text).text);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->job_cache != b || l->state != LEASE_WAITING)
 			continue;
 		send_lease_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built",
-				  b->worker_at_fault);
+				  b->is_worker_at_fault);
 		lease_list_drop(a, l);
 	}
 }

@@ -14,7 +14,7 @@
  * acknowledged, no more leases are requested.
  *
  * After SIGKILL has ended a rendering process, which the system sends when memory is short, or an allocation has failed
- * while several scenes were in memory, leases of only one job at a time are accepted for a while (scenes_kept_admit).
+ * while several scenes were in memory, leases of only one job at a time are accepted for a while (scene_limit_admit).
  * Otherwise two jobs whose scenes do not fit into memory together would end each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
@@ -23,12 +23,12 @@
 #include "worker/daemon/fetch.h"
 #include "worker/daemon/lease_list.h"
 #include "worker/daemon/outgoing.h"
-#include "worker/daemon/scenes_kept.h"
-#include "worker/daemon/work.h"
+#include "worker/daemon/scene_limit.h"
+#include "worker/daemon/crash_record.h"
 
 /* ---- scenes ---- */
 
-/* Fails a job's waiting leases. The next scenes_kept_drop_unused drops the job. */
+/* Fails a job's waiting leases. The next scene_limit_drop_unused drops the job. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
@@ -44,7 +44,7 @@ static void start_lease(struct agent *a, struct lease_task *l)
 	lease_task_start(l, a->thread_pool);
 }
 
-/* Returns out_of_memory, which means that this machine is at fault, not the job: the client that submitted the scene
+/* Returns is_out_of_memory, which means that this machine is at fault, not the job: the client that submitted the scene
  * had enough memory, and other workers may have. */
 static bool note_memory_failure(const struct job_cache *b, bool no_memory)
 {
@@ -57,16 +57,16 @@ static void on_built(struct job_cache *b)
 {
 	struct agent *a = b->owner;
 	if (b->state == JOB_CACHE_FAILED) {
-		b->worker_at_fault |= note_memory_failure(b, b->out_of_memory);
+		b->is_worker_at_fault |= note_memory_failure(b, b->is_out_of_memory);
 		fail_job_cache(a, b, &b->error);
 	} else {
-		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
-			  world_embree_bytes(b->world));
+		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_value_from_u64(b->job),
+			  b->build_seconds, world_embree_bytes(b->world));
 		for (struct lease_task *l = a->leases; l; l = l->next)
 			if (l->job_cache == b && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 	a->leave_if_idle(a);
 }
 
@@ -86,7 +86,7 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 	enum job_cache_files files = job_cache_check_files(b, &a->loop);
 	if (files == JOB_CACHE_FILE_MISSING) {
 		rc = fetch_request(a, &b->wanted_file, &e);
-	} else if (files == JOB_CACHE_FILES_COMPLETE && !scenes_kept_must_wait(a, b)) {
+	} else if (files == JOB_CACHE_FILES_COMPLETE && !scene_limit_must_wait(a, b)) {
 		b->on_built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
 			if (l->job_cache == b)
@@ -95,7 +95,7 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 		rc = job_cache_build(b, a->thread_pool, &e);
 	}
 	if (rc) {
-		b->worker_at_fault = rc == -ENOMEM;
+		b->is_worker_at_fault = rc == -ENOMEM;
 		fail_job_cache(a, b, &e);
 	}
 }
@@ -111,9 +111,9 @@ static void on_file_read(struct job_cache *b)
 	struct agent *a = b->owner;
 	if (a->has_left)
 		return;
-	if (!b->ended)
+	if (!b->has_ended)
 		fetch_or_build(a, b);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 	a->leave_if_idle(a);
 }
 
@@ -125,7 +125,7 @@ static void on_rendered(struct lease_task *l)
 	l->state = LEASE_RENDERED;
 	if (l->is_unwanted) {
 		lease_list_drop(a, l);
-	} else if (l->rc || l->end == LEASE_STOPPED) {
+	} else if (l->rc || l->outcome == LEASE_STOPPED) {
 		if (l->rc == -EILSEQ)
 			send_bad_states(a, &l->grant, l->error.text);
 		else
@@ -136,15 +136,15 @@ static void on_rendered(struct lease_task *l)
 		send_result(a, l);
 	}
 	lease_list_update_backlog(a);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 	fetch_or_build_all(a); /* a scene may have waited for this thread to stop */
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 	a->leave_if_idle(a);
 }
 
 static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
 {
-	int rc = scenes_kept_admit(a, job, e);
+	int rc = scene_limit_admit(a, job, e);
 	*b = rc ? NULL : job_cache_find(a->job_caches, job);
 	if (rc || *b)
 		return rc;
@@ -206,7 +206,7 @@ static void handle_grant(struct agent *a, const Farm__LeaseGrant *m, const unsig
 	*end = l;
 	if (b->state == JOB_CACHE_READY)
 		start_lease(a, l);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 static void handle_ack(struct agent *a, const Farm__LeaseAck *m)
@@ -219,15 +219,15 @@ static void handle_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = lease_list_find(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k.job), LEASE_VALUES(&k),
-			  log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_value_from_u64(k.job),
+			  LEASE_VALUES(&k), log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
-		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_u64(k.job),
+		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_value_from_u64(k.job),
 			  LEASE_VALUES(&k), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		lease_list_drop(a, l);
 		lease_list_update_backlog(a);
-		scenes_kept_drop_unused(a);
+		scene_limit_drop_unused(a);
 	}
 }
 
@@ -238,7 +238,7 @@ static void handle_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : lease_list_find(a, &k);
 	if (l && l->state != LEASE_RENDERED) /* a result is kept: the coordinator will acknowledge it */
 		lease_list_forget(a, l);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 static void handle_job_end(struct agent *a, uint64_t job)
@@ -251,9 +251,9 @@ static void handle_job_end(struct agent *a, uint64_t job)
 		if (l->job_cache == b && !l->is_unwanted)
 			lease_list_forget(a, l);
 	}
-	b->ended = true;
+	b->has_ended = true;
 	lease_list_update_backlog(a);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 /* The coordinator has started with an empty spool and given the number to another job: results of the old job are
@@ -261,7 +261,8 @@ static void handle_job_end(struct agent *a, uint64_t job)
  * ignores the return of the others. */
 static void drop_old_job(struct agent *a, struct job_cache *b)
 {
-	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
+	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"",
+		  log_value_from_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->job_cache != b || l->is_unwanted)
@@ -270,9 +271,9 @@ static void drop_old_job(struct agent *a, struct job_cache *b)
 		lease_list_forget(a, l);
 	}
 	lease_list_update_backlog(a);
-	b->ended = true;
+	b->has_ended = true;
 	b->job = 0;
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 static void handle_job_info(struct agent *a, struct envelope *env)
@@ -285,14 +286,14 @@ static void handle_job_info(struct agent *a, struct envelope *env)
 		drop_old_job(a, b);
 		return;
 	}
-	b->confirmed = true;
+	b->is_confirmed = true;
 	if (b->state == JOB_CACHE_REQUESTED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job still runs: send results of it */
 		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 /* Stores a chunk for the first job that wants the file. If the file cannot be stored, that job fails, which releases
@@ -306,7 +307,7 @@ static void handle_blob_chunk(struct agent *a, const Farm__BlobChunk *c, const u
 		return;
 	}
 	const struct blob_hash hash = f->hash;
-	struct job_cache *first = scenes_kept_find_waiting(a, &hash);
+	struct job_cache *first = scene_limit_find_waiting(a, &hash);
 	enum fetch_outcome end = FETCH_MORE;
 	if (first && !f->writer && cache_restore_folder(&a->cache, &e))
 		end = FETCH_NOT_STORED;
@@ -315,14 +316,14 @@ static void handle_blob_chunk(struct agent *a, const Farm__BlobChunk *c, const u
 	if (end != FETCH_MORE)
 		fetch_drop(a, f);
 	if (end == FETCH_FAILED || end == FETCH_NOT_STORED) {
-		first->worker_at_fault = end == FETCH_NOT_STORED;
+		first->is_worker_at_fault = end == FETCH_NOT_STORED;
 		fail_job_cache(a, first, &e);
-		scenes_kept_drop_unused(a);
+		scene_limit_drop_unused(a);
 	}
 	fetch_or_build_all(a);
 	if (end == FETCH_COMPLETE)
 		blob_release(a->cache.blobs, &hash);
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 void lease_queue_handle_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
@@ -361,10 +362,10 @@ void lease_queue_handle_message(struct agent *a, struct envelope *env, const uns
 static void report_lost_leases(struct agent *a)
 {
 	struct lost_lease *l;
-	for (unsigned i = 0; (l = work_lost_lease(i)); i++)
-		if (!l->reported) {
-			send_lease_failed(a, &l->key, l->text, l->worker_at_fault);
-			l->reported = true;
+	for (unsigned i = 0; (l = crash_record_lost_lease_at(i)); i++)
+		if (!l->is_reported) {
+			send_lease_failed(a, &l->key, l->text, l->is_worker_at_fault);
+			l->is_reported = true;
 		}
 }
 
@@ -379,7 +380,7 @@ static void drop_old_leases(struct agent *a)
 		    (l->state == LEASE_WAITING || thread_pool_remove(a->thread_pool, &l->task)))
 			lease_list_drop(a, l);
 	}
-	scenes_kept_drop_unused(a);
+	scene_limit_drop_unused(a);
 }
 
 void lease_queue_on_connect(struct agent *a)
@@ -391,8 +392,8 @@ void lease_queue_on_connect(struct agent *a)
 	fetch_reset_requests(a);
 	/* Ask whether the jobs still exist. The answers resume unfinished fetches and send unsent results. */
 	for (struct job_cache *b = a->job_caches; b; b = b->next) {
-		b->confirmed = false;
-		if (!b->ended)
+		b->is_confirmed = false;
+		if (!b->has_ended)
 			send_job_get(a, b->job);
 	}
 	send_lease_request(a);
@@ -438,6 +439,6 @@ void lease_queue_close(struct agent *a)
 	while (a->job_caches) {
 		if (a->job_caches->state == JOB_CACHE_BUILDING) /* the thread has ended without calling back */
 			a->job_caches->state = a->job_caches->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
-		scenes_kept_drop(a, a->job_caches);
+		scene_limit_drop(a, a->job_caches);
 	}
 }

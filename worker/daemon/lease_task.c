@@ -2,7 +2,7 @@
 #include "worker/daemon/lease_task.h"
 
 #include "common/base/mem.h"
-#include "worker/daemon/work.h"
+#include "worker/daemon/crash_record.h"
 
 #include <string.h>
 
@@ -38,19 +38,20 @@ static void render_task(struct task *t)
 				 .states = l->grant.states,
 				 .map = l->job_cache->brightness_map};
 	const struct plan *p = &l->job_cache->plan;
-	l->end = LEASE_STOPPED;
-	work_begin(&l->grant.key, l->job_cache->info.message->job_info->scene);
+	l->outcome = LEASE_STOPPED;
+	crash_record_begin(&l->grant.key, l->job_cache->info.message->job_info->scene);
 	if (!atomic_load(&l->stop_requested))
-		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop_requested, &l->end, &batch,
-				     &l->error);
-	if (!l->rc && l->end == LEASE_DONE) /* the coordinator would refuse such a result: report a failure instead */
+		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop_requested, &l->outcome,
+				     &batch, &l->error);
+	if (!l->rc &&
+	    l->outcome == LEASE_DONE) /* the coordinator would refuse such a result: report a failure instead */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
 		error_prefix(&l->error, l->rc, "%s", l->job_cache->info.message->job_info->scene);
-	if (!l->rc && l->end == LEASE_DONE)
+	if (!l->rc && l->outcome == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
 	batch_fini(&batch);
-	work_end();
+	crash_record_end();
 }
 
 static void on_task_done(struct task *t)

@@ -29,7 +29,7 @@ struct lease_task {
 	unsigned char *frame;
 	size_t frame_size;
 	/* These three are set by the thread. */
-	enum lease_outcome end;
+	enum lease_outcome outcome;
 	int rc;
 	struct error error;
 	void *owner;

@@ -10,9 +10,9 @@
 
 #define CONFIG struct agent_config
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(CONFIG, coordinator_address),
-	 .environment = "HSLT_COORDINATOR", .required = true},
+	 .environment = "HSLT_COORDINATOR", .is_required = true},
 	{"threads", 't', "N", "Render threads (all cores)", OPTION_COUNT(CONFIG, threads, 1, 1024)},
 	{"name", 0, "NAME", "Displayed name of the worker (host and process)", OPTION_NAME(CONFIG, name, 127)},
 	{"cache", 0, "DIR", "Folder of cached scene files (~/.cache/hslt)", OPTION_TEXT(CONFIG, cache_folder)},
@@ -48,7 +48,7 @@ static const struct program program = {
 	.exit_codes =
 		"0 stopped, 1 failed, 2 usage, 6 refused permanently (a certificate of another role, another version), "
 		"75 a thread hung",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, NULL},
 };
 
 static int run_worker(void *user)

@@ -25,10 +25,10 @@ void send_job_get(struct agent *a, uint64_t job)
 }
 
 /* Who is at fault for a failed lease: the job, this machine, or nobody (another scene is in memory). */
-enum fault { FAULT_JOB, FAULT_WORKER, FAULT_NOBODY };
+enum fault_party { FAULT_JOB, FAULT_WORKER, FAULT_NONE };
 
 /* states: digest of the chain states that could not be used; NULL: they are not at fault. */
-static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault fault,
+static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault_party fault,
 			 const struct blob_hash *states)
 {
 	char copy[1024];
@@ -38,15 +38,15 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	text_copy(copy, sizeof copy, text);
 	text_clean(copy);
 	Farm__LeaseFailed failed = MESSAGE(lease_failed, .key = &key, .text = copy, .own = fault != FAULT_JOB,
-					   .later = fault == FAULT_NOBODY, .bad_states = states != NULL);
+					   .later = fault == FAULT_NONE, .bad_states = states != NULL);
 	if (states) {
 		digest = *states;
 		failed.states_digest = (ProtobufCBinaryData){sizeof digest.bytes, digest.bytes};
 	}
 	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
-	if (*text && fault != FAULT_NOBODY)
-		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k->job), LEASE_VALUES(k),
-			  log_quote(text).text);
+	if (*text && fault != FAULT_NONE)
+		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_value_from_u64(k->job),
+			  LEASE_VALUES(k), log_quote(text).text);
 }
 
 void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool worker_at_fault)
@@ -56,7 +56,7 @@ void send_lease_failed(struct agent *a, const struct lease_key *k, const char *t
 
 void send_lease_deferred(struct agent *a, const struct lease_key *k, const char *text)
 {
-	send_failure(a, k, text, FAULT_NOBODY, NULL);
+	send_failure(a, k, text, FAULT_NONE, NULL);
 }
 
 void send_bad_states(struct agent *a, const struct grant *g, const char *text)
@@ -66,7 +66,7 @@ void send_bad_states(struct agent *a, const struct grant *g, const char *text)
 
 void send_result(struct agent *a, struct lease_task *l)
 {
-	if (!a->conn || !a->is_accepted || l->is_sent || !l->job_cache->confirmed)
+	if (!a->conn || !a->is_accepted || l->is_sent || !l->job_cache->is_confirmed)
 		return;
 	unsigned char *copy = mem_alloc(l->frame_size, 1);
 	if (!copy) { /* the result will be sent on the next connection */

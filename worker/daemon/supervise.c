@@ -4,7 +4,7 @@
 #include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/log.h"
-#include "worker/daemon/work.h"
+#include "worker/daemon/crash_record.h"
 
 #include <signal.h>
 #include <stdbool.h>
@@ -65,7 +65,7 @@ static int start_process(struct supervisor *s, int (*run)(void *), void *user)
 	if (getppid() != parent)
 		_exit(1);
 	take_over_watchdog(parent);
-	work_catch_signals();
+	crash_record_catch_signals();
 	sigprocmask(SIG_SETMASK, &s->mask, NULL);
 	exit(run(user));
 }
@@ -110,7 +110,7 @@ static bool has_failed_to_start(int status)
 static bool wait_for_loss(struct supervisor *s, int *code)
 {
 	int status = wait_for_end(s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-	unsigned lost = work_record_loss(number, clock_seconds());
+	unsigned lost = crash_record_add_loss(number, clock_seconds());
 	bool unable = s->has_lost_process && has_failed_to_start(status);
 	*code = WEXITSTATUS(status);
 	if (!number && !lost && !unable)
@@ -132,7 +132,7 @@ int supervise_process(unsigned threads, int (*run)(void *), void *user)
 	struct supervisor s = {.pause_seconds = initial_pause};
 	struct error e;
 	int code;
-	if (work_share_memory(threads, &e)) {
+	if (crash_record_open(threads, &e)) {
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
 		return 1;
 	}

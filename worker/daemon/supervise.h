@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A rendering process and its supervisor. If a signal ends the rendering process (a fault caused by a scene, lack of
- * memory), the supervisor starts a new one, which tells the coordinator which leases the old one had (work.h). The
- * supervisor does nothing else, so no scene can affect it; if it is killed, the rendering process is killed with it.
- * SIGTERM, SIGINT and SIGHUP (unless ignored, as under nohup) are passed on to the rendering process, whose exit code
- * is the program's. If the first process cannot start, the program ends; a later one is tried again.
+ * memory), the supervisor starts a new one, which tells the coordinator which leases the old one had (crash_record.h).
+ * The supervisor does nothing else, so no scene can affect it; if it is killed, the rendering process is killed with
+ * it. SIGTERM, SIGINT and SIGHUP (unless ignored, as under nohup) are passed on to the rendering process, whose exit
+ * code is the program's. If the first process cannot start, the program ends; a later one is tried again.
  */
 #ifndef WORKER_DAEMON_SUPERVISE_H
 #define WORKER_DAEMON_SUPERVISE_H

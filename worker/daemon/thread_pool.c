@@ -16,9 +16,9 @@ struct thread_pool {
 	uv_async_t finished_async;
 	pthread_mutex_t lock;
 	pthread_cond_t work_available;
-	struct queue waiting, finished;
+	struct queue waiting_tasks, finished_tasks;
 	unsigned pending_count, thread_count;
-	bool stopping;
+	bool is_stopping;
 	pthread_t threads[];
 };
 
@@ -46,7 +46,7 @@ static void *thread_main(void *user)
 	pthread_mutex_lock(&c->lock);
 	for (;;) {
 		struct task *t = NULL;
-		while (!c->stopping && !(t = queue_pop(&c->waiting)))
+		while (!c->is_stopping && !(t = queue_pop(&c->waiting_tasks)))
 			pthread_cond_wait(&c->work_available, &c->lock);
 		if (!t)
 			break;
@@ -56,7 +56,7 @@ static void *thread_main(void *user)
 		t->run(t);
 		liveness_counter = NULL;
 		pthread_mutex_lock(&c->lock);
-		queue_push(&c->finished, t);
+		queue_push(&c->finished_tasks, t);
 		uv_async_send(&c->finished_async);
 	}
 	pthread_mutex_unlock(&c->lock);
@@ -68,7 +68,7 @@ static void on_tasks_finished(uv_async_t *a)
 	struct thread_pool *c = a->data;
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
-		struct task *t = queue_pop(&c->finished);
+		struct task *t = queue_pop(&c->finished_tasks);
 		pthread_mutex_unlock(&c->lock);
 		if (!t)
 			return;
@@ -85,7 +85,7 @@ static void on_closed(uv_handle_t *h)
 void thread_pool_close(struct thread_pool *c)
 {
 	pthread_mutex_lock(&c->lock);
-	c->stopping = true;
+	c->is_stopping = true;
 	pthread_cond_broadcast(&c->work_available);
 	pthread_mutex_unlock(&c->lock);
 	for (unsigned i = 0; i < c->thread_count; i++)
@@ -106,8 +106,8 @@ int thread_pool_new(struct thread_pool **out, uv_loop_t *loop, unsigned threads,
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
 	c->finished_async.data = c;
-	c->waiting.last = &c->waiting.first;
-	c->finished.last = &c->finished.first;
+	c->waiting_tasks.last = &c->waiting_tasks.first;
+	c->finished_tasks.last = &c->finished_tasks.first;
 	pthread_mutex_init(&c->lock, NULL);
 	pthread_cond_init(&c->work_available, NULL);
 	sigset_t all, before;
@@ -128,7 +128,7 @@ void thread_pool_add(struct thread_pool *c, struct task *t)
 {
 	atomic_store(&t->ticks, 0);
 	pthread_mutex_lock(&c->lock);
-	queue_push(&c->waiting, t);
+	queue_push(&c->waiting_tasks, t);
 	pthread_cond_signal(&c->work_available);
 	pthread_mutex_unlock(&c->lock);
 	c->pending_count++;
@@ -138,11 +138,11 @@ bool thread_pool_remove(struct thread_pool *c, struct task *t)
 {
 	bool found = false;
 	pthread_mutex_lock(&c->lock);
-	for (struct task **at = &c->waiting.first; *at; at = &(*at)->next)
+	for (struct task **at = &c->waiting_tasks.first; *at; at = &(*at)->next)
 		if (*at == t) {
 			*at = t->next;
 			if (!*at)
-				c->waiting.last = at;
+				c->waiting_tasks.last = at;
 			found = true;
 			break;
 		}

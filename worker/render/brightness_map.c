@@ -69,7 +69,7 @@ static void sample_second(struct map_maker *m, struct brightness *map, uint64_t 
 		path_trace_bidirectional(c, &s.base, &m->sample);
 		brightness_add_sample(map, &m->sample);
 	}
-	brightness_compute_neighbourhood_scales(map, samples);
+	brightness_compute_nearby_scales(map, samples);
 }
 
 static int make_second(struct map_maker *m, struct brightness *map, uint64_t seed, uint64_t n, struct error *e)
@@ -98,7 +98,7 @@ static int make_maps(struct map_maker *m, struct brightness *map, const struct p
 	int rc = brightness_init_from_samples(&m->first_map, &m->context, path_trace_bidirectional, p->seed,
 					      RNG_BRIGHTNESS, STEP_FIRST,
 					      first < FIRST_SAMPLES_MIN ? FIRST_SAMPLES_MIN : first, e);
-	m->context.light_every = light_every;
+	m->context.light_subpath_interval = light_every;
 	if (!rc)
 		rc = make_second(m, map, p->seed, n, e);
 	fptrap_catch(previous_jump);
@@ -119,7 +119,7 @@ int render_brightness_map_new(const struct world *w, const struct plan *p, struc
 	if (!rc) {
 		path_context_init_for_samples(&m->context, w, p, m->counters);
 		m->context.refract = halfvec_refract;
-		rc = make_maps(m, map, p, i->light_every, e);
+		rc = make_maps(m, map, p, i->light_subpath_interval, e);
 		brightness_fini(&m->first_map);
 		redistribution_free(m->redistribution);
 	}

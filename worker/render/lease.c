@@ -20,7 +20,7 @@
 #include "worker/render/brightness_map.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
-#include "worker/render/path/longer.h"
+#include "worker/render/path/overlong.h"
 #include "worker/render/path/sobol.h"
 #include "worker/render/film/sums.h"
 #include "worker/render/world/build.h"
@@ -40,7 +40,7 @@ struct lease_job {
 	struct chain *chain;
 	struct redistribution *redistribution; /* NULL: the integrator does not redistribute */
 	struct brightness *owned_map;
-	struct batch *out;
+	struct batch *batch;
 	struct error *e;
 	/* Current position: row and column, or chain and mutation; for a bootstrap, index is the sample. */
 	uint64_t sequence, index;
@@ -48,7 +48,7 @@ struct lease_job {
 
 enum { STOP_INTERVAL = 16 }; /* samples or mutations between checks of the stop flag; one sample may take 10 ms */
 enum {
-	LONGER_INTERVAL = 16
+	OVERLONG_INTERVAL = 16
 }; /* one in this many bootstrap samples also estimates paths that are too long to simulate */
 
 static bool is_stopped(const struct lease_job *j)
@@ -95,10 +95,10 @@ static void evaluate_sample(struct lease_job *j, struct sampler *s, uint64_t pix
 		film_sums_splat(&j->sums, &j->sample.splats[k], 1 / area);
 	double intensity = j->sample.intensity;
 	if (j->redistribution)
-		intensity += redistribution_spread_intensity(j->redistribution);
-	j->out->independent_sum += intensity;
-	j->out->independent_square += intensity * intensity;
-	j->out->counters[COUNT_SAMPLES]++;
+		intensity += redistribution_taken_intensity(j->redistribution);
+	j->batch->independent_sum += intensity;
+	j->batch->independent_square += intensity * intensity;
+	j->batch->counters[COUNT_SAMPLES]++;
 }
 
 static enum lease_outcome sample_pixel(struct lease_job *j, uint64_t column, uint64_t row)
@@ -111,14 +111,14 @@ static enum lease_outcome sample_pixel(struct lease_job *j, uint64_t column, uin
 				  .width = 1 / w->width,
 				  .height = 1 / w->height};
 	for (uint64_t i = 0; i < p->epoch; i++) {
-		if (j->out->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && is_stopped(j))
+		if (j->batch->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && is_stopped(j))
 			return LEASE_STOPPED;
 		uint64_t sample = j->key->epoch * p->epoch + i;
 		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel, j->key->group, sample);
 		s.sobol.base.block = pixel_block;
 		evaluate_sample(j, &s.sobol.base, pixel, sample);
 	}
-	j->out->counters[COUNT_INDEPENDENT] += p->epoch;
+	j->batch->counters[COUNT_INDEPENDENT] += p->epoch;
 	return LEASE_DONE;
 }
 
@@ -138,8 +138,8 @@ static enum lease_outcome run_samples(struct lease_job *j)
 static enum lease_outcome run_bootstrap(struct lease_job *j)
 {
 	struct plan_range r = plan_bootstrap_range(j->plan, j->key->group, j->key->part);
-	struct batch *out = j->out;
-	uint32_t max_edges = j->plan->max_depth < PATH_EDGES_MAX ? j->plan->max_depth : LONGER_EDGES_MAX;
+	struct batch *out = j->batch;
+	uint32_t max_edges = j->plan->max_depth < PATH_EDGES_MAX ? j->plan->max_depth : OVERLONG_EDGES_MAX;
 	for (uint64_t i = r.begin; i < r.end; i++) {
 		if ((i - r.begin) % STOP_INTERVAL == 0 && is_stopped(j))
 			return LEASE_STOPPED;
@@ -157,9 +157,10 @@ static enum lease_outcome run_bootstrap(struct lease_job *j)
 		out->independent_square += intensity * intensity;
 		out->counters[COUNT_SAMPLES]++;
 		out->counters[COUNT_INDEPENDENT]++;
-		if (max_edges > j->context.max_depth && i % LONGER_INTERVAL == 0)
-			out->beyond_sum += LONGER_INTERVAL * longer_paths_sample_energy(&j->context, j->plan->seed, i,
-											max_edges, &j->sample);
+		if (max_edges > j->context.max_depth && i % OVERLONG_INTERVAL == 0)
+			out->overlong_sum +=
+				OVERLONG_INTERVAL *
+				overlong_paths_sample_energy(&j->context, j->plan->seed, i, max_edges, &j->sample);
 	}
 	return LEASE_DONE;
 }
@@ -173,7 +174,7 @@ static int run_chain(struct lease_job *j, const struct lease_input *in, uint32_t
 			    .context = &j->context,
 			    .film = &j->sums,
 			    .mixture = j->plan->mutations,
-			    .strategy_counters = j->out->strategies,
+			    .strategy_counters = j->batch->strategies,
 			    .seed = j->plan->seed,
 			    .id = id,
 			    .step = j->key->epoch * j->plan->epoch};
@@ -185,11 +186,11 @@ static int run_chain(struct lease_job *j, const struct lease_input *in, uint32_t
 				 "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
 	if (!ok) { /* the seed, chosen by weights computed elsewhere, carries no light here */
-		j->out->counters[COUNT_STATES_LOST]++;
+		j->batch->counters[COUNT_STATES_LOST]++;
 		ops->start(c, UINT64_MAX);
 	}
 	struct chain_sums sums = {0, 0};
-	uint64_t accepted = j->out->counters[COUNT_ACCEPTED];
+	uint64_t accepted = j->batch->counters[COUNT_ACCEPTED];
 	for (uint64_t i = 0; i < j->plan->epoch; i++) {
 		if (i % STOP_INTERVAL == 0 && is_stopped(j)) {
 			*result = LEASE_STOPPED;
@@ -201,11 +202,11 @@ static int run_chain(struct lease_job *j, const struct lease_input *in, uint32_t
 	ops->flush(c);
 	if (batch_sequence_count(j->plan) > 1)
 		chain_moments_end_sequence(&j->sums.moments,
-					   j->out->moments + (size_t)k * batch_film_tile_count(j->plan));
-	j->out->counters[COUNT_STUCK] += j->out->counters[COUNT_ACCEPTED] == accepted;
-	j->out->independent_sum += sums.sum;
-	j->out->independent_square += sums.square_sum;
-	return ops->save(c, &j->out->states[k]);
+					   j->batch->moments + (size_t)k * batch_film_tile_count(j->plan));
+	j->batch->counters[COUNT_STUCK] += j->batch->counters[COUNT_ACCEPTED] == accepted;
+	j->batch->independent_sum += sums.sum;
+	j->batch->independent_square += sums.square_sum;
+	return ops->save(c, &j->batch->states[k]);
 }
 
 static int run_chains(struct lease_job *j, const struct lease_input *in, enum lease_outcome *result)
@@ -221,9 +222,9 @@ static int run_chains(struct lease_job *j, const struct lease_input *in, enum le
 			return rc == -ENOMEM ? error_set(j->e, ENOMEM, "out of memory for chain states") : rc;
 	}
 	if (batch_sequence_count(j->plan) == 1)
-		chain_moments_end_sequence(&j->sums.moments, j->out->moments);
+		chain_moments_end_sequence(&j->sums.moments, j->batch->moments);
 	size_t second = (size_t)batch_sequence_count(j->plan) * batch_film_tile_count(j->plan);
-	chain_moments_end_lease(&j->sums.moments, j->out->moments + second, j->out->classes);
+	chain_moments_end_lease(&j->sums.moments, j->batch->moments + second, j->batch->classes);
 	return 0;
 }
 
@@ -237,11 +238,11 @@ static int check_job(const struct world *w, const struct plan *p, const struct i
 		return error_set(
 			e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
 			p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
-	if (i->properties.only_from_camera && world_has_beam(w))
+	if (i->properties.is_camera_only && world_has_beam(w))
 		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->properties.name);
-	if (!i->properties.only_from_camera && world_has_rolling_shutter(w))
+	if (!i->properties.is_camera_only && world_has_rolling_shutter(w))
 		return error_set(e, EINVAL, RENDER_NO_ROLLING_SHUTTER, i->properties.name);
-	if (i->properties.ends_on_emitters && w->effects.medium_light)
+	if (i->properties.must_end_on_emitter && w->effects.medium_light)
 		return error_set(e, EINVAL, RENDER_NO_MEDIUM_LIGHT, i->properties.name);
 	struct mixture unused;
 	char accuracy[PLAN_ACCURACY_MAX];
@@ -263,7 +264,7 @@ static int prepare_redistribution(struct lease_job *j, const struct brightness *
 	if (rc)
 		return rc;
 	return redistribution_new(&j->redistribution, &redistribution_default_rule, &j->context,
-				  map ? map : j->owned_map, j->plan->seed, &j->sums.target, j->out->classes, e);
+				  map ? map : j->owned_map, j->plan->seed, &j->sums.target, j->batch->classes, e);
 }
 
 static int prepare_job(struct lease_job *j, const struct world *w, const struct lease_input *in, struct error *e)
@@ -275,28 +276,28 @@ static int prepare_job(struct lease_job *j, const struct world *w, const struct 
 	j->context.window = film_window_from_plan(p);
 	j->context.min_depth = p->min_depth;
 	j->context.max_depth = depth;
-	j->context.light_every = j->integrator->light_every;
+	j->context.light_subpath_interval = j->integrator->light_subpath_interval;
 	j->context.max_survival = p->kind == PLAN_SAMPLES ? PATH_SURVIVAL_MAX : 0;
 	j->context.skips_classes = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
-	j->context.counters = j->out->counters;
+	j->context.counters = j->batch->counters;
 	j->context.refract = halfvec_refract;
-	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
+	j->batch->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
 	if (j->key->kind == LEASE_BOOTSTRAP) {
 		struct plan_range r = plan_bootstrap_range(p, j->key->group, j->key->part);
-		j->out->weight_count = r.end - r.begin;
-		j->out->weights = mem_alloc(j->out->weight_count, sizeof *j->out->weights);
-		return j->out->weights ? 0
-				       : error_set(e, ENOMEM, "out of memory for %llu weights",
-						   (unsigned long long)(r.end - r.begin));
+		j->batch->weight_count = r.end - r.begin;
+		j->batch->weights = mem_alloc(j->batch->weight_count, sizeof *j->batch->weights);
+		return j->batch->weights ? 0
+					 : error_set(e, ENOMEM, "out of memory for %llu weights",
+						     (unsigned long long)(r.end - r.begin));
 	}
 	if (p->kind == PLAN_CHAINS) {
 		struct plan_range r = plan_chain_range(p, j->key->part);
-		j->out->state_count = (uint32_t)(r.end - r.begin);
-		j->out->states = mem_alloc(j->out->state_count, sizeof *j->out->states);
+		j->batch->state_count = (uint32_t)(r.end - r.begin);
+		j->batch->states = mem_alloc(j->batch->state_count, sizeof *j->batch->states);
 		j->chain = mem_alloc(1, j->integrator->chain->size);
-		j->out->moment_count = batch_moment_count(p, LEASE_RENDER);
-		j->out->moments = mem_alloc(j->out->moment_count, sizeof *j->out->moments);
-		if (!j->out->states || !j->chain || !j->out->moments)
+		j->batch->moment_count = batch_moment_count(p, LEASE_RENDER);
+		j->batch->moments = mem_alloc(j->batch->moment_count, sizeof *j->batch->moments);
+		if (!j->batch->states || !j->chain || !j->batch->moments)
 			return error_set(e, ENOMEM, "out of memory for chain states");
 	}
 	int rc = j->integrator->redistributes ? prepare_redistribution(j, in ? in->map : NULL, e) : 0;
@@ -316,7 +317,7 @@ static int run_job(struct lease_job *j, const struct lease_input *in, enum lease
 		rc = run_chains(j, in, result);
 	if (rc || *result == LEASE_STOPPED)
 		return rc;
-	return film_sums_add_tiles(&j->sums, j->out, j->e);
+	return film_sums_add_tiles(&j->sums, j->batch, j->e);
 }
 
 static int invalid_operation(const struct lease_job *j)
@@ -365,7 +366,7 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	j->key = k;
 	j->integrator = integrator;
 	j->stop = stop;
-	j->out = out;
+	j->batch = out;
 	j->e = e;
 	double start = clock_thread_seconds();
 	crash_set_context(k->kind == LEASE_BOOTSTRAP ? "rendering bootstrap samples" : "rendering", NULL, 0);

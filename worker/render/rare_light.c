@@ -4,9 +4,9 @@
  * it. Contributions count as far as they exceed RENDER_RARE_FACTOR times the brightness of their place.
  *
  * The map of brightness is made from few samples: where they found no light it is too dark. A bright spot in a dark
- * corner would then be called rare however easily it is found, so its photons correct the map (merging_scale). Light
- * that no photon brings to a rough surface visible to the camera is not detected: light through a keyhole, or light
- * from a mirror that is seen in a mirror.
+ * corner would then be called rare however easily it is found, so its photons correct the map
+ * (merging_inverse_brightness). Light that no photon brings to a rough surface visible to the camera is not detected:
+ * light through a keyhole, or light from a mirror that is seen in a mirror.
  */
 #include "worker/render/rare_light.h"
 
@@ -17,7 +17,7 @@ struct rare_light_sums {
 	double light, rare_light; /* light of its photons, and the rare part of it */
 };
 
-static void add_rare_light(void *user, const struct merged *m)
+static void add_rare_light(void *user, const struct merged_path *m)
 {
 	struct rare_light_sums *s = user;
 	s->rare_light +=
@@ -35,10 +35,10 @@ int rare_light_estimate(struct path_context *c, const struct brightness *map, ui
 		struct rare_light_sums s = {0};
 		if (!merging_walk_camera(&m, c, seed, step + 1, i, &point))
 			continue;
-		s.scale = merging_scale(&m, c, &point, map, &s.light);
+		s.scale = merging_inverse_brightness(&m, c, &point, map, &s.light);
 		if (!(s.scale > 0))
 			continue;
-		merging_for_each(&m, c, &point, add_rare_light, &s);
+		merging_visit_paths(&m, c, &point, add_rare_light, &s);
 		out->rare_share += s.rare_light / (double)m.path_count;
 		out->seen_share += s.scale * s.light / (double)m.path_count;
 	}

@@ -24,7 +24,7 @@
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
 #include "worker/render/path/merging.h"
-#include "worker/render/pilot.h"
+#include "worker/render/pilot_plan.h"
 
 #include <string.h>
 
@@ -48,7 +48,7 @@ struct merge_target {
 	unsigned cell;
 };
 
-static void add_to_class(void *user, const struct merged *m)
+static void add_to_class(void *user, const struct merged_path *m)
 {
 	struct merge_target *p = user;
 	double finds = (1 - p->light_fraction) * m->contribution / m->path_contribution +
@@ -82,9 +82,9 @@ static int merge_one_set(struct path_context *c, const struct brightness *map, d
 		out->samples[p.cell]++;
 		if (!is_rough || !m.photon_count)
 			continue;
-		p.scale = merging_scale(&m, c, &point, map, &photons);
+		p.scale = merging_inverse_brightness(&m, c, &point, map, &photons);
 		if (p.scale > 0)
-			merging_for_each(&m, c, &point, add_to_class, &p);
+			merging_visit_paths(&m, c, &point, add_to_class, &p);
 	}
 	for (int k = 0; k < CLASSES && !rc; k++)
 		out->finds[k] /= (double)m.path_count;
@@ -150,9 +150,9 @@ static int run_pilot(struct pilot *p, const struct world *w, const struct plan *
 	p->context.refract = halfvec_refract;
 	int rc = brightness_init_from_samples(&p->map, &p->context, path_trace_candidates, r->seed, RNG_CHOICE,
 					      PILOT_UNSEEN_MAP, SAMPLES, e);
-	double light_fraction = integrator->properties.only_from_camera ? 0
-				: integrator->light_every > 1		? 1.0 / integrator->light_every
-									: 1;
+	double light_fraction = integrator->properties.is_camera_only	 ? 0
+				: integrator->light_subpath_interval > 1 ? 1.0 / integrator->light_subpath_interval
+									 : 1;
 	if (!rc &&
 	    unseen_light_estimate(&p->context, &p->map, light_fraction, r->seed, PILOT_UNSEEN, SAMPLES, &r->unseen))
 		rc = error_set(e, ENOMEM, "no memory for a pilot");

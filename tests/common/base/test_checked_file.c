@@ -63,7 +63,7 @@ static void numbers_have_fixed_bytes(void **state)
 	write_file();
 	golden_compare_file(path, file_bytes, sizeof file_bytes);
 	assert_int_equal(checked_file_open(&f, path, &e), 0);
-	assert_int_equal(f.remaining, sizeof file_bytes - 4);
+	assert_int_equal(f.remaining_bytes, sizeof file_bytes - 4);
 	assert_int_equal(checked_file_read(&f, text, sizeof text, &e), 0);
 	assert_int_equal(checked_file_read_numbers(&f, words, sizeof *words, 2, &e), 0);
 	assert_int_equal(checked_file_read_numbers(&f, &large, sizeof large, 1, &e), 0);
@@ -128,7 +128,7 @@ static void large_arrays_are_read_back(void **state)
 		memset(back, 0, COUNT * sizeof *back);
 		assert_int_equal(checked_file_read_numbers(&f, back, sizeof *back, COUNT, &e), 0);
 		assert_memory_equal(back, numbers, COUNT * sizeof *back);
-		assert_int_equal(f.remaining, 12);
+		assert_int_equal(f.remaining_bytes, 12);
 		checked_file_close(&f);
 	}
 	free(numbers);
@@ -141,13 +141,13 @@ static void reverse_numbers_swaps_byte_order(void **state)
 	(void)state;
 	const unsigned char source[] = {1, 2, 3, 4, 5, 6, 7, 8};
 	unsigned char target[8];
-	reverse_numbers(target, source, 8, 1);
+	reverse_bytes_of_numbers(target, source, 8, 1);
 	assert_memory_equal(target, ((unsigned char[]){8, 7, 6, 5, 4, 3, 2, 1}), 8);
-	reverse_numbers(target, source, 4, 2);
+	reverse_bytes_of_numbers(target, source, 4, 2);
 	assert_memory_equal(target, ((unsigned char[]){4, 3, 2, 1, 8, 7, 6, 5}), 8);
-	reverse_numbers(target, target, 2, 4);
+	reverse_bytes_of_numbers(target, target, 2, 4);
 	assert_memory_equal(target, ((unsigned char[]){3, 4, 1, 2, 7, 8, 5, 6}), 8);
-	reverse_numbers(target, source, 1, 8);
+	reverse_bytes_of_numbers(target, source, 1, 8);
 	assert_memory_equal(target, source, 8);
 }
 

@@ -54,14 +54,14 @@ static void append_remark(char *text, size_t size)
 }
 
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .required = true},
+	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .is_required = true},
 	{"tls", 0, "DIR", "Certificates", OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TEST_TLS"},
 	{"name", 'n', "NAME", "Displayed", OPTION_NAME(struct arguments, name, 9)},
 	{"wait", 'w', NULL, "Show progress", OPTION_FLAG(struct arguments, wait)},
 	{"quiet", 'q', NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
 	 .default_value = "0.5"},
-	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .max_excluded = true},
+	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .excludes_max = true},
 	{"share", 0, "P", "Share of the epochs", OPTION_RATIO(struct arguments, share, 0, 1)},
 	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .default_value = "3"},
 	{"blobs", 0, "GB", "Of the spool", OPTION_SIZE(struct arguments, bytes, 0.01, 1e6, 1e9),
@@ -76,7 +76,7 @@ static const struct option_row rows[] = {
 static const struct option_row shared_rows[] = {
 	{"spp", 0, "+N", "Samples", OPTION_COUNT(struct shared_arguments, spp, 1, 1e9)},
 	{"time", 0, "SECONDS", "Wall clock", OPTION_SECONDS(struct shared_arguments, seconds, 0, 1e9),
-	 .min_excluded = true},
+	 .excludes_min = true},
 	{0},
 };
 

@@ -12,10 +12,10 @@ static const char *nearest_name(const char *wanted)
 {
 	static const char *const names[] = {"roughdielectric", "dielectric", "diffuse", "conductor", "roughconductor"};
 	static struct spelling s;
-	s = (struct spelling){.wanted = wanted};
+	s = (struct spelling){.wanted_name = wanted};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		spelling_offer(&s, names[i]);
-	return s.best ? s.best : "";
+	return s.best_match ? s.best_match : "";
 }
 
 static void test_misspelled_names_are_corrected(void **state)
@@ -34,11 +34,11 @@ static void test_offered_names_are_copied(void **state)
 {
 	(void)state;
 	char name[] = "room.xml";
-	struct spelling s = {.wanted = "rom.xml"};
+	struct spelling s = {.wanted_name = "rom.xml"};
 	spelling_offer(&s, name);
 	memset(name, 'x', sizeof name - 1);
 	spelling_offer(&s, name);
-	assert_string_equal(s.best, "room.xml");
+	assert_string_equal(s.best_match, "room.xml");
 }
 
 static void test_full_list_ends_in_an_ellipsis(void **state)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Which file a program's output path leads to, and what is there afterwards: files are replaced, links and devices
  * stay. */
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/exr/image_file.h"
 
 #include <stdarg.h>

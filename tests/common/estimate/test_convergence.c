@@ -52,7 +52,7 @@ static void fixture_init(struct fixture *f)
 				       .tiles_down = DOWN,
 				       .r_hat = f->r_hat,
 				       .tile_error = f->tile_error,
-				       .tile_share = f->tile_share};
+				       .tile_energy_share = f->tile_share};
 	for (int i = 0; i < TILES; i++) {
 		f->r_hat[i] = 1 + 0.002F * (float)i;
 		f->tile_error[i] = 0.02F;
@@ -109,19 +109,19 @@ static void well_mixed_chains_agree(void **state)
 	assert_int_equal(judge_fixture(&f, &a), CHAINS_AGREE);
 	assert_int_equal(a.tiles, TILES);
 	assert_int_equal(a.flagged_tiles, 0);
-	expect_close(a.r_hat_median, 1.02, 1e-6);
+	expect_close(a.median_r_hat, 1.02, 1e-6);
 	expect_close(a.max_r_hat, 1.038, 1e-6);
 	assert_int_equal(a.worst_x, 7 + 3 * TILE_SIZE);
 	assert_int_equal(a.worst_y, 11 + 4 * TILE_SIZE);
 	/* Nothing is known of tiles, or there is no light in them. */
-	f.img.r_hat = f.img.tile_error = f.img.tile_share = NULL;
+	f.img.r_hat = f.img.tile_error = f.img.tile_energy_share = NULL;
 	assert_int_equal(judge_fixture(&f, &a), CHAINS_AGREE);
-	assert_true(isnan(a.r_hat_median) && isnan(a.max_r_hat));
+	assert_true(isnan(a.median_r_hat) && isnan(a.max_r_hat));
 	fixture_init(&f);
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = NAN;
 	assert_int_equal(judge_fixture(&f, &a), CHAINS_AGREE);
-	assert_true(isnan(a.r_hat_median) && isnan(a.max_r_hat));
+	assert_true(isnan(a.median_r_hat) && isnan(a.max_r_hat));
 }
 
 static void median_r_hat_skips_tiles_without_light(void **state)
@@ -134,7 +134,7 @@ static void median_r_hat_skips_tiles_without_light(void **state)
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = i < 7 ? values[i] : NAN;
 	judge_fixture(&f, &a);
-	expect_close(a.r_hat_median, 2, 0);
+	expect_close(a.median_r_hat, 2, 0);
 	expect_close(a.max_r_hat, 9, 0);
 }
 

@@ -238,7 +238,7 @@ static void doubtful_render_stops_well_below_the_target(void **state)
 			p.kind = PLAN_CHAINS; /* the doubt of such a render ends */
 			assert_true(forecast_stopping_error(&h, &p, targets[i]) == 0);
 			p.kind = PLAN_SAMPLES;
-			h.looks[h.count - 1].doubtful = 0;
+			h.looks[h.count - 1].is_doubtful = 0;
 			h.looks[h.count - 1].rel_mse_upper = 1.05 * h.looks[h.count - 1].rel_mse;
 			assert_true(forecast_stopping_error(&h, &p, targets[i]) == 0);
 		}
@@ -279,7 +279,7 @@ static void doubt_that_ended_late_raises_the_forecast(void **state)
 	for (double work = 1e4; work < 1e8; work *= 1.3) {
 		struct forecast_look l = {work, work, work, 1000 / work, 1050 / work, 3000, 0};
 		forecast_add_look(&clear, &l);
-		l.doubtful = work < 1e6;
+		l.is_doubtful = work < 1e6;
 		forecast_add_look(&h, &l);
 	}
 	struct forecast_cost c, sure;
@@ -330,7 +330,7 @@ static void invalid_estimates_are_ignored(void **state)
 	assert_true(h.looks[FORECAST_LOOKS_MAX - 1].work == 3 * FORECAST_LOOKS_MAX);
 	assert_null(forecast_stopping_look(&h, 1e-9));
 	assert_ptr_equal(forecast_stopping_look(&h, 10), &h.looks[0]);
-	h.looks[0].doubtful = 1; /* no render would have ended at it */
+	h.looks[0].is_doubtful = 1; /* no render would have ended at it */
 	assert_ptr_equal(forecast_stopping_look(&h, 10), &h.looks[1]);
 	/* A target out of reach is reported as such, without computing. */
 	assert_true(forecast_cost_of_target(&h, &p, 1e-200, FORECAST_SAME, &c) && isinf(c.work.low));
@@ -346,12 +346,13 @@ static void history_survives_json(void **state)
 	json_decref(list);
 	assert_int_equal(back.count, h.count);
 	for (uint32_t i = 0; i < h.count; i++)
-		assert_true(
-			back.looks[i].rel_mse == h.looks[i].rel_mse && back.looks[i].seconds == h.looks[i].seconds &&
-			back.looks[i].cpu_seconds == h.looks[i].cpu_seconds &&
-			back.looks[i].degrees == h.looks[i].degrees && back.looks[i].doubtful == h.looks[i].doubtful &&
-			back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper &&
-			back.looks[i].work == h.looks[i].work);
+		assert_true(back.looks[i].rel_mse == h.looks[i].rel_mse &&
+			    back.looks[i].seconds == h.looks[i].seconds &&
+			    back.looks[i].cpu_seconds == h.looks[i].cpu_seconds &&
+			    back.looks[i].degrees == h.looks[i].degrees &&
+			    back.looks[i].is_doubtful == h.looks[i].is_doubtful &&
+			    back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper &&
+			    back.looks[i].work == h.looks[i].work);
 	forecast_looks_from_json(NULL, &back);
 	assert_int_equal(back.count, 0);
 }

@@ -149,11 +149,12 @@ static void check_interval(const char *name, group_image_value *value, truth_of 
 		group_image_make(&p, value, &d, &img);
 		double x = realised_error(&img, truth);
 		assert_true((img.rel_mse_doubt == ERROR_DOUBT_NONE) ==
-			    (isfinite(img.rel_mse_95[0]) && isfinite(img.rel_mse_95[1])));
+			    (isfinite(img.rel_mse_interval_95[0]) && isfinite(img.rel_mse_interval_95[1])));
 		if (img.rel_mse_doubt == ERROR_DOUBT_NONE) {
 			known_count++;
-			held_count += img.rel_mse_95[0] <= x && x <= img.rel_mse_95[1];
-			faulty_held_count += img.rel_mse_95[0] / fault <= x && x <= img.rel_mse_95[1] / fault;
+			held_count += img.rel_mse_interval_95[0] <= x && x <= img.rel_mse_interval_95[1];
+			faulty_held_count +=
+				img.rel_mse_interval_95[0] / fault <= x && x <= img.rel_mse_interval_95[1] / fault;
 			realised += x;
 			stated += img.rel_mse;
 		}
@@ -260,7 +261,7 @@ static void dominant_firefly_is_doubtful(void **state)
 	char text[STATED_ERROR_TEXT_MAX];
 	group_image_make(&p, value_with_firefly, NULL, &img);
 	assert_int_equal(img.rel_mse_doubt, ERROR_DOUBT_ONE_GROUP);
-	assert_true(img.doubtful_share > 0.9 && isnan(img.rel_mse_95[0]) && isnan(img.rel_mse_95[1]));
+	assert_true(img.doubtful_share > 0.9 && isnan(img.rel_mse_interval_95[0]) && isnan(img.rel_mse_interval_95[1]));
 	p.target_error = 1e9;
 	assert_int_equal(merge_find_end(&p, 1, 0, &img), MERGE_CONTINUES);
 	stated_error_print(&img, text, sizeof text);
@@ -300,7 +301,7 @@ static void unknown_brightness_is_doubtful(void **state)
 		struct canvas_image img;
 		group_image_make(&p, few_hits, &d, &img);
 		assert_int_equal(img.rel_mse_doubt, ERROR_DOUBT_DARK);
-		assert_true(img.doubtful_share > 0.8 && isnan(img.rel_mse_95[1]));
+		assert_true(img.doubtful_share > 0.8 && isnan(img.rel_mse_interval_95[1]));
 		canvas_image_fini(&img);
 	}
 }
@@ -374,7 +375,7 @@ static void unseen_light_is_doubtful(void **state)
 		struct dice d = dice_for_test("unseen light");
 		const double missing[] = {0, 0.4, 0.6};
 		group_image_make(&p, finite_variance_light, &d, &img);
-		double own = img.rel_mse, room = (img.rel_mse_95[1] - own) / own;
+		double own = img.rel_mse, room = (img.rel_mse_interval_95[1] - own) / own;
 		canvas_image_fini(&img);
 		for (int k = 0; k < PLAN_UNSEEN_COUNT; k++)
 			p.unseen.mean_squares[k] = missing[i] * room * own;
@@ -382,7 +383,7 @@ static void unseen_light_is_doubtful(void **state)
 		group_image_make(&p, finite_variance_light, &d, &img);
 		assert_true(img.rel_mse == own && fabs(img.rel_mse_unseen - missing[i] * room * own) <= 1e-12 * own);
 		assert_int_equal(img.rel_mse_doubt, i == 2 ? ERROR_DOUBT_UNSEEN : ERROR_DOUBT_NONE);
-		assert_true((i == 2) == (bool)isnan(img.rel_mse_95[1]));
+		assert_true((i == 2) == (bool)isnan(img.rel_mse_interval_95[1]));
 		canvas_image_fini(&img);
 	}
 }
@@ -433,7 +434,7 @@ static void sentence_states_the_interval_or_the_doubt(void **state)
 				   .rel_mse = 0.01,
 				   .rel_mse_as_measured = 0.01,
 				   .rel_mse_upper = 0.0121,
-				   .rel_mse_95 = {0.0081, 0.0144}};
+				   .rel_mse_interval_95 = {0.0081, 0.0144}};
 	char text[STATED_ERROR_TEXT_MAX];
 	stated_error_print(&img, text, sizeof text);
 	assert_string_equal(text, "relative error 10.00 % (95 %: 9.00 to 12.00 %)");

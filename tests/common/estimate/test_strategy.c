@@ -218,9 +218,9 @@ static void tables_are_readable(void **state)
 		"the image is black: no sample found light; 2,000 contributions were NaN, infinite or negative, and "
 		"were left out; 1 of 8 chain epochs accepted nothing (4 chains); longest run: "
 		"911 rejections");
-	strategy_append_beyond(0.0009, text, sizeof text); /* too little to mention */
+	strategy_append_overlong(0.0009, text, sizeof text); /* too little to mention */
 	assert_null(strstr(text, "missing"));
-	strategy_append_beyond(0.25, text, sizeof text);
+	strategy_append_overlong(0.25, text, sizeof text);
 	assert_non_null(strstr(
 		text,
 		"911 rejections; 25 % of the light is missing: it comes by paths of more edges than are simulated "
@@ -238,7 +238,7 @@ static void tables_are_readable(void **state)
 	p.chains = UINT32_MAX;
 	p.epoch = 1;
 	strategy_print_note(&p, &n, true, text, sizeof text);
-	strategy_append_beyond(0.00123456, text, sizeof text);
+	strategy_append_overlong(0.00123456, text, sizeof text);
 	assert_true(strlen(text) < STRATEGY_NOTE_MAX);
 	char lines[5120]; /* the size of the header's buffer for them */
 	strategy_print_lines("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, lines, sizeof lines);

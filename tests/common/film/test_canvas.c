@@ -204,7 +204,7 @@ static void chains_are_scaled_by_b(void **unused)
 	assert_int_equal(canvas_new(&c, &p, canvas_grid_exponent(&p, 1, 1), NULL, NULL), 0);
 	for (uint32_t g = 0; g < 2; g++) {
 		struct batch boot = {
-			.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 16, .beyond_sum = 8};
+			.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 16, .overlong_sum = 8};
 		boot.counters[COUNT_INDEPENDENT] = 8;
 		boot.counters[COUNT_SAMPLES] = 8;
 		assert_int_equal(canvas_add(c, &boot, NULL), 0);
@@ -226,7 +226,7 @@ static void chains_are_scaled_by_b(void **unused)
 	assert_true(img.b == 2.5 && fabs(img.b_error - 1.5) < 1e-12);
 	assert_int_equal(img.samples, 16);
 	assert_int_equal(img.counts.counters[COUNT_LONGEST_STUCK], 7);
-	assert_true(fabs(img.beyond_share - 16.0 / 56) < 1e-12);
+	assert_true(fabs(img.overlong_share - 16.0 / 56) < 1e-12);
 	double y = 0.2126729 * (double)img.rgb[0] + 0.7151522 * (double)img.rgb[1] + 0.0721750 * (double)img.rgb[2];
 	assert_true(fabs(y - 2.5 * 2 / 16) < 1e-6);
 	/* Group images are 1/8 and 4/8 in each of X, Y, Z: error 3/16 of the white of XYZ (1,1,1). */

@@ -82,7 +82,7 @@ static void add_batch(struct canvas *c, const struct plan *p, enum lease_kind ki
 	struct batch b = {.key = {1, kind, 0, part, epoch},
 			  .strategy_count = 1,
 			  .independent_sum = 1.5,
-			  .beyond_sum = 0.25,
+			  .overlong_sum = 0.25,
 			  .tile_count = kind == LEASE_RENDER,
 			  .tiles = &tile,
 			  .moment_count = batch_moment_count(p, kind),
@@ -150,7 +150,7 @@ static int load_golden_bytes(struct canvas **c, const struct plan *p, size_t siz
 	*c = make_canvas(p);
 	golden_write_and_open(&f, path, golden_bytes, size);
 	int rc = canvas_load(*c, &f, &e);
-	assert_true(rc || f.remaining == 0);
+	assert_true(rc || f.remaining_bytes == 0);
 	checked_file_close(&f);
 	return rc;
 }

@@ -52,7 +52,7 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 	b.counters[COUNT_INDEPENDENT] = p->epoch + canvas_random_next() % 4;
 	b.counters[COUNT_LONGEST_STUCK] = canvas_random_next() % 100;
 	b.independent_sum = canvas_random_uniform() * (double)p->epoch;
-	b.beyond_sum = canvas_random_uniform();
+	b.overlong_sum = canvas_random_uniform();
 	for (int k = 0; k < PATH_CLASSES; k++)
 		b.classes[k] = canvas_random_uniform();
 	b.moment_count = batch_moment_count(p, kind);
@@ -112,7 +112,7 @@ static struct canvas *save_and_load(struct canvas *c, const struct plan *p, cons
 	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	if (canvas_load(c, &s, &e))
 		fail_msg("%s", e.text);
-	assert_int_equal(s.remaining, 0);
+	assert_int_equal(s.remaining_bytes, 0);
 	checked_file_close(&s);
 	return c;
 }

@@ -119,7 +119,8 @@ static void r_hat_of_simulated_chains_is_right(void **state)
 		double draws = N / (double)dwell_times[k], sum = 0;
 		for (int t = 0; t < TILES; t++) {
 			if (tile_probability[t] == 0) {
-				assert_true(isnan(img.r_hat[t]) && isnan(img.tile_error[t]) && img.tile_share[t] == 0);
+				assert_true(isnan(img.r_hat[t]) && isnan(img.tile_error[t]) &&
+					    img.tile_energy_share[t] == 0);
 				continue;
 			}
 			double r2 = (double)img.r_hat[t] * (double)img.r_hat[t], v = 1 / draws;
@@ -131,8 +132,9 @@ static void r_hat_of_simulated_chains_is_right(void **state)
 					 (N - 1.0) / N + v / w);
 			double error = sqrt((1 - tile_probability[t]) / tile_probability[t] / draws / CHAINS);
 			assert_true(fabs((double)img.tile_error[t] / error - 1) < 0.2);
-			assert_true(fabs((double)img.tile_share[t] / (tile_probability[t] / 0.9) - 1) < 6 * error);
-			sum += (double)img.tile_share[t];
+			assert_true(fabs((double)img.tile_energy_share[t] / (tile_probability[t] / 0.9) - 1) <
+				    6 * error);
+			sum += (double)img.tile_energy_share[t];
 		}
 		assert_true(fabs(sum - 1) < 1e-6);
 		canvas_image_fini(&img);
@@ -257,7 +259,8 @@ static void order_of_batches_changes_no_bit(void **state)
 		if (order) {
 			assert_memory_equal(img.r_hat, first.r_hat, TILES * sizeof *img.r_hat);
 			assert_memory_equal(img.tile_error, first.tile_error, TILES * sizeof *img.tile_error);
-			assert_memory_equal(img.tile_share, first.tile_share, TILES * sizeof *img.tile_share);
+			assert_memory_equal(img.tile_energy_share, first.tile_energy_share,
+					    TILES * sizeof *img.tile_energy_share);
 			assert_memory_equal(img.classes, first.classes, sizeof img.classes);
 			canvas_image_fini(&img);
 		} else {
@@ -332,7 +335,7 @@ static void r_hat_is_of_complete_rounds_of_chains_only(void **state)
 	open.moments[1] = open.moments[4 * TILES + 1] = 100;
 	add_batch(c, &open);
 	assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
-	assert_true(isnan(img.r_hat[1]) && img.tile_share[0] == 1);
+	assert_true(isnan(img.r_hat[1]) && img.tile_energy_share[0] == 1);
 	canvas_image_fini(&img);
 	canvas_free(c);
 	p.kind = PLAN_SAMPLES;

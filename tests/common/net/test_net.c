@@ -222,7 +222,7 @@ static void peer_that_does_not_read_is_cut_off_at_the_shared_limit(void **state)
 	while (!listener_end.close_count || !caller_end.close_count)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_true(listener_end.gave_way && pool.used_bytes == 0 && pool.closing_bytes == 0 &&
-		    LIST_EMPTY(&pool.waiting));
+		    LIST_EMPTY(&pool.waiting_shares));
 	assert_string_equal(listener_end.why,
 			    "too much waits to be sent to all peers, and this one does not read its part");
 	close_ends();

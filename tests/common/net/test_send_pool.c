@@ -52,7 +52,7 @@ static int tear_down(void **state)
 		send_pool_close_share(&peers[i].share);
 		send_pool_subtract(&peers[i].share, peers[i].share.bytes, 0);
 	}
-	return pool.used_bytes || pool.closing_bytes || !LIST_EMPTY(&pool.waiting);
+	return pool.used_bytes || pool.closing_bytes || !LIST_EMPTY(&pool.waiting_shares);
 }
 
 static bool queue_bytes(int i, uint64_t bytes, uint64_t now)

@@ -89,7 +89,7 @@ static int tear_down(void **state)
 {
 	(void)state;
 	fixture_fini(&fixture);
-	assert_true(pool.used_bytes == 0 && pool.closing_bytes == 0 && LIST_EMPTY(&pool.waiting));
+	assert_true(pool.used_bytes == 0 && pool.closing_bytes == 0 && LIST_EMPTY(&pool.waiting_shares));
 	return uv_loop_close(&loop);
 }
 

@@ -254,19 +254,19 @@ static void rays_are_measured_only_where_the_plan_depends_on_them(void **state)
 	(void)state;
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
 		struct plan_request r = make_request((enum plan_kind)kind, "");
-		assert_false(plan_wants_rays(&r));
+		assert_false(plan_needs_ray_count(&r));
 		r.seconds = 1;
-		assert_true(plan_wants_rays(&r));
+		assert_true(plan_needs_ray_count(&r));
 		r.seconds = 0;
 		r.target_error = 0.1;
-		assert_true(plan_wants_rays(&r));
+		assert_true(plan_needs_ray_count(&r));
 		r.bootstrap = r.epoch = 64;
-		assert_int_equal(plan_wants_rays(&r), kind == PLAN_CHAINS);
+		assert_int_equal(plan_needs_ray_count(&r), kind == PLAN_CHAINS);
 		r.chains = 64;
-		assert_false(plan_wants_rays(&r));
+		assert_false(plan_needs_ray_count(&r));
 		r.target_error = 0;
 		r.spp = r.bootstrap = 0;
-		assert_true(plan_wants_rays(&r)); /* those of an estimate */
+		assert_true(plan_needs_ray_count(&r)); /* those of an estimate */
 	}
 }
 
@@ -330,7 +330,7 @@ static void leases_take_twenty_seconds(void **state)
 			r.height = 720;
 			r.spp = 1 << 24;
 			struct plan p = make_plan(&r);
-			assert_true(plan_wants_speed(&r, &p));
+			assert_true(plan_needs_speed(&r, &p));
 			r.speed = speed;
 			p = make_plan(&r);
 			double seconds = (double)lease_work(&p) / speed;
@@ -340,7 +340,7 @@ static void leases_take_twenty_seconds(void **state)
 			assert_true(seconds > 20 / 1.4143 - 1e-9);
 			assert_true((p.epoch & (p.epoch - 1)) == 0);
 			assert_true(epoch_text_has(&r, "20 s for a thread"));
-			assert_false(plan_wants_speed(&r, &p));
+			assert_false(plan_needs_speed(&r, &p));
 		}
 	struct plan_request r = make_request(PLAN_CHAINS, "");
 	r.width = r.height = 1024;
@@ -363,7 +363,7 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	r.width = 320;
 	r.height = 180;
 	struct plan p = make_plan(&r), q;
-	assert_false(plan_wants_speed(&r, &p));
+	assert_false(plan_needs_speed(&r, &p));
 	assert_true(epoch_text_has(&r, "for 8 rounds"));
 	struct plan_request one = make_request(PLAN_SAMPLES, "");
 	assert_int_equal(make_plan(&one).rounds, 1);
@@ -382,7 +382,7 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	r.epoch = 77;
 	p = make_plan(&r);
 	assert_int_equal(p.epoch, 77);
-	assert_false(plan_wants_speed(&r, &p));
+	assert_false(plan_needs_speed(&r, &p));
 	assert_true(epoch_text_has(&r, ""));
 }
 
@@ -488,9 +488,9 @@ static void unseen_light_is_interpolated_and_checked(void **state)
 	for (int i = 0; i < PLAN_UNSEEN_COUNT; i++)
 		r.unseen.mean_squares[i] = PLAN_UNSEEN_COUNT - 1 - i;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
-	assert_true(plan_unseen_after(&p, 1) == 11 && plan_unseen_after(&p, 0.25) == 11);
-	assert_true(plan_unseen_after(&p, 64) == 8 && plan_unseen_after(&p, 128) == 7.5);
-	assert_true(plan_unseen_after(&p, 0x1p22) == 0 && plan_unseen_after(&p, 0x1p60) == 0);
+	assert_true(plan_unseen_mean_square(&p, 1) == 11 && plan_unseen_mean_square(&p, 0.25) == 11);
+	assert_true(plan_unseen_mean_square(&p, 64) == 8 && plan_unseen_mean_square(&p, 128) == 7.5);
+	assert_true(plan_unseen_mean_square(&p, 0x1p22) == 0 && plan_unseen_mean_square(&p, 0x1p60) == 0);
 	const double bad[] = {-1e-9, NAN, INFINITY};
 	for (int i = 0; i < 3; i++) {
 		r.unseen.mean_squares[5] = bad[i];

@@ -57,7 +57,7 @@ static struct batch chain_batch(const struct plan *p)
 	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2},
 			  .independent_sum = 1.0 / 3,
 			  .independent_square = 0.05,
-			  .beyond_sum = 0,
+			  .overlong_sum = 0,
 			  .cpu_seconds = 0.25};
 	uint32_t chains = p->chains / (p->groups * p->parts);
 	b.counters[COUNT_SAMPLES] = chains * p->epoch;

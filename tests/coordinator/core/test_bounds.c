@@ -262,7 +262,7 @@ static void progress_and_rate_follow_merged_mutations(void **state)
 	expect_near(s.rate, 200);
 	expect_near(s.eta, 16);
 	assert_int_equal(s.mutations, 800);
-	assert_true(s.started == 10 && s.submitted == 0);
+	assert_true(s.started_at == 10 && s.submitted_at == 0);
 	transcript_play(f, (const char *const[]){"[15] hold order j1 held by ann -> -", NULL});
 	s = read_job_status(f, 15);
 	assert_true(isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
@@ -374,7 +374,7 @@ static void doubtful_estimate_does_not_end_the_job(void **state)
 	farm_step(f, &ev, &u);
 	struct job_status s = read_job_status(f, 13.5);
 	assert_int_equal(s.state, JOB_RUNNING);
-	assert_true(isnan(s.rel_error) && s.looks->count == 1 && s.looks->looks[0].doubtful);
+	assert_true(isnan(s.rel_error) && s.looks->count == 1 && s.looks->looks[0].is_doubtful);
 	farm_free(f);
 }
 

@@ -195,7 +195,7 @@ static void racks_losing_power_fail_no_job(void **state)
 		struct update u;
 		for (int i = 1; i <= 4; i++)
 			farm_step(f,
-				  &(struct event){.kind = EVENT_REQUEST,
+				  &(struct event){.kind = EVENT_LEASE_REQUEST,
 						  .time = rack,
 						  .peer = (uint64_t)(peer + i),
 						  .wanted_leases = 1},
@@ -209,7 +209,7 @@ static void racks_losing_power_fail_no_job(void **state)
 					struct event batch = {
 						.kind = EVENT_BATCH, .time = rack, .peer = (uint64_t)peer + i};
 					batch.lease.key = l.key;
-					batch.lease.valid = true;
+					batch.lease.is_valid = true;
 					farm_step(f, &batch, &u);
 				}
 		for (int i = 1; i <= 4; i++)

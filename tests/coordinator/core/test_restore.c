@@ -55,7 +55,7 @@ static void job_is_restored_within_a_round(void **state)
 	assert_true(farm_job_status(f, 7, 3, &s));
 	assert_int_equal(s.leases_merged, 4 + 3 + 5 + 3);
 	assert_int_equal(s.bootstrap_merged, 3);
-	assert_true(s.rounds == 5 && s.started == -10);
+	assert_true(s.rounds == 5 && s.started_at == -10);
 	assert_true(farm_job_elapsed(f, 7, 3) == 13);
 	farm_free(f);
 }
@@ -240,8 +240,8 @@ static void reports_of_workers_are_restored_with_a_job(void **state)
 				       .next_epochs = next,
 				       .makers = by,
 				       .elapsed = 1,
-				       .opened = 0,
-				       .completed = 1,
+				       .first_round_at = 0,
+				       .last_round_end = 1,
 				       .looks = &looks}};
 	farm_step(f, &ev, &u);
 	assert_true(farm_peer_status(f, 1, &p) && farm_worker_status(f, p.worker_id, &w));

@@ -343,11 +343,11 @@ static void end_without_a_result_is_written_later(void **state)
 	struct server *s = open_server();
 	staged_disk->fail_ledger_writes = true;
 	jobs_step(&s->jobs, &(struct event){.kind = EVENT_CANCEL, .job = job});
-	assert_true(s->jobs.endings && !s->jobs.live_jobs);
+	assert_true(s->jobs.unrecorded_ends && !s->jobs.live_jobs);
 	assert_int_equal(ledger_read_row(s->jobs.ledger, job, &j, &e), 1);
 	assert_string_equal(j.state, "live");
 	staged_disk->fail_ledger_writes = false;
-	while (s->jobs.endings)
+	while (s->jobs.unrecorded_ends)
 		uv_run(&s->loop, UV_RUN_ONCE);
 	assert_int_equal(ledger_read_row(s->jobs.ledger, job, &j, &e), 1);
 	assert_string_equal(j.state, "cancelled");
@@ -371,7 +371,7 @@ static void check_late_end_with_films(bool extended)
 	assert_true(films > 0);
 	staged_disk->fail_ledger_writes = true;
 	durable_restore_end(&s->jobs, &r);
-	assert_non_null(s->jobs.endings);
+	assert_non_null(s->jobs.unrecorded_ends);
 	staged_disk->fail_ledger_writes = false;
 	assert_int_equal(ledger_read_row(l, job, &j, &e), 1);
 	size_t size = j.submission_size;
@@ -388,7 +388,7 @@ static void check_late_end_with_films(bool extended)
 		free(submission);
 		free(plan);
 	}
-	while (s->jobs.endings)
+	while (s->jobs.unrecorded_ends)
 		uv_run(&s->loop, UV_RUN_ONCE);
 	assert_int_equal(spool_film_bytes(s->jobs.spool, job, 1, &later, &e), 0);
 	assert_int_equal(later, films);
@@ -432,16 +432,16 @@ static void job_is_held_until_a_checkpoint_fits(void **state)
 	assert_true(job && job->canvas && journal_bytes(job->journal) > JOURNAL_HEAD_SIZE);
 	uint64_t original_bytes = job->checkpoint_bytes;
 	job->checkpoint_bytes = 1;
-	job->kept_record_bytes = 0;
+	job->merged_record_bytes = 0;
 	job->blocked_result_bytes = 100;
 	durable_hold_job(&s->jobs, job, "its results cannot be stored", "the disk is full");
 	disk_set_calls(&full);
 	int rc = durable_retry_job(&s->jobs, job);
 	disk_set_calls(before);
 	assert_int_equal(rc, -ENOSPC);
-	assert_true(job->held_for_storage);
+	assert_true(job->is_held_for_storage);
 	assert_int_equal(durable_retry_job(&s->jobs, job), 0);
-	assert_false(job->held_for_storage);
+	assert_false(job->is_held_for_storage);
 	job->checkpoint_bytes = original_bytes;
 	server_close(s);
 }

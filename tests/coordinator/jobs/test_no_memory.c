@@ -54,8 +54,8 @@ static void image_without_memory_is_made_later(void **state)
 		mem_fail_after(0);
 		publish_start(&s->jobs, job, what, live_job_complete_rounds(job));
 		mem_fail_after(-1);
-		assert_true(job->busy && STAILQ_EMPTY(&s->jobs.deferred));
-		while (job->busy || (what == PUBLISH_RESULT && !job->record.has_result))
+		assert_true(job->is_busy && STAILQ_EMPTY(&s->jobs.deferred_events));
+		while (job->is_busy || (what == PUBLISH_RESULT && !job->record.has_result))
 			uv_run(&s->loop, UV_RUN_ONCE);
 		struct job_status status;
 		assert_true(farm_job_status(s->jobs.farm, id, jobs_now(&s->jobs), &status) &&

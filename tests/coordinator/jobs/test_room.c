@@ -3,7 +3,7 @@
  * Which jobs may go on when the disk or memory has not enough room for all: at least one always does, and the jobs that
  * go on have room together.
  */
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 
 #include "common/base/disk.h"
 #include "tests/support/temporary_folder.h"
@@ -45,19 +45,19 @@ static void jobs_that_fit_together_go_on(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct room_claim claims[JOBS];
+		struct storage_claim claims[JOBS];
 		char going[JOBS + 1] = "";
 		for (size_t k = 0; k < JOBS; k++) /* in any order */
 			claims[(k + i) % JOBS] =
-				(struct room_claim){k + 1, cases[i].bytes[k], cases[i].priority[k], k % 2};
-		room_grant_claims(claims, JOBS, cases[i].available);
+				(struct storage_claim){k + 1, cases[i].bytes[k], cases[i].priority[k], k % 2};
+		storage_grant_claims(claims, JOBS, cases[i].available);
 		for (int k = 0; k < JOBS; k++)
 			if (claims[k].may_write)
 				going[strlen(going)] = (char)('0' + claims[k].job);
 		if (strcmp(going, cases[i].expected) != 0)
 			fail_msg("case %zu: '%s' go on, not '%s'", i, going, cases[i].expected);
 	}
-	room_grant_claims(NULL, 0, 100);
+	storage_grant_claims(NULL, 0, 100);
 }
 
 /* Jobs of random sizes, each of which fits alone, write up to their claims and release all of it at their ends while
@@ -75,13 +75,13 @@ static void all_jobs_end_despite_little_room(void **state)
 			priority[k] = (int)(draw >> 60) % 3;
 		}
 		for (; ended < JOBS && steps < 1000; steps++) {
-			struct room_claim claims[JOBS];
+			struct storage_claim claims[JOBS];
 			size_t count = 0;
 			for (int k = 0; k < JOBS && k <= steps / 5; k++) /* jobs arrive one after the other */
 				if (remaining[k])
 					claims[count++] =
-						(struct room_claim){(uint64_t)k, remaining[k], priority[k], false};
-			room_grant_claims(claims, count, free_bytes);
+						(struct storage_claim){(uint64_t)k, remaining[k], priority[k], false};
+			storage_grant_claims(claims, count, free_bytes);
 			for (size_t i = 0; i < count; i++) {
 				uint64_t k = claims[i].job;
 				if (!claims[i].may_write || free_bytes == 0)
@@ -125,7 +125,7 @@ static void memory_of_chain_states_is_bounded(void **state)
 			int k = (int)(next_random(&draw) % COUNT);
 			uint64_t room = final[k] - live[k].state_bytes, step = 1 + next_random(&draw) % 10, total = 0;
 			step = step < room ? step : room;
-			uint64_t other = room_states_blocker(&jobs, &live[k], live[k].state_bytes + step);
+			uint64_t other = storage_find_states_blocker(&jobs, &live[k], live[k].state_bytes + step);
 			assert_true(other <= COUNT && other != live[k].id);
 			waited += other != 0;
 			blocked = other ? blocked + 1 : 0;
@@ -149,7 +149,7 @@ static void memory_of_chain_states_is_bounded(void **state)
 static void small_jobs_pass_a_large_one(void **state)
 {
 	(void)state;
-	enum { MOST = 3200, SMALL = MOST / ROOM_SMALL_JOB_DIVISOR, COUNT = 20 };
+	enum { MOST = 3200, SMALL = MOST / STORAGE_SMALL_JOB_DIVISOR, COUNT = 20 };
 	struct live_job live[1 + COUNT] = {{.id = 1, .state_bytes = MOST}};
 	struct jobs jobs = {.live_jobs = live, .config.max_state_bytes = MOST};
 	uint64_t total = MOST;
@@ -157,16 +157,16 @@ static void small_jobs_pass_a_large_one(void **state)
 		live[k].id = (uint64_t)k + 1;
 		live[k - 1].next = &live[k];
 	}
-	assert_int_equal(room_states_blocker(&jobs, &live[1], SMALL + 1), 1);
+	assert_int_equal(storage_find_states_blocker(&jobs, &live[1], SMALL + 1), 1);
 	for (int k = 1; k <= COUNT; k++)
 		while (live[k].state_bytes < SMALL &&
-		       room_states_blocker(&jobs, &live[k], live[k].state_bytes + 1) == 0) {
+		       storage_find_states_blocker(&jobs, &live[k], live[k].state_bytes + 1) == 0) {
 			live[k].state_bytes++;
 			total++;
 		}
-	assert_int_equal(total, MOST + MOST / ROOM_SMALL_RESERVE_DIVISOR);
-	assert_int_equal(room_states_blocker(&jobs, &live[COUNT], 1), 1);
-	assert_int_equal(room_states_blocker(&jobs, &live[0], MOST), 0); /* and the large job can end */
+	assert_int_equal(total, MOST + MOST / STORAGE_SMALL_RESERVE_DIVISOR);
+	assert_int_equal(storage_find_states_blocker(&jobs, &live[COUNT], 1), 1);
+	assert_int_equal(storage_find_states_blocker(&jobs, &live[0], MOST), 0); /* and the large job can end */
 }
 
 static unsigned sent_count, refused_count, ended_job_count; /* results, results refused for lack of memory, and jobs */
@@ -215,27 +215,27 @@ static void job_that_never_fits_is_refused(void **state)
 	assert_int_equal(blob_store_open(&jobs.blobs, spool_blob_folder(jobs.spool), 0, &e), 0);
 	small.available = four_thousand_bytes;
 	disk_set_calls(&small);
-	assert_int_equal(room_check_fits(&jobs, 4000, &e), 0);
-	assert_int_equal(room_check_fits(&jobs, 4001, &e), -ENOSPC);
+	assert_int_equal(storage_check_fits(&jobs, 4000, &e), 0);
+	assert_int_equal(storage_check_fits(&jobs, 4001, &e), -ENOSPC);
 	assert_non_null(strstr(e.text, "may need 4001 bytes"));
 	assert_non_null(strstr(e.text, "has 4000: 4000 are free, 0 belong"));
 	assert_int_equal(blob_hash_bytes(bytes, 300, &h, &e), 0);
 	assert_int_equal(blob_write_begin(&w, jobs.blobs, &h, 300, &e), 0);
 	assert_int_equal(blob_write_append(w, bytes, 300, &e), 0);
-	assert_int_equal(room_check_fits(&jobs, 4301, &e), -ENOSPC);
+	assert_int_equal(storage_check_fits(&jobs, 4301, &e), -ENOSPC);
 	assert_int_equal(blob_write_commit(w, &e), 0);
-	assert_int_equal(room_check_fits(&jobs, 4300, &e), 0);
+	assert_int_equal(storage_check_fits(&jobs, 4300, &e), 0);
 	spool_job_path(jobs.spool, over.id, NULL, job_folder);
 	assert_int_equal(disk_make_folder(job_folder, &e), 0);
 	assert_int_equal(spool_write_job_file(jobs.spool, over.id, "checkpoint", bytes, sizeof bytes, &e), 0);
-	assert_int_equal(room_check_fits(&jobs, 4301, &e), -ENOSPC);
+	assert_int_equal(storage_check_fits(&jobs, 4301, &e), -ENOSPC);
 	jobs.ended_jobs = &over;
 	jobs.ended_job_count = 1;
-	assert_int_equal(room_check_fits(&jobs, 7300, &e), 0);
-	assert_int_equal(room_check_fits(&jobs, 7301, &e), -ENOSPC);
+	assert_int_equal(storage_check_fits(&jobs, 7300, &e), 0);
+	assert_int_equal(storage_check_fits(&jobs, 7301, &e), -ENOSPC);
 	jobs.recovering_jobs = (struct recovering_job *)&jobs; /* free space is unknown: jobs from before the restart
 								* are still being read */
-	assert_int_equal(room_check_fits(&jobs, 7301, &e), 0);
+	assert_int_equal(storage_check_fits(&jobs, 7301, &e), 0);
 	disk_set_calls(NULL);
 	blob_store_close(jobs.blobs);
 	spool_close(jobs.spool);

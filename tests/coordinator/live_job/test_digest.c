@@ -78,7 +78,7 @@ static void every_number_changes_the_digest(void **state)
 		EXPECT_CHANGED(s.batch.classes[i] = 1);
 	EXPECT_CHANGED(s.batch.independent_sum = -0.0);
 	EXPECT_CHANGED(s.batch.independent_square = 1);
-	EXPECT_CHANGED(s.batch.beyond_sum = 1);
+	EXPECT_CHANGED(s.batch.overlong_sum = 1);
 	EXPECT_CHANGED(s.batch.strategy_count = 1);
 	EXPECT_CHANGED(s.batch.tile_count = 1);
 	EXPECT_CHANGED(s.batch.state_count = 1);

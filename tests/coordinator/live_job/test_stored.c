@@ -79,7 +79,7 @@ static struct checkpoint_head make_head(void)
 				    .bootstrap_cpu_seconds = 2.5,
 				    .look_written = 3.5,
 				    .times = {4.5, 5.5, NAN},
-				    .bootstrap_result = {.b_pooled = 6.5, .beyond_share = 7.5, .black = true},
+				    .bootstrap_result = {.b_pooled = 6.5, .overlong_share = 7.5, .is_black = true},
 				    .counts = make_counts()};
 	for (int i = 0; i < PLAN_GROUPS_MAX; i++)
 		h.bootstrap_result.b[i] = 1.0 / (1 + i);
@@ -94,10 +94,10 @@ static void assert_head(const struct checkpoint_head *h)
 	struct checkpoint_head want = make_head();
 	assert_true(h->job == want.job && h->generation == want.generation && h->worker_count == want.worker_count);
 	assert_true(h->cpu_seconds == 1.5 && h->bootstrap_cpu_seconds == 2.5 && h->look_written == 3.5);
-	assert_true(h->times.elapsed == 4.5 && h->times.opened == 5.5 && isnan(h->times.completed));
+	assert_true(h->times.elapsed == 4.5 && h->times.first_round_at == 5.5 && isnan(h->times.last_round_end));
 	assert_memory_equal(h->bootstrap_result.b, want.bootstrap_result.b, sizeof want.bootstrap_result.b);
-	assert_true(h->bootstrap_result.b_pooled == 6.5 && h->bootstrap_result.beyond_share == 7.5 &&
-		    h->bootstrap_result.black);
+	assert_true(h->bootstrap_result.b_pooled == 6.5 && h->bootstrap_result.overlong_share == 7.5 &&
+		    h->bootstrap_result.is_black);
 	assert_int_equal(h->looks.count, FORECAST_LOOKS_MAX);
 	for (uint32_t i = 0; i < h->looks.count; i++)
 		assert_look(&h->looks.looks[i], i);
@@ -141,7 +141,7 @@ static size_t put_look(size_t offset, double work)
 	struct forecast_look l = make_look(work);
 	offset = put_doubles(offset,
 			     (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
-	put64(bytes + offset, l.doubtful);
+	put64(bytes + offset, l.is_doubtful);
 	return offset + 8;
 }
 

@@ -161,7 +161,7 @@ static void json_shows_the_share_of_machines(void **state)
 	assert_true(wire.workers == 3 && wire.share == 2.5);
 	assert_string_equal(wire.owner, "ann");
 	assert_string_equal(wire.place, s.place);
-	view_hide_others(&v);
+	view_hide_other_owners(&v);
 	view_to_wire(&v, &wire);
 	assert_string_equal(wire.place, "3 of 8 machines; 1 job of another owner comes first");
 	assert_string_equal(wire.why, "waits for a job of another owner");

@@ -5,7 +5,7 @@
  * neither an announcement nor a part of a file keeps others waiting for long.
  */
 #include "common/base/disk.h"
-#include "coordinator/jobs/room.h"
+#include "coordinator/jobs/storage.h"
 #include "tests/support/child_server.h"
 
 #include <stdarg.h>

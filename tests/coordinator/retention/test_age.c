@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Which parts of finished jobs are deleted, and in which order, by a clock that the test sets. */
-#include "coordinator/retention/age.h"
+#include "coordinator/retention/expiry.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,27 +11,30 @@
 #define DAY 86400.0
 
 /* Films and results of 100 bytes each; the jobs ended on days 5, 1, 3, 4, 2. */
-static void make_jobs(struct age_job jobs[5])
+static void make_jobs(struct expiry_job jobs[5])
 {
 	static const double days[] = {5, 1, 3, 4, 2};
 	for (int i = 0; i < 5; i++)
-		jobs[i] = (struct age_job){.id = 10 + (uint64_t)i,
-					   .end_order = days[i],
-					   .ended = days[i] * DAY,
-					   .film_bytes = 100,
-					   .result_bytes = 100};
+		jobs[i] = (struct expiry_job){.id = 10 + (uint64_t)i,
+					      .end_order = days[i],
+					      .ended_at = days[i] * DAY,
+					      .film_bytes = 100,
+					      .result_bytes = 100};
 }
 
 /* One letter per job, in the order of their ends: . nothing is deleted, f its films, r also its result, x also its
  * record. */
-static void expect_deletions(const struct age_job jobs[5], const char *what)
+static void expect_deletions(const struct expiry_job jobs[5], const char *what)
 {
 	char deletions[6] = "";
 	for (int i = 0; i < 5; i++) {
-		assert_true(i == 0 || jobs[i].ended >= jobs[i - 1].ended);
-		assert_true(!jobs[i].drop_record || jobs[i].drop_result);
-		assert_true(!jobs[i].drop_result || jobs[i].drop_films || !jobs[i].film_bytes);
-		deletions[i] = jobs[i].drop_record ? 'x' : jobs[i].drop_result ? 'r' : jobs[i].drop_films ? 'f' : '.';
+		assert_true(i == 0 || jobs[i].ended_at >= jobs[i - 1].ended_at);
+		assert_true(!jobs[i].must_drop_record || jobs[i].must_drop_result);
+		assert_true(!jobs[i].must_drop_result || jobs[i].must_drop_films || !jobs[i].film_bytes);
+		deletions[i] = jobs[i].must_drop_record	  ? 'x'
+			       : jobs[i].must_drop_result ? 'r'
+			       : jobs[i].must_drop_films  ? 'f'
+							  : '.';
 	}
 	assert_string_equal(deletions, what);
 }
@@ -39,64 +42,64 @@ static void expect_deletions(const struct age_job jobs[5], const char *what)
 static void old_jobs_are_deleted_by_age(void **state)
 {
 	(void)state;
-	struct age_job jobs[5];
-	struct age_limits l = {3 * DAY, 0};
+	struct expiry_job jobs[5];
+	struct expiry_limits l = {3 * DAY, 0};
 	make_jobs(jobs);
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, "r....");
-	age_choose_deletions(jobs, 5, &l, 6.5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 6.5 * DAY);
 	expect_deletions(jobs, "rrr..");
-	age_choose_deletions(jobs, 5, &l, 33.5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 33.5 * DAY);
 	expect_deletions(jobs, "xxxrr");
-	age_choose_deletions(jobs, 5, &l, -100 * DAY); /* the clock jumps back */
+	expiry_choose_deletions(jobs, 5, &l, -100 * DAY); /* the clock jumps back */
 	expect_deletions(jobs, ".....");
 	l.max_age_seconds = 0;
-	age_choose_deletions(jobs, 5, &l, 1e6 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 1e6 * DAY);
 	expect_deletions(jobs, ".....");
 }
 
 static void oldest_jobs_are_deleted_for_space(void **state)
 {
 	(void)state;
-	struct age_job jobs[5];
-	struct age_limits l = {0, 1000};
+	struct expiry_job jobs[5];
+	struct expiry_limits l = {0, 1000};
 	make_jobs(jobs);
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, ".....");
 	l.max_bytes = 999;
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, "f....");
 	l.max_bytes = 550; /* all films go before any result */
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, "fffff");
 	l.max_bytes = 300;
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, "rrfff");
 }
 
 static void job_being_fetched_stays(void **state)
 {
 	(void)state;
-	struct age_job jobs[5];
-	struct age_limits l = {1 * DAY, 0};
+	struct expiry_job jobs[5];
+	struct expiry_limits l = {1 * DAY, 0};
 	make_jobs(jobs);
 	jobs[1].is_in_use = true; /* the oldest job */
-	age_choose_deletions(jobs, 5, &l, 100 * DAY);
+	expiry_choose_deletions(jobs, 5, &l, 100 * DAY);
 	expect_deletions(jobs, ".xxxx");
-	l = (struct age_limits){0, 300};
-	age_choose_deletions(jobs, 5, &l, 5 * DAY);
+	l = (struct expiry_limits){0, 300};
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY);
 	expect_deletions(jobs, "frrff");
 }
 
 static void limits_of_age_and_space_apply_together(void **state)
 {
 	(void)state;
-	struct age_job jobs[5];
-	struct age_limits l = {3 * DAY, 700};
+	struct expiry_job jobs[5];
+	struct expiry_limits l = {3 * DAY, 700};
 	make_jobs(jobs);
-	age_choose_deletions(jobs, 5, &l, 5 * DAY); /* one job by age, and another for 100 bytes */
+	expiry_choose_deletions(jobs, 5, &l, 5 * DAY); /* one job by age, and another for 100 bytes */
 	expect_deletions(jobs, "rf...");
-	age_choose_deletions(jobs, 0, &l, 5 * DAY);
+	expiry_choose_deletions(jobs, 0, &l, 5 * DAY);
 }
 
 int main(void)

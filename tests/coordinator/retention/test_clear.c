@@ -3,7 +3,7 @@
 #include "common/base/disk.h"
 #include "common/base/log.h"
 #include "coordinator/retention/observed_time.h"
-#include "coordinator/retention/clear.h"
+#include "coordinator/retention/clearing.h"
 #include "tests/support/bytes_read.h"
 #include "tests/support/failing_list.h"
 #include "tests/support/temporary_folder.h"
@@ -107,9 +107,9 @@ static void restart_after_reboot(double ahead)
 	age_clock_to_text(&last, text);
 	assert_int_equal(ledger_set_note(jobs.ledger, "clock", text, &e), 0);
 	observed_time_open(&jobs);
-	jobs.next_clearing = 0;
+	jobs.next_clearing_at = 0;
 	do
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 	while (jobs.clearing);
 }
 
@@ -150,9 +150,9 @@ static void order_of_ends_survives_a_loss_of_power(void **state)
 	assert_true(job_file_exists(1, "result.exr"));
 	add_ended_job(2, now);
 	jobs.config.retention_bytes = 5; /* room for one result */
-	jobs.next_clearing = 0;
+	jobs.next_clearing_at = 0;
 	do
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 	while (jobs.clearing);
 	assert_true(!job_file_exists(1, "result.exr") && job_file_exists(2, "result.exr"));
 	ledger_close(jobs.ledger);
@@ -175,7 +175,7 @@ static void old_jobs_are_deleted_in_short_ticks(void **state)
 	slow.open = slow_open;
 	do {
 		double begin = jobs_now(&jobs);
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 		double took = jobs_now(&jobs) - begin;
 		longest = took > longest ? took : longest;
 		ticks++;
@@ -215,7 +215,7 @@ static void many_rows_are_read_in_short_ticks(void **state)
 		skip();
 	const uint64_t begin = before;
 	do {
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 		assert_true(bytes_read_count(&after));
 		longest = after - before > longest ? after - before : longest;
 		before = after;
@@ -244,9 +244,10 @@ static void job_of_unknown_age_counts_as_young(void **state)
 		r->ended_seen = id == 1 ? -1 : 1000.0 * DAY;
 		assert_int_equal(ledger_write_record(jobs.ledger, r, &e), 0);
 	}
-	for (int day = 0; day < 3; day++, jobs.observed_clock.observed_seconds += 0.7 * DAY, jobs.next_clearing = 0) {
+	for (int day = 0; day < 3;
+	     day++, jobs.observed_clock.observed_seconds += 0.7 * DAY, jobs.next_clearing_at = 0) {
 		do
-			clear_tick(&jobs);
+			clearing_tick(&jobs);
 		while (jobs.clearing);
 		for (uint64_t id = 1; id <= 2; id++) {
 			assert_true(job_file_exists(id, "result.exr") == (day < 2));
@@ -272,7 +273,7 @@ static void job_that_changed_meanwhile_stays(void **state)
 	open_jobs();
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add_ended_job(id, now - 20 * DAY);
-	clear_tick(&jobs);
+	clearing_tick(&jobs);
 	assert_non_null(jobs.clearing);
 	struct error e;
 	struct job_record *r = calloc(1, sizeof *r);
@@ -281,10 +282,10 @@ static void job_that_changed_meanwhile_stays(void **state)
 	assert_int_equal(ledger_write_record(jobs.ledger, r, &e), 0);
 	free(r);
 	while (jobs.clearing)
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 	disk_set_calls(NULL);
 	assert_true(job_file_exists(1, "result.exr") && !job_file_exists(2, NULL));
-	clear_close(&jobs);
+	clearing_close(&jobs);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -301,11 +302,11 @@ static void films_being_read_stay(void **state)
 	open_jobs();
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add_ended_job(id, (double)time(NULL) - 20 * DAY);
-	jobs.reading_job = &first;
+	jobs.extended_job = &first;
 	do { /* the last job goes in a later tick than the first: looking at 120 jobs takes more than one tick */
-		clear_tick(&jobs);
+		clearing_tick(&jobs);
 		if (!job_file_exists(1, "result.exr"))
-			jobs.reading_job = &second;
+			jobs.extended_job = &second;
 	} while (jobs.clearing);
 	disk_set_calls(NULL);
 	assert_true(job_file_exists(3, "result.exr") && job_file_exists(JOBS, "result.exr") &&
@@ -337,12 +338,12 @@ static void result_being_fetched_is_deleted_afterwards(void **state)
 	add_ended_job(2, (double)time(NULL) - DAY);
 	for (int fetching = 1; fetching >= 0; fetching--) {
 		is_fetching = fetching;
-		jobs.next_clearing = 0;
+		jobs.next_clearing_at = 0;
 		do
-			clear_tick(&jobs);
+			clearing_tick(&jobs);
 		while (jobs.clearing);
 		assert_true(job_file_exists(1, "result.exr") == fetching && !job_file_exists(2, "result.exr"));
-		assert_true((jobs.next_clearing - jobs_now(&jobs) < 10) == fetching);
+		assert_true((jobs.next_clearing_at - jobs_now(&jobs) < 10) == fetching);
 	}
 	disk_set_calls(NULL);
 	ledger_close(jobs.ledger);
@@ -362,9 +363,9 @@ static void row_stays_until_its_folder_is_gone(void **state)
 	for (int round = 0; round < 2; round++) {
 		if (round == 0)
 			failing_list_begin("/jobs/j1", 0, EIO);
-		jobs.next_clearing = 0;
+		jobs.next_clearing_at = 0;
 		do
-			clear_tick(&jobs);
+			clearing_tick(&jobs);
 		while (jobs.clearing);
 		failing_list_end();
 		assert_int_equal(job_file_exists(1, NULL), round == 0);

@@ -36,7 +36,7 @@ static void make_job(struct test_job *j, const struct plan_request *r, uint64_t 
 	j->request = *r;
 	assert_int_equal(plan_make(r, &j->plan, &j->e), 0);
 	j->progress = (struct extension_basis){
-		.rounds = rounds ? rounds : j->plan.rounds, .seconds = 10, .error = NAN, .ended = ended};
+		.rounds = rounds ? rounds : j->plan.rounds, .seconds = 10, .error = NAN, .has_ended = ended};
 }
 
 static int try_extension(struct test_job *j, struct extension x)
@@ -76,11 +76,11 @@ static void extended_plan_is_that_of_one_long_job(void **state)
 			assert_int_equal(plan_make(&all, &one, &j.e), 0);
 			assert_int_equal(try_extension(&j, (struct extension){.spp = 100}), 0);
 			assert_true(j.plan.rounds > j.progress.rounds);
-			j.progress.ended = spp % 2; /* while the job runs, or when it is done */
+			j.progress.has_ended = spp % 2; /* while the job runs, or when it is done */
 			j.progress.rounds = spp % 2 ? j.plan.rounds : j.plan.rounds - 1;
 			int rc = try_extension(&j, (struct extension){.mutations = 3 * 48 * 40});
 			if (rc) /* the last round was already larger by as many samples */
-				assert_true(j.progress.ended && one.rounds == j.plan.rounds);
+				assert_true(j.progress.has_ended && one.rounds == j.plan.rounds);
 			assert_memory_equal(&one, &j.plan, sizeof one);
 		}
 }
@@ -139,13 +139,13 @@ static void extension_after_a_cancelled_one_continues_from_what_is_done(void **s
 	r.seconds = 1000;
 	r.target_error = 0.05;
 	make_job(&j, &r, 3, true);
-	j.progress.extension_cancelled = true;
+	j.progress.was_extension_cancelled = true;
 	uint64_t done = 3 * plan_round_mutations(&j.plan), more = 8 * 48 * 40, round = plan_round_mutations(&j.plan);
 	assert_int_equal(try_extension(&j, (struct extension){.spp = 8}), 0);
 	assert_int_equal(j.plan.rounds, (done + more + round - 1) / round);
 	assert_true(j.plan.seconds == 0 && j.plan.target_error == 0);
 	make_job(&j, &r, 3, true);
-	j.progress.extension_cancelled = true;
+	j.progress.was_extension_cancelled = true;
 	assert_int_equal(try_extension(&j, (struct extension){.seconds = 3}), 0);
 	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 13 && j.plan.target_error == 0);
 }

@@ -3,7 +3,7 @@
  * needs the room; results stay. */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "coordinator/retention/keep.h"
+#include "coordinator/retention/kept_films.h"
 #include "tests/support/failing_list.h"
 #include "tests/support/temporary_folder.h"
 
@@ -89,17 +89,17 @@ static void films_of_the_oldest_jobs_are_deleted_first(void **state)
 		add_ended_job(id);
 	make_films();
 	jobs.config.retained_film_bytes = 3000;
-	keep_trim_films(&jobs);
+	kept_films_trim(&jobs);
 	assert_true(job_file_exists(3, "checkpoint") && job_file_exists(1, "checkpoint") &&
 		    job_file_exists(2, "journal.2"));
 	jobs.config.retained_film_bytes = 2999;
-	keep_trim_films(&jobs);
+	kept_films_trim(&jobs);
 	assert_false(job_file_exists(3, "checkpoint") || job_file_exists(3, "journal.2"));
 	assert_true(job_file_exists(1, "journal.2") && job_file_exists(2, "checkpoint"));
 	assert_true(!has_submission(3) && has_submission(1));
-	assert_true(keep_drop_all_films(&jobs));
+	assert_true(kept_films_drop_all(&jobs));
 	assert_false(job_file_exists(1, "journal.2") || job_file_exists(2, "checkpoint"));
-	assert_false(keep_drop_all_films(&jobs)); /* there is nothing more to delete */
+	assert_false(kept_films_drop_all(&jobs)); /* there is nothing more to delete */
 	for (uint64_t id = 1; id <= 3; id++)
 		assert_true(job_file_exists(id, "result.exr"));
 	ledger_close(jobs.ledger);
@@ -184,17 +184,17 @@ static void films_that_cannot_be_deleted_make_no_room(void **state)
 	struct disk failing_disk = disk_system;
 	failing_disk.unlink = fail_unlink;
 	disk_set_calls(&failing_disk);
-	assert_false(keep_drop_all_films(&jobs));
+	assert_false(kept_films_drop_all(&jobs));
 	disk_set_calls(NULL);
 	failing_list_begin("/jobs/j", 1, EIO);
-	keep_trim_films(&jobs); /* the size of no job's films is known */
-	assert_false(keep_drop_all_films(&jobs));
+	kept_films_trim(&jobs); /* the size of no job's films is known */
+	assert_false(kept_films_drop_all(&jobs));
 	failing_list_end();
 	for (uint64_t id = 1; id <= 3; id++)
 		assert_true(job_file_exists(id, "checkpoint") && job_file_exists(id, "journal.2"));
-	jobs.reading_job = &(struct live_job){.id = 1};
-	assert_true(keep_drop_all_films(&jobs));
-	assert_false(keep_drop_all_films(&jobs));
+	jobs.extended_job = &(struct live_job){.id = 1};
+	assert_true(kept_films_drop_all(&jobs));
+	assert_false(kept_films_drop_all(&jobs));
 	assert_true(job_file_exists(1, "checkpoint") && !job_file_exists(2, "checkpoint") &&
 		    !job_file_exists(3, "journal.2"));
 	ledger_close(jobs.ledger);

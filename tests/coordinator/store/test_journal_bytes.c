@@ -92,7 +92,7 @@ static void bytes_of_journals_never_change(void **state)
 	a.size = 0;
 	assert_true(buf_append(&a, "\x08\x07", 2));
 	r = (struct journal_record){
-		.kind = JOURNAL_COUNTS, .number = 1, .durable_before = 1, .elapsed = 2.5, .salt = old_salt};
+		.kind = JOURNAL_COUNTS, .number = 1, .durable_count_before = 1, .elapsed = 2.5, .salt = old_salt};
 	journal_record_pack(&r, bytes, &a, &none);
 	assert_memory_equal(bytes, old_journal + OLD_SECOND, sizeof bytes);
 	buf_fini(&a);

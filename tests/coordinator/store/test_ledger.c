@@ -65,7 +65,7 @@ static void add_job(struct ledger *l, uint64_t id)
 			       .name = "a 'name'",
 			       .version = "0.1",
 			       .priority = -3,
-			       .mixed = true,
+			       .is_mixed = true,
 			       .submitted = 12.5,
 			       .record = "",
 			       .submission = submission,
@@ -123,7 +123,7 @@ static void live_jobs_survive_reopening(void **state)
 	assert_string_equal(j.name, "a 'name'");
 	assert_string_equal(j.version, "0.1");
 	assert_int_equal(j.priority, -3);
-	assert_true(j.mixed && j.submitted == 12.5);
+	assert_true(j.is_mixed && j.submitted == 12.5);
 	assert_int_equal(j.submission_size, 4);
 	assert_memory_equal(j.submission, "\0\1\0\377", 4);
 	assert_int_equal(j.plan_size, 2);
@@ -221,7 +221,7 @@ static void ended_job_can_be_extended(void **state)
 	assert_int_equal(ledger_ended_count(l), 1);
 	assert_int_equal(next_live(l, 0, &j), 0);
 	assert_int_equal(ledger_read_row(l, 1, &j, &e), 1);
-	assert_true(j.submission_size == 0 && j.priority == -3 && j.mixed);
+	assert_true(j.submission_size == 0 && j.priority == -3 && j.is_mixed);
 	more.extended = 2;
 	assert_int_equal(ledger_extend_job(l, &more, &e), 0);
 	assert_int_equal(ledger_ended_count(l), 0);

@@ -92,7 +92,7 @@ static void assert_row(void)
 	struct old_row f;
 	const struct ledger_job *j = &f.job;
 	assert_int_equal(old_spool_read_row(spool, JOB, &f, &e), 0);
-	assert_true(j->id == 1 && j->extended == 3 && j->revision == revision && j->priority == -7 && j->mixed);
+	assert_true(j->id == 1 && j->extended == 3 && j->revision == revision && j->priority == -7 && j->is_mixed);
 	assert_true(j->submitted == 1.5 && j->end_time == 0 && !j->is_damaged);
 	assert_string_equal(j->owner, "anna");
 	assert_string_equal(j->name, "glass");

@@ -91,7 +91,7 @@ static void record_is_read_back_from_its_json(void **state)
 	const struct convergence *a = &back.convergence;
 	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->flagged_tiles == 3 &&
 		    a->flagged_energy_share == 0.125);
-	assert_true(a->r_hat_median == 1.01 && a->max_r_hat == 2.5 && a->worst_x == 64 && a->worst_y == 128);
+	assert_true(a->median_r_hat == 1.01 && a->max_r_hat == 2.5 && a->worst_x == 64 && a->worst_y == 128);
 	assert_true(a->flagged_classes == r.convergence.flagged_classes &&
 		    a->inconsistent_classes == r.convergence.inconsistent_classes && a->stuck_share == 0.25 &&
 		    back.b == r.b);

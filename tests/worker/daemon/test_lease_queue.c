@@ -183,7 +183,7 @@ static void full_store_fails_each_job_once(void **state)
 	coord_begin_jobs(2);
 	coord_serve_mesh(0, 1);
 	const uint64_t first = coord_expect_lease_failed("exceeds its limit");
-	assert_false(coord.failed_own); /* a configured limit: no worker may have room for this file */
+	assert_false(coord.worker_at_fault); /* a configured limit: no worker may have room for this file */
 	coord_serve_mesh(0, 1);
 	assert_int_equal(coord_expect_lease_failed("exceeds its limit"), 3 - first);
 	coord_expect_silence();
@@ -208,7 +208,7 @@ static void full_disk_does_not_count_against_the_job(void **state)
 	disk_set_calls(&full);
 	coord_send_piece(&coord.mesh, 0);
 	assert_int_equal(coord_expect_lease_failed("No space left on device"), 1);
-	assert_true(coord.failed_own);
+	assert_true(coord.worker_at_fault);
 	disk_set_calls(NULL);
 	coord_grant_new_job(1); /* with free space again it works */
 	coord_send_job_info(1);
@@ -230,7 +230,7 @@ static void lost_file_does_not_count_against_the_job(void **state)
 	assert_int_equal(system(command), 0);
 	coord_send_piece(&coord.mesh, (COORD_MESH_PIECES - 1) * COORD_PIECE_BYTES);
 	coord_expect_lease_failed("No such file");
-	assert_true(coord.failed_own);
+	assert_true(coord.worker_at_fault);
 	coord_stop();
 }
 

@@ -7,7 +7,7 @@
 #include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "worker/daemon/lease_queue.h"
-#include "worker/daemon/work.h"
+#include "worker/daemon/crash_record.h"
 #include "tests/support/failing_memory.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/scripted_coordinator.h"
@@ -27,15 +27,15 @@
 static void start_short_of_memory(void)
 {
 	struct error e;
-	assert_int_equal(work_share_memory(1, &e), 0);
-	work_record_loss(SIGKILL, clock_seconds());
+	assert_int_equal(crash_record_open(1, &e), 0);
+	crash_record_add_loss(SIGKILL, clock_seconds());
 	coord_start(0);
 }
 
 static void expect_postponed(uint64_t job, const char *why)
 {
 	assert_int_equal(coord_expect_lease_failed(why), job);
-	assert_true(coord.failed_own); /* the failure does not count against the job */
+	assert_true(coord.worker_at_fault); /* the failure does not count against the job */
 	assert_true(coord.connection->env.message->lease_failed->later);
 }
 
@@ -45,12 +45,12 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share_memory(1, &e), 0);
+	assert_int_equal(crash_record_open(1, &e), 0);
 	coord_start(0);
 	coord_grant_new_job(1);
 	coord_grant_new_job(2);
 	coord_stop();
-	work_record_loss(SIGSEGV, clock_seconds()); /* the fault of a scene, not of the machine */
+	crash_record_add_loss(SIGSEGV, clock_seconds()); /* the fault of a scene, not of the machine */
 	coord_start(0);
 	coord_grant_new_job(1);
 	coord_grant_new_job(2);
@@ -104,27 +104,27 @@ static void restriction_ends_and_doubles_when_repeated(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share_memory(1, &e), 0);
-	assert_false(work_memory_was_short(0));
-	work_record_loss(SIGKILL, 1000);
-	assert_true(work_memory_was_short(1599));
-	assert_false(work_memory_was_short(1601));
-	work_note_memory_short(1700);
-	assert_true(work_memory_was_short(2899));
-	assert_false(work_memory_was_short(2901));
-	work_note_memory_short(4101); /* the same time has passed without a shortage: ten minutes */
-	assert_true(work_memory_was_short(4700));
-	work_record_loss(SIGKILL, 4700); /* within the period: it restarts with the same length */
-	assert_true(work_memory_was_short(5299));
-	assert_false(work_memory_was_short(5301));
+	assert_int_equal(crash_record_open(1, &e), 0);
+	assert_false(crash_record_is_memory_short(0));
+	crash_record_add_loss(SIGKILL, 1000);
+	assert_true(crash_record_is_memory_short(1599));
+	assert_false(crash_record_is_memory_short(1601));
+	crash_record_note_memory_short(1700);
+	assert_true(crash_record_is_memory_short(2899));
+	assert_false(crash_record_is_memory_short(2901));
+	crash_record_note_memory_short(4101); /* the same time has passed without a shortage: ten minutes */
+	assert_true(crash_record_is_memory_short(4700));
+	crash_record_add_loss(SIGKILL, 4700); /* within the period: it restarts with the same length */
+	assert_true(crash_record_is_memory_short(5299));
+	assert_false(crash_record_is_memory_short(5301));
 	double start = 5300, duration = 600; /* the last period began at 4700 */
 	for (int i = 0; i < 8; i++) {
 		duration = 2 * duration < 19200 ? 2 * duration : 19200;
-		work_note_memory_short(start);
+		crash_record_note_memory_short(start);
 		start += duration;
 	}
-	assert_true(work_memory_was_short(start - 1));
-	assert_false(work_memory_was_short(start + 1));
+	assert_true(crash_record_is_memory_short(start - 1));
+	assert_false(crash_record_is_memory_short(start + 1));
 }
 
 /* After the period, both jobs are accepted again. */
@@ -132,8 +132,8 @@ static void both_scenes_are_accepted_afterwards(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share_memory(1, &e), 0);
-	work_record_loss(SIGKILL, clock_seconds() - 601);
+	assert_int_equal(crash_record_open(1, &e), 0);
+	crash_record_add_loss(SIGKILL, clock_seconds() - 601);
 	coord_start(0);
 	coord_grant_new_job(1);
 	coord_grant_new_job(2);
@@ -235,18 +235,18 @@ static void lack_of_memory_is_no_jobs_fault(void **state)
 {
 	struct error e;
 	(void)state;
-	assert_int_equal(work_share_memory(1, &e), 0);
+	assert_int_equal(crash_record_open(1, &e), 0);
 	coord_start(0);
 	compute_first_of_two();
 	coord_grant_new_job(2);
 	build_without_memory(2);
-	assert_true(coord.failed_own);
+	assert_true(coord.worker_at_fault);
 	coord_send_grant(3);
 	expect_postponed(3, "now that of j1");
 	coord_send_job_end(1);
 	coord_grant_new_job(2);
 	build_without_memory(2);
-	assert_true(coord.failed_own);
+	assert_true(coord.worker_at_fault);
 	coord_stop();
 }
 

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static const char *canonical(const char *text)
+static const char *canonical_text(const char *text)
 {
 	static char out[PLAN_ACCURACY_MAX];
 	struct error e = {""};
@@ -21,7 +21,7 @@ static const char *canonical(const char *text)
 	return out;
 }
 
-static void test_canonical(void **state)
+static void settings_have_one_canonical_spelling(void **state)
 {
 	(void)state;
 	static const char *const cases[][2] = {
@@ -36,11 +36,11 @@ static void test_canonical(void **state)
 		{"iterations=3e1", "iterations=30"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		assert_string_equal(canonical(cases[i][0]), cases[i][1]);
+		assert_string_equal(canonical_text(cases[i][0]), cases[i][1]);
 }
 
 /* A text and its canonical form mean the same, and the longest text fits into a plan. */
-static void test_all_at_once(void **state)
+static void longest_settings_fit_into_a_plan(void **state)
 {
 	(void)state;
 	char all[2 * PLAN_ACCURACY_MAX] = "", once[PLAN_ACCURACY_MAX], twice[PLAN_ACCURACY_MAX];
@@ -74,7 +74,7 @@ static void test_all_at_once(void **state)
 	assert_int_equal(entries, 0);
 }
 
-static void test_list(void **state)
+static void each_setting_is_listed_with_its_default(void **state)
 {
 	(void)state;
 	const struct render_setting *k;
@@ -84,11 +84,11 @@ static void test_list(void **state)
 		assert_true(strlen(k->summary) > 20);
 		accuracy_settings_print_value(&accuracy_settings_default, i, value, sizeof value);
 		snprintf(entry, sizeof entry, "%s=%s", k->name, value);
-		assert_string_equal(canonical(entry), "");
+		assert_string_equal(canonical_text(entry), "");
 		bool has_default = false;
 		for (size_t s = 0; k->sweep[s]; s++) {
 			snprintf(entry, sizeof entry, "%s=%s", k->name, k->sweep[s]);
-			const char *got = canonical(entry);
+			const char *got = canonical_text(entry);
 			has_default |= !*got;
 			assert_true(!*got || strcmp(got, entry) == 0);
 		}
@@ -96,7 +96,7 @@ static void test_list(void **state)
 	}
 }
 
-static void refused(const char *text, const char *reason)
+static void assert_refused(const char *text, const char *reason)
 {
 	char out[PLAN_ACCURACY_MAX];
 	struct error e = {""};
@@ -105,7 +105,7 @@ static void refused(const char *text, const char *reason)
 		fail_msg("'%s': \"%s\" does not say \"%s\"", text, e.text, reason);
 }
 
-static void test_refusals(void **state)
+static void other_spellings_are_refused(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {",",
@@ -125,18 +125,18 @@ static void test_refusals(void **state)
 					    "iterations=0",
 					    "iterations=1e300"};
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
-		refused(texts[i], "");
-	refused("tolerence=1e-3", "did you mean `tolerance`?");
-	refused("tolerance=2", "tolerance is 1e-09 to 1, not '2'");
-	refused("iterations=0", "a whole number from 1 to 1000");
-	refused("xyzzy=1", "there are tolerance, iterations");
+		assert_refused(texts[i], "");
+	assert_refused("tolerence=1e-3", "did you mean `tolerance`?");
+	assert_refused("tolerance=2", "tolerance is 1e-09 to 1, not '2'");
+	assert_refused("iterations=0", "a whole number from 1 to 1000");
+	assert_refused("xyzzy=1", "there are tolerance, iterations");
 	char longest[3000];
 	memset(longest, 'a', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
-	refused(longest, "NAME=VALUE");
+	assert_refused(longest, "NAME=VALUE");
 }
 
-static void test_walk_limits(void **state)
+static void settings_reach_the_walk_limits(void **state)
 {
 	(void)state;
 	struct accuracy_settings k;
@@ -148,7 +148,7 @@ static void test_walk_limits(void **state)
 }
 
 /* Returns the BSDF of a world's only shape. */
-static const struct bsdf *material(const char *accuracy, const char *bsdf, struct world **w)
+static const struct bsdf *material_of_world(const char *accuracy, const char *bsdf, struct world **w)
 {
 	worlds_accuracy = accuracy;
 	*w = world_from_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>",
@@ -157,7 +157,7 @@ static const struct bsdf *material(const char *accuracy, const char *bsdf, struc
 	return &(*w)->bsdfs[(*w)->shape_bindings[0].bsdf];
 }
 
-static void test_roughness(void **state)
+static void roughness_setting_reaches_materials(void **state)
 {
 	(void)state;
 	static const char *const rough[] = {
@@ -167,11 +167,11 @@ static void test_roughness(void **state)
 	};
 	for (size_t i = 0; i < sizeof rough / sizeof *rough; i++) {
 		struct world *w;
-		const struct bsdf *b = material("roughness=0.05", rough[i], &w);
+		const struct bsdf *b = material_of_world("roughness=0.05", rough[i], &w);
 		assert_true(b->has_smooth && !b->has_delta && b->min_alpha == 0.05);
 		assert_true(w->effects.glossy && !w->effects.specular);
 		world_free(w);
-		b = material("roughness=0.051", rough[i], &w);
+		b = material_of_world("roughness=0.051", rough[i], &w);
 		assert_true(!b->has_smooth && b->has_delta && b->min_alpha == 0);
 		assert_true(!w->effects.glossy && w->effects.specular);
 		const struct wavelengths wl = wavelengths_sample(0.3);
@@ -184,7 +184,7 @@ static void test_roughness(void **state)
 	}
 }
 
-static void test_tessellation(void **state)
+static void tessellation_setting_reaches_shapes(void **state)
 {
 	(void)state;
 	static const struct {
@@ -215,7 +215,7 @@ static void test_tessellation(void **state)
 }
 
 /* A lease refuses a world built with other settings than the plan's. */
-static void test_lease_and_world(void **state)
+static void lease_refuses_a_world_of_other_settings(void **state)
 {
 	(void)state;
 	worlds_accuracy = "tolerance=1e-05";
@@ -251,10 +251,14 @@ static void test_lease_and_world(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_canonical),    cmocka_unit_test(test_all_at_once),
-		cmocka_unit_test(test_list),	     cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_walk_limits),  cmocka_unit_test(test_roughness),
-		cmocka_unit_test(test_tessellation), cmocka_unit_test(test_lease_and_world),
+		cmocka_unit_test(settings_have_one_canonical_spelling),
+		cmocka_unit_test(longest_settings_fit_into_a_plan),
+		cmocka_unit_test(each_setting_is_listed_with_its_default),
+		cmocka_unit_test(other_spellings_are_refused),
+		cmocka_unit_test(settings_reach_the_walk_limits),
+		cmocka_unit_test(roughness_setting_reaches_materials),
+		cmocka_unit_test(tessellation_setting_reaches_shapes),
+		cmocka_unit_test(lease_refuses_a_world_of_other_settings),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,7 +4,7 @@
 #include "tests/support/test_length.h"
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
-#include "worker/render/choose.h"
+#include "worker/render/choose_integrator.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -34,7 +34,7 @@ static void choose_for(const struct world *w, uint64_t seed, uint64_t spp, struc
 }
 
 /* A world without refracted connections, in which only chance finds light behind glass. */
-static struct world *without_refraction(const char *folder, const char *file)
+static struct world *world_without_refraction(const char *folder, const char *file)
 {
 	worlds_effects = "-refracted-shadows";
 	struct world *w = world_from_own_scene(folder, file, 160, 90);
@@ -106,7 +106,7 @@ static void fog_is_not_merged(void **state)
 }
 
 /* The `null` faces of a cloud do not focus light; glass inside the cloud does. */
-static void clouds_focus_nothing(void **state)
+static void null_faces_of_clouds_focus_no_light(void **state)
 {
 	(void)state;
 	static const char *const inner[] = {"",
@@ -125,7 +125,7 @@ static void clouds_focus_nothing(void **state)
 		struct render_choice c;
 		choose_for(w, 1, SPP, &r, &c);
 		assert_int_equal(c.has_narrow_lobes, i > 0);
-		assert_int_equal(c.transmits, i == 2);
+		assert_int_equal(c.has_transmission, i == 2);
 		assert_string_equal(r.integrator, i == 0 ? "path" : "erpt4");
 		world_free(w);
 	}
@@ -210,7 +210,7 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 }
 
 /* Wide lobes and a large lamp: the contributions have a wide but bounded range. */
-static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
+static void light_of_bounded_range_is_given_to_erpt4(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("../bench/scenes", "effects-glass.xml", 160, 90);
@@ -230,7 +230,7 @@ static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 {
 	(void)state;
-	struct world *w = without_refraction("bulb", "scene.xml");
+	struct world *w = world_without_refraction("bulb", "scene.xml");
 	for (uint64_t seed = 0; seed < 2 * SEEDS; seed++)
 		assert_true(chooses_chains(w, seed));
 	world_free(w);
@@ -245,7 +245,7 @@ static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 {
 	(void)state;
-	struct world *w = without_refraction("../bench/scenes", "kitchen.xml");
+	struct world *w = world_without_refraction("../bench/scenes", "kitchen.xml");
 	static const uint64_t seeds[] = {2001, 2005, 2007};
 	for (size_t i = 0; i < sizeof seeds / sizeof *seeds; i++) {
 		struct plan_request r;
@@ -260,10 +260,10 @@ static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
 /* The sun on the floor of a pool, without refracted connections: the samples of a pilot meet it once or never, and
  * one such sample cannot be told from the edge of a lamp. Merging knows it: 0.05 to 0.07 of the light is rare, and
  * 0.03 suffices. */
-static void light_that_no_sample_meets_is_known_by_merging(void **state)
+static void merging_detects_light_that_no_sample_meets(void **state)
 {
 	(void)state;
-	struct world *w = without_refraction("../bench/scenes", "pool.xml");
+	struct world *w = world_without_refraction("../bench/scenes", "pool.xml");
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_true(merging_finds_rare_light(w, seed));
 	world_free(w);
@@ -298,7 +298,7 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 		struct render_choice c;
 		choose_for(w, seed, 16, &r, &c);
 		assert_int_equal(strncmp(r.integrator, "erpt", 4), 0);
-		c.path_misses_light = c.has_narrow_lobes = c.transmits = false;
+		c.path_misses_light = c.has_narrow_lobes = c.has_transmission = false;
 		would += strcmp(render_choice_integrator(&c), "path") == 0;
 	}
 	assert_true(would >= SEEDS - 1);
@@ -323,17 +323,17 @@ static void path_is_not_chosen_where_glass_may_focus_light(void **state)
 	world_free(w);
 }
 
-static void light_through_water_begins_chains(void **state)
+static void light_through_water_needs_chains(void **state)
 {
 	(void)state;
-	struct world *w = without_refraction("displaced", "water.xml");
+	struct world *w = world_without_refraction("displaced", "water.xml");
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_true(merging_finds_rare_light(w, seed));
 	world_free(w);
 }
 
 /* A scene seen and lit through glass: a few samples in 16,384 find most of the light, and the others look clean. */
-static void light_that_few_samples_find_begins_chains(void **state)
+static void light_that_few_samples_find_needs_chains(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("../bench/scenes", "torus.xml", 160, 90);
@@ -352,7 +352,7 @@ static void light_that_is_found_by_luck_needs_chains(void **state)
 	world_free(w);
 }
 
-static void where_no_light_is_found_the_longest_search_goes_on(void **state)
+static void scene_without_found_light_gets_chains(void **state)
 {
 	(void)state;
 	struct world *w =
@@ -366,7 +366,7 @@ static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 
 /* Longer renders have longer pilots, up to one or two seconds for each kind of sample, because pilots use one thread.
  */
-static void the_pilot_of_hours_is_bounded(void **state)
+static void pilot_of_a_long_render_is_bounded(void **state)
 {
 	(void)state;
 	struct world *w =
@@ -403,7 +403,7 @@ static void the_same_request_gives_the_same_choice(void **state)
 }
 
 /* Crops of a film are assembled, so one integrator must render them all. */
-static void a_crop_is_rendered_as_the_whole_is(void **state)
+static void crop_gets_the_integrator_of_the_whole_film(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
@@ -488,7 +488,7 @@ static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
 	world_free(w);
 }
 
-static void what_cannot_be_rendered_is_said(void **state)
+static void unrenderable_scene_is_refused_with_a_reason(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("box", "box.xml", 60, 50);
@@ -513,27 +513,27 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(samples_that_are_all_alike_have_no_variance),
 		cmocka_unit_test(fog_is_not_merged),
-		cmocka_unit_test(clouds_focus_nothing),
+		cmocka_unit_test(null_faces_of_clouds_focus_no_light),
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
 		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),
-		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_erpt4),
+		cmocka_unit_test(light_of_bounded_range_is_given_to_erpt4),
 		cmocka_unit_test(a_lamp_behind_glass_that_path_never_hits_needs_chains),
 		cmocka_unit_test(light_that_path_never_finds_may_be_easy_for_bdpt),
-		cmocka_unit_test(light_that_no_sample_meets_is_known_by_merging),
+		cmocka_unit_test(merging_detects_light_that_no_sample_meets),
 		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
 		cmocka_unit_test(path_is_not_chosen_where_glass_may_focus_light),
-		cmocka_unit_test(light_through_water_begins_chains),
-		cmocka_unit_test(light_that_few_samples_find_begins_chains),
+		cmocka_unit_test(light_through_water_needs_chains),
+		cmocka_unit_test(light_that_few_samples_find_needs_chains),
 		cmocka_unit_test(light_that_is_found_by_luck_needs_chains),
-		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
-		cmocka_unit_test(the_pilot_of_hours_is_bounded),
+		cmocka_unit_test(scene_without_found_light_gets_chains),
+		cmocka_unit_test(pilot_of_a_long_render_is_bounded),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
-		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
+		cmocka_unit_test(crop_gets_the_integrator_of_the_whole_film),
 		cmocka_unit_test(a_short_render_has_a_brief_pilot),
 		cmocka_unit_test(the_pilot_is_a_small_part_of_the_render),
 		cmocka_unit_test(a_render_without_a_number_of_samples_has_a_short_pilot),
-		cmocka_unit_test(what_cannot_be_rendered_is_said),
+		cmocka_unit_test(unrenderable_scene_is_refused_with_a_reason),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The rule that chooses an integrator from the figures of a pilot, and the sentence that gives the reason; against a
  * table written by hand. */
-#include "worker/render/choose.h"
+#include "worker/render/choose_integrator.h"
 #include "worker/render/render.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static void the_rule(void **state)
+static void rule_follows_the_table(void **state)
 {
 	(void)state;
 	enum { FLAT, FOCUSES, MISSES };
@@ -92,7 +92,7 @@ static void the_rule(void **state)
 					  .has_narrow_lobes = cases[i].scene != FLAT};
 		assert_string_equal(render_choice_integrator(&c), cases[i].name);
 		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
-		c.media_emit = true; /* emitting media: the next best */
+		c.has_emitting_media = true; /* emitting media: the next best */
 		assert_string_equal(render_choice_integrator(&c),
 				    strcmp(cases[i].name, "hslt") ? cases[i].name : "erpt");
 	}
@@ -100,14 +100,14 @@ static void the_rule(void **state)
 
 /* In half of the brief pilots of the demo scene no sample is a firefly; and bdpt8 takes five times as long as erpt4
  * for a lamp behind frosted glass that the pilot missed. */
-static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
+static void brief_pilots_and_glass_need_erpt4(void **state)
 {
 	(void)state;
 	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .has_narrow_lobes = true};
 	assert_string_equal(render_choice_integrator(&c), "bdpt8");
-	c.transmits = true;
+	c.has_transmission = true;
 	assert_string_equal(render_choice_integrator(&c), "erpt4");
-	c.transmits = false;
+	c.has_transmission = false;
 	c.is_brief = true;
 	assert_string_equal(render_choice_integrator(&c), "erpt4");
 	c.has_narrow_lobes = false;
@@ -116,7 +116,7 @@ static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 
 /* A point light and a mirror ball in a room: one sample in four with a light sub-path suffices for the little light
  * that path cannot find. */
-static void little_that_path_misses_needs_few_light_paths(void **state)
+static void little_light_that_path_misses_needs_few_light_subpaths(void **state)
 {
 	(void)state;
 	const struct render_choice easy = {.path = {1, 0, 4, 4, 1, 0},
@@ -187,7 +187,7 @@ static void light_that_photons_see_is_not_rare(void **state)
 }
 
 /* Where path alone settles the choice, no figures of bdpt change it. */
-static void what_is_settled_is_the_same_with_bdpt(void **state)
+static void settled_choice_ignores_figures_of_bdpt(void **state)
 {
 	(void)state;
 	static const double costs[] = {0, 1, INFINITY}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
@@ -235,12 +235,12 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_rule),
-		cmocka_unit_test(a_brief_pilot_and_glass_are_not_left_to_samples_alone),
-		cmocka_unit_test(little_that_path_misses_needs_few_light_paths),
+		cmocka_unit_test(rule_follows_the_table),
+		cmocka_unit_test(brief_pilots_and_glass_need_erpt4),
+		cmocka_unit_test(little_light_that_path_misses_needs_few_light_subpaths),
 		cmocka_unit_test(light_that_is_rare_by_merging_needs_chains),
 		cmocka_unit_test(light_that_photons_see_is_not_rare),
-		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),
+		cmocka_unit_test(settled_choice_ignores_figures_of_bdpt),
 		cmocka_unit_test(the_reason_is_a_sentence_without_figures),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,7 +10,7 @@
 #include "common/plan/resample.h"
 #include "tests/support/leases.h"
 #include "tests/support/worlds.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 #include "worker/render/render.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/mutation/mixture.h"
@@ -29,27 +29,27 @@ enum { GROUPS = 4, PARTS = 2, CHAINS = 16, BOOTSTRAP = 2048, ROUNDS = 2, SPP_EPO
 
 /* ---- recorded numbers ---- */
 
-struct number {
+struct random_block {
 	uint64_t stream, index, step, block, owner;
 };
 
 static struct {
-	bool on;
+	bool is_on;
 	uint64_t owner;
-	struct number *all;
-	size_t count, room;
-} noted;
+	struct random_block *blocks;
+	size_t count, capacity;
+} recorded;
 
-static void note(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block)
+static void record_block(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block)
 {
-	if (!noted.on)
+	if (!recorded.is_on)
 		return;
-	if (noted.count == noted.room) {
-		noted.room = noted.room ? 2 * noted.room : 1 << 16;
-		noted.all = realloc(noted.all, noted.room * sizeof *noted.all);
-		assert_non_null(noted.all);
+	if (recorded.count == recorded.capacity) {
+		recorded.capacity = recorded.capacity ? 2 * recorded.capacity : 1 << 16;
+		recorded.blocks = realloc(recorded.blocks, recorded.capacity * sizeof *recorded.blocks);
+		assert_non_null(recorded.blocks);
 	}
-	noted.all[noted.count++] = (struct number){stream, index, step, block, noted.owner};
+	recorded.blocks[recorded.count++] = (struct random_block){stream, index, step, block, recorded.owner};
 }
 
 void __real_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
@@ -64,30 +64,30 @@ void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uin
 void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
 			 double out[4])
 {
-	note(stream, index, step, block);
+	record_block(stream, index, step, block);
 	__real_rng_uniform4(seed, stream, index, step, block, out);
 }
 
 void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
 		      uint64_t out[4])
 {
-	note(stream, index, step, block);
+	record_block(stream, index, step, block);
 	__real_rng_bits4(seed, stream, index, step, block, out);
 }
 
-static void record_numbers(bool on)
+static void set_recording(bool on)
 {
-	noted.on = on;
+	recorded.is_on = on;
 	if (!on) {
-		free(noted.all);
-		noted.all = NULL;
-		noted.count = noted.room = 0;
+		free(recorded.blocks);
+		recorded.blocks = NULL;
+		recorded.count = recorded.capacity = 0;
 	}
 }
 
-static int by_number(const void *a, const void *b)
+static int compare_blocks(const void *a, const void *b)
 {
-	return memcmp(a, b, sizeof(struct number));
+	return memcmp(a, b, sizeof(struct random_block));
 }
 
 /* ---- renders ---- */
@@ -143,24 +143,24 @@ static struct plan plan_of(const struct world *w, const struct integrator_proper
 	return p;
 }
 
-/* Runs all leases of a job, recording their numbers by group; `look` sees each batch. The brightness map belongs to
- * the plan: all groups share it, but none of its numbers. It is recorded as one more group. */
-static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b),
-		    void *user)
+/* Runs all leases of a job, recording their numbers by group; `look_at_batch` sees each batch. The brightness map
+ * belongs to the plan: all groups share it, but none of its numbers. It is recorded as one more group. */
+static void run_all(const struct world *w, const struct plan *p,
+		    void (*look_at_batch)(void *user, const struct batch *b), void *user)
 {
 	struct bootstrap *s;
 	struct batch before[GROUPS * PARTS] = {{.key = {0}}};
 	uint64_t seeds[GROUPS][CHAINS / GROUPS];
 	struct brightness *map;
-	noted.owner = GROUPS;
+	recorded.owner = GROUPS;
 	assert_int_equal(render_brightness_map_new(w, p, &map, NULL), 0);
 	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
-		noted.owner = i / PARTS;
+		recorded.owner = i / PARTS;
 		struct batch b =
 			leases_run(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
-		look(user, &b);
+		look_at_batch(user, &b);
 		batch_fini(&b);
 	}
 	for (uint32_t g = 0; g < GROUPS && p->kind == PLAN_CHAINS; g++)
@@ -174,10 +174,10 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 		if (before[lease].states)
 			in = (struct lease_input){.chain_count = before[lease].state_count,
 						  .states = before[lease].states};
-		noted.owner = group;
+		recorded.owner = group;
 		struct batch b =
 			leases_run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
-		look(user, &b);
+		look_at_batch(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
 	}
@@ -200,13 +200,13 @@ static void groups_share_no_random_number(void **state)
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		struct plan p = plan_of(w, render_integrator_at(i));
 		size_t own[GROUPS + 1] = {0};
-		record_numbers(true);
+		set_recording(true);
 		run_all(w, &p, ignore_batch, NULL);
-		qsort(noted.all, noted.count, sizeof *noted.all, by_number);
-		for (size_t n = 0; n < noted.count; n++) {
-			const struct number *a = &noted.all[n], *b = a + 1;
+		qsort(recorded.blocks, recorded.count, sizeof *recorded.blocks, compare_blocks);
+		for (size_t n = 0; n < recorded.count; n++) {
+			const struct random_block *a = &recorded.blocks[n], *b = a + 1;
 			own[a->owner]++;
-			if (n + 1 < noted.count && memcmp(a, b, offsetof(struct number, owner)) == 0 &&
+			if (n + 1 < recorded.count && memcmp(a, b, offsetof(struct random_block, owner)) == 0 &&
 			    a->owner != b->owner)
 				fail_msg(
 					"%s: groups %u and %u ask for the same number: stream %u, index %llu, step %llu, block %llu",
@@ -216,7 +216,7 @@ static void groups_share_no_random_number(void **state)
 		}
 		for (uint32_t g = 0; g < GROUPS; g++)
 			assert_true(own[g] > BOOTSTRAP / GROUPS + ROUNDS * EPOCH);
-		record_numbers(false);
+		set_recording(false);
 	}
 	world_free(w);
 }
@@ -235,14 +235,15 @@ static void chains_start_from_their_groups_bootstrap(void **state)
 		atomic_bool stop = false;
 		struct local_run r = {.world = w, .plan = &p, .threads = 1, .stop = &stop};
 		struct error e = {""};
-		record_numbers(true);
+		set_recording(true);
 		if (local_run(&r, &e))
 			fail_msg("%s", e.text);
 		canvas_free(r.canvas);
-		for (size_t n = 0; n < noted.count; n++)
-			if (noted.all[n].stream == RNG_BOOTSTRAP && noted.all[n].block == 0 && noted.all[n].step == 0)
-				looks[noted.all[n].index]++;
-		record_numbers(false);
+		for (size_t n = 0; n < recorded.count; n++)
+			if (recorded.blocks[n].stream == RNG_BOOTSTRAP && recorded.blocks[n].block == 0 &&
+			    recorded.blocks[n].step == 0)
+				looks[recorded.blocks[n].index]++;
+		set_recording(false);
 		for (uint64_t n = 0; n < BOOTSTRAP; n++) {
 			assert_true(looks[n] > 0); /* all groups together have drawn every sample */
 			started[n / (BOOTSTRAP / GROUPS)] += looks[n] > 1;
@@ -274,16 +275,17 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 			}
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
-		record_numbers(true);
+		set_recording(true);
 		boot = leases_run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
 				  &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&boot);
-		for (size_t k = 0; k < noted.count; k++) {
-			looks += noted.all[k].stream == RNG_BOOTSTRAP;
-			assert_true(noted.all[k].stream != RNG_BOOTSTRAP || noted.all[k].index == first + n);
+		for (size_t k = 0; k < recorded.count; k++) {
+			looks += recorded.blocks[k].stream == RNG_BOOTSTRAP;
+			assert_true(recorded.blocks[k].stream != RNG_BOOTSTRAP ||
+				    recorded.blocks[k].index == first + n);
 		}
 		assert_true(looks > 0);
-		record_numbers(false);
+		set_recording(false);
 	}
 	world_free(w);
 }
@@ -308,16 +310,16 @@ static struct world *closed_room(void)
 }
 
 /* Finds the blocks of a bootstrap sample's numbers that were asked for, and returns their number. */
-enum { BLOCKS_MOST = 4096 };
-static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MOST])
+enum { BLOCKS_MAX = 4096 };
+static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MAX])
 {
 	size_t count = 0;
-	memset(asked, 0, BLOCKS_MOST * sizeof *asked);
-	for (size_t k = 0; k < noted.count; k++) {
-		const struct number *n = &noted.all[k];
+	memset(asked, 0, BLOCKS_MAX * sizeof *asked);
+	for (size_t k = 0; k < recorded.count; k++) {
+		const struct random_block *n = &recorded.blocks[k];
 		if (n->stream != RNG_BOOTSTRAP || n->index != index || n->step != 0)
 			continue;
-		assert_true(n->block < BLOCKS_MOST);
+		assert_true(n->block < BLOCKS_MAX);
 		count += !asked[n->block];
 		asked[n->block] = true;
 	}
@@ -326,11 +328,11 @@ static size_t blocks_of(uint64_t index, bool asked[BLOCKS_MOST])
 
 /* A chain of full paths starts from the very sample that had the weight, with sub-paths of the same length: it asks
  * for the same numbers, and for those that choose one of the sample's paths. */
-static void a_start_is_the_sample_again(void **state)
+static void chain_starts_from_the_very_bootstrap_sample(void **state)
 {
 	(void)state;
 	enum { SAMPLES = 64 };
-	static bool before[SAMPLES][BLOCKS_MOST], after[BLOCKS_MOST];
+	static bool before[SAMPLES][BLOCKS_MAX], after[BLOCKS_MAX];
 	const struct integrator_properties *hslt = NULL;
 	for (size_t i = 0; render_integrator_at(i); i++)
 		if (render_integrator_at(i)->has_mutations)
@@ -341,26 +343,26 @@ static void a_start_is_the_sample_again(void **state)
 	p.max_depth = 40;
 	uint64_t first = plan_bootstrap_range(&p, 1, 0).begin;
 	size_t longest = 0, lit = 0;
-	record_numbers(true);
+	set_recording(true);
 	struct batch boot = leases_run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
 	for (uint64_t n = 0; n < SAMPLES; n++) {
 		size_t asked = blocks_of(first + n, before[n]);
 		longest = asked > longest ? asked : longest;
 	}
-	record_numbers(false);
+	set_recording(false);
 	for (uint64_t n = 0; n < SAMPLES; n++) {
 		if (!(boot.weights[n] > 0))
 			continue;
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		size_t extra = 0;
-		record_numbers(true);
+		set_recording(true);
 		struct batch b =
 			leases_run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
 				   &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&b);
 		blocks_of(first + n, after);
-		record_numbers(false);
-		for (size_t k = 0; k < BLOCKS_MOST; k++) {
+		set_recording(false);
+		for (size_t k = 0; k < BLOCKS_MAX; k++) {
 			assert_true(!before[n][k] || after[k]);
 			extra += after[k] && !before[n][k];
 		}
@@ -374,7 +376,7 @@ static void a_start_is_the_sample_again(void **state)
 
 /* The random number for resampling differs between groups, too; otherwise all groups would take seeds at the same
  * quantiles. */
-static void groups_resample_by_themselves(void **state)
+static void groups_resample_with_their_own_numbers(void **state)
 {
 	(void)state;
 	struct plan p = {.seed = 3, .groups = PLAN_GROUPS_MAX};
@@ -383,16 +385,16 @@ static void groups_resample_by_themselves(void **state)
 			assert_true(plan_resample_offset(&p, g) != plan_resample_offset(&p, h));
 }
 
-struct counted {
-	uint64_t weights, dark, bootstrap, samples, independent, proposed;
+struct weight_counts {
+	uint64_t weights, dark_weights, bootstrap, samples, independent, proposed;
 	uint32_t strategy;
 };
 
-static void count(void *user, const struct batch *b)
+static void count_weights(void *user, const struct batch *b)
 {
-	struct counted *c = user;
+	struct weight_counts *c = user;
 	for (uint64_t i = 0; i < b->weight_count; i++)
-		c->dark += b->weights[i] == 0;
+		c->dark_weights += b->weights[i] == 0;
 	c->weights += b->weight_count;
 	if (b->key.kind == LEASE_BOOTSTRAP) {
 		c->bootstrap += b->counters[COUNT_INDEPENDENT];
@@ -410,24 +412,24 @@ static void count(void *user, const struct batch *b)
 /* About half of the samples are dark (fewer if emitters are connected to the lens), and must be counted: all of them
  * by the bootstrap and by samples; all proposals by strategies; and by pssmlt 0.3 of the steps, within five standard
  * errors (without the dark ones, the share would be 6 standard errors lower). */
-static void zeros_are_counted(void **state)
+static void dark_samples_are_counted(void **state)
 {
 	(void)state;
 	struct world *w = lit_world();
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		struct plan p = plan_of(w, render_integrator_at(i));
-		struct counted c = {0};
+		struct weight_counts c = {0};
 		struct mixture m;
 		if (p.mutations[0]) {
 			assert_int_equal(mixture_parse(p.mutations, &m, NULL), 0);
 			c.strategy = m.independent_index;
 		}
-		run_all(w, &p, count, &c);
+		run_all(w, &p, count_weights, &c);
 		double share = (double)c.independent / (double)c.samples;
 		print_message("%s: %llu of %llu bootstrap samples dark, %.3f of %llu samples independent\n",
-			      p.integrator, (unsigned long long)c.dark, (unsigned long long)c.weights, share,
+			      p.integrator, (unsigned long long)c.dark_weights, (unsigned long long)c.weights, share,
 			      (unsigned long long)c.samples);
-		assert_true(c.weights == BOOTSTRAP && c.dark > BOOTSTRAP / 8 && c.dark < BOOTSTRAP);
+		assert_true(c.weights == BOOTSTRAP && c.dark_weights > BOOTSTRAP / 8 && c.dark_weights < BOOTSTRAP);
 		assert_true(c.bootstrap == c.weights);
 		if (p.kind == PLAN_SAMPLES)
 			assert_true(c.independent == c.samples &&
@@ -487,9 +489,9 @@ int main(void)
 		cmocka_unit_test(groups_share_no_random_number),
 		cmocka_unit_test(chains_start_from_their_groups_bootstrap),
 		cmocka_unit_test(chains_start_from_the_samples_that_were_chosen),
-		cmocka_unit_test(a_start_is_the_sample_again),
-		cmocka_unit_test(groups_resample_by_themselves),
-		cmocka_unit_test(zeros_are_counted),
+		cmocka_unit_test(chain_starts_from_the_very_bootstrap_sample),
+		cmocka_unit_test(groups_resample_with_their_own_numbers),
+		cmocka_unit_test(dark_samples_are_counted),
 		cmocka_unit_test(each_group_has_its_own_b),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -82,7 +82,7 @@ static void assert_same(const struct batch *a, const struct batch *b)
 {
 	assert_memory_equal(a->counters, b->counters, sizeof a->counters);
 	assert_true(a->independent_sum == b->independent_sum && a->independent_square == b->independent_square);
-	assert_true(a->beyond_sum == b->beyond_sum);
+	assert_true(a->overlong_sum == b->overlong_sum);
 	assert_int_equal(a->tile_count, b->tile_count);
 	for (uint32_t i = 0; i < a->tile_count; i++) {
 		const struct tile *s = &a->tiles[i], *t = &b->tiles[i];
@@ -118,7 +118,7 @@ static void find_seeds(const struct world *w, const struct plan *p, uint32_t gro
 }
 
 /* All leases of a job of samples or bootstraps, forwards and backwards: the same bytes for each. */
-static void test_any_order(void **state)
+static void results_do_not_depend_on_the_order_of_leases(void **state)
 {
 	(void)state;
 	struct world *w = small_world("gaussian");
@@ -140,7 +140,7 @@ static void test_any_order(void **state)
 }
 
 /* Chains from seeds, and from states saved by another run. */
-static void test_chains(void **state)
+static void chain_results_depend_only_on_seeds_and_states(void **state)
 {
 	(void)state;
 	struct world *w = small_world("box");
@@ -170,7 +170,7 @@ static void test_chains(void **state)
 
 /* Light so weak that contributions are denormal or zero, and light as strong as a scene may have: every lease gives a
  * batch that passes its checks (leases_run() verifies them), with each integrator. */
-static void test_extreme_light(void **state)
+static void extreme_light_passes_the_batch_checks(void **state)
 {
 	(void)state;
 	const char *radiance[] = {"1e-320", "1e-306", "1e-293", "1e-290", "1e-160", "1e30"};
@@ -204,7 +204,8 @@ static void test_extreme_light(void **state)
 	}
 }
 
-static int end_of(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+static int lease_result_code(const struct world *w, const struct plan *p, struct lease_key k,
+			     const struct lease_input *in)
 {
 	struct batch b;
 	struct error e = {""};
@@ -215,7 +216,7 @@ static int end_of(const struct world *w, const struct plan *p, struct lease_key 
 	return rc;
 }
 
-static void test_refused(void **state)
+static void invalid_leases_are_refused(void **state)
 {
 	(void)state;
 	struct world *w = small_world("box");
@@ -226,15 +227,16 @@ static void test_refused(void **state)
 	struct lease_input in = {.chain_count = 2, .seeds = seeds};
 	struct batch b = leases_run(w, &p, k0, &in);
 	/* Wrong counts, and no input at all. */
-	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
+	assert_int_equal(lease_result_code(w, &p, k0, NULL), -EINVAL);
 	for (uint32_t n = 0; n < 4; n++)
 		if (n != 2)
-			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = n, .seeds = seeds}),
-					 -EINVAL);
-	assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = 2}), -EINVAL);
+			assert_int_equal(
+				lease_result_code(w, &p, k0, &(struct lease_input){.chain_count = n, .seeds = seeds}),
+				-EINVAL);
+	assert_int_equal(lease_result_code(w, &p, k0, &(struct lease_input){.chain_count = 2}), -EINVAL);
 	/* States: of another chain, truncated, too long, random bytes. */
 	struct chain_state s[2] = {b.states[1], b.states[0]};
-	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = s}), -EILSEQ);
+	assert_int_equal(lease_result_code(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = s}), -EILSEQ);
 	struct dice d = dice_for_test("hostile states");
 	size_t good = 0;
 	for (size_t i = 0; i < dice_scaled_count(300); i++) {
@@ -252,7 +254,7 @@ static void test_refused(void **state)
 		uint8_t *exact = malloc(size ? size : 1);
 		memcpy(exact, bytes, size);
 		struct chain_state hostile[2] = {{exact, size}, b.states[1]};
-		int rc = end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = hostile});
+		int rc = lease_result_code(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = hostile});
 		/* Other numbers in [0,1) may give another path that carries light: a valid state. */
 		assert_true(rc == -EILSEQ || (rc == 0 && i % 3 == 2));
 		good += rc == 0;
@@ -264,31 +266,31 @@ static void test_refused(void **state)
 	struct batch boot = leases_run(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
-			assert_int_equal(
-				end_of(w, &p, k0,
-				       &(struct lease_input){.chain_count = 2, .seeds = (uint64_t[]){seeds[0], i}}),
-				0);
+			assert_int_equal(lease_result_code(w, &p, k0,
+							   &(struct lease_input){.chain_count = 2,
+										 .seeds = (uint64_t[]){seeds[0], i}}),
+					 0);
 			break;
 		}
 	batch_fini(&boot);
 	/* Plans that do not belong to this world. */
 	other = p;
 	other.width++;
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	other = p;
 	other.border = 3;
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	other = p;
 	strcpy(other.integrator, "none");
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	other = p;
 	strcpy(other.integrator, "path");
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	other = p;
 	other.max_depth = 0;
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	other.max_depth = PATH_EDGES_MAX + 1;
-	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	assert_int_equal(lease_result_code(w, &other, k0, &in), -EINVAL);
 	batch_fini(&b);
 	world_free(w);
 	/* A scene with scattering media. */
@@ -298,14 +300,14 @@ static void test_refused(void **state)
 					 "<medium type='homogeneous' name='interior'/></shape>");
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		p = plan_of(w, render_integrator_at(i)->name);
-		assert_int_equal(end_of(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL), 0);
+		assert_int_equal(lease_result_code(w, &p, make_key(LEASE_BOOTSTRAP, 0, 0, 0), NULL), 0);
 	}
 	world_free(w);
 }
 
 /* A camera without a direction computes 0/0 in the first path of every kind of lease: an error names the place, and
  * neither the thread nor the world keeps any effect of it. */
-static void test_invalid_operation(void **state)
+static void invalid_operation_fails_only_its_lease(void **state)
 {
 	(void)state;
 #if defined(__x86_64__)
@@ -343,7 +345,7 @@ static void test_invalid_operation(void **state)
 #endif
 }
 
-static void test_stop(void **state)
+static void leases_can_be_stopped(void **state)
 {
 	(void)state;
 	struct world *w = small_world("box");
@@ -376,7 +378,7 @@ static void test_stop(void **state)
 
 /* A lease ticks however few pixels there are: a worker whose lease does not tick for long counts as hung, and one
  * that does not poll stops late. */
-static void test_ticks(void **state)
+static void every_lease_ticks(void **state)
 {
 	(void)state;
 	enum { TICK = 16 };
@@ -403,7 +405,7 @@ static void test_ticks(void **state)
 	world_free(w);
 }
 
-static float *film_of(const struct world *w, const struct plan *p)
+static float *render_film(const struct world *w, const struct plan *p)
 {
 	float *film = calloc((size_t)p->width * p->height * 3, sizeof *film);
 	double *sum = calloc((size_t)p->width * p->height * 3, sizeof *sum);
@@ -426,7 +428,7 @@ static float *film_of(const struct world *w, const struct plan *p)
 
 /* A crop draws the samples of the full render. Film points are computed from the crop's own corner: they differ by
  * roundings of double, which a path through glass can magnify, and sums are rounded to float in other strips. */
-static void test_crop(void **state)
+static void crop_has_the_pixels_of_the_whole_film(void **state)
 {
 	(void)state;
 	const char *filters[] = {"box", "tent", "gaussian"};
@@ -437,7 +439,7 @@ static void test_crop(void **state)
 		crop.crop_y = 9;
 		crop.crop_width = 50;
 		crop.crop_height = 31;
-		float *whole = film_of(w, &p), *part = film_of(w, &crop);
+		float *whole = render_film(w, &p), *part = render_film(w, &crop);
 		size_t differ = 0;
 		double light = 0;
 		for (uint32_t y = 0; y < p.height; y++)
@@ -463,7 +465,7 @@ static void test_crop(void **state)
 /* Constant light remains constant to the border with every filter, because sampling extends beyond the film. Each
  * pixel's mean must lie within the noise of its samples, since the kernel's weights vary; a border that lost energy
  * would be darker by at least 10 %. */
-static void test_borders(void **state)
+static void constant_light_is_constant_to_the_border(void **state)
 {
 	(void)state;
 	const char *filters[] = {"box", "tent", "gaussian"};
@@ -475,7 +477,7 @@ static void test_borders(void **state)
 			filters[f]);
 		struct plan p = plan_of(w, "path");
 		p.epoch = 512;
-		float *film = film_of(w, &p);
+		float *film = render_film(w, &p);
 		double expected = 2 * w->grey_xyz[1] * (double)(p.epoch * p.groups), border = 0, inner = 0;
 		size_t borders = 0, inners = 0;
 		for (uint32_t y = 0; y < p.height; y++)
@@ -498,7 +500,7 @@ static void test_borders(void **state)
 }
 
 /* The n-th allocation fails, for each n: an error or a result, nothing else; the sanitizer finds leaks. */
-static void test_no_memory(void **state)
+static void failed_allocation_is_an_error_without_leaks(void **state)
 {
 	(void)state;
 	struct world *w = small_world("tent");
@@ -537,16 +539,16 @@ static void test_no_memory(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_order),
-		cmocka_unit_test(test_chains),
-		cmocka_unit_test(test_extreme_light),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_invalid_operation),
-		cmocka_unit_test(test_stop),
-		cmocka_unit_test(test_ticks),
-		cmocka_unit_test(test_crop),
-		cmocka_unit_test(test_borders),
-		cmocka_unit_test(test_no_memory),
+		cmocka_unit_test(results_do_not_depend_on_the_order_of_leases),
+		cmocka_unit_test(chain_results_depend_only_on_seeds_and_states),
+		cmocka_unit_test(extreme_light_passes_the_batch_checks),
+		cmocka_unit_test(invalid_leases_are_refused),
+		cmocka_unit_test(invalid_operation_fails_only_its_lease),
+		cmocka_unit_test(leases_can_be_stopped),
+		cmocka_unit_test(every_lease_ticks),
+		cmocka_unit_test(crop_has_the_pixels_of_the_whole_film),
+		cmocka_unit_test(constant_light_is_constant_to_the_border),
+		cmocka_unit_test(failed_allocation_is_an_error_without_leaks),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,7 +34,7 @@
 #define LEVEL 1e-6
 enum { GROUPS = 16 };
 /* t at level 1e-6 with 15 degrees of freedom, plus the 95 % quantile for the power. */
-#define FOUND 9.4
+#define DETECTABLE_T 9.4
 
 /* ---- one path, many techniques ---- */
 
@@ -44,7 +44,7 @@ static bool same_place(const struct path_vertex *a, const struct path_vertex *b)
 }
 
 /* Returns whether technique s, from the sub-paths in c, makes x. */
-static bool is_made(const struct path_context *c, const struct full_path *x, unsigned s)
+static bool is_made_by_technique(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned k = x->edges;
 	for (unsigned i = 0; s >= 2 && i < s; i++)
@@ -57,7 +57,7 @@ static bool is_made(const struct path_context *c, const struct full_path *x, uns
 }
 
 struct seen {
-	uint64_t paths, again;
+	uint64_t paths, agreements;
 	uint32_t techniques, classes; /* as bits */
 };
 
@@ -81,13 +81,14 @@ static void check_around(struct path_context *c, struct full_path *x, unsigned f
 	for (uint32_t i = 0; i < around.count; i++) {
 		const struct candidate *a = &around.candidates[i];
 		unsigned passed = a->s > 0 ? full_path_passed_count(c, x, a->s) : 0;
-		if (a->edges != x->edges || a->passed_count != passed || a->s == from || !is_made(c, x, a->s))
+		if (a->edges != x->edges || a->passed_count != passed || a->s == from ||
+		    !is_made_by_technique(c, x, a->s))
 			continue;
 		path_classes_begin(&classes, c, x->edges + 1 - a->s, a->s, &unused);
 		assert_int_equal(
 			path_classes_of_joint(&classes, a->s, x->edges + 1 - a->s - a->passed_count, a->passed_count),
 			class);
-		seen->again++;
+		seen->agreements++;
 		seen->techniques |= 1u << (a->s < 31 ? a->s : 31);
 	}
 }
@@ -142,11 +143,12 @@ static void check_techniques(const struct world *w, const char *name)
 		}
 	}
 	print_message("%s: %llu paths, %llu by another technique, techniques %#x, classes %#x\n", name,
-		      (unsigned long long)seen.paths, (unsigned long long)seen.again, seen.techniques, seen.classes);
-	assert_true(seen.again > dice_scaled_count(100));
+		      (unsigned long long)seen.paths, (unsigned long long)seen.agreements, seen.techniques,
+		      seen.classes);
+	assert_true(seen.agreements > dice_scaled_count(100));
 }
 
-static void techniques_agree(void **state)
+static void techniques_give_a_path_one_class(void **state)
 {
 	(void)state;
 	for (const struct room *r = rooms; r->name; r++) {
@@ -201,23 +203,23 @@ static void sample_classes(const struct world *w, const char *integrator, const 
 }
 
 static void check_class(const char *test, unsigned class, double share, double difference_error, double p,
-			double *least)
+			double *min_difference)
 {
 	/* For classes that independent samples rarely find, the means are far from normally distributed. */
 	if (share >= 0.01 && p < LEVEL)
 		fail_msg("%s: the energies of class '%s', share %.3g, differ (p = %g)", test, path_class_name(class),
 			 share, p);
 	if (share >= 0.1)
-		*least = fmax(*least, FOUND * difference_error);
+		*min_difference = fmax(*min_difference, DETECTABLE_T * difference_error);
 }
 
-static void end_judging(const char *test, double least, double most)
+static void assert_detectable_difference(const char *test, double min_difference, double max_difference)
 {
-	print_message("%s: finds a class that differs by %.1f %%\n", test, 100 * least);
-	assert_true(dice_scaled_count(1000) < 1000 || (least > 0 && least < most));
+	print_message("%s: finds a class that differs by %.1f %%\n", test, 100 * min_difference);
+	assert_true(dice_scaled_count(1000) < 1000 || (min_difference > 0 && min_difference < max_difference));
 }
 
-static void samples_agree(void **state)
+static void integrators_of_samples_agree_on_class_energies(void **state)
 {
 	(void)state;
 	static const char *const of[] = {"glass", "mirror", "prism"};
@@ -225,7 +227,7 @@ static void samples_agree(void **state)
 		static double a[PATH_CLASSES][GROUPS], b[PATH_CLASSES][GROUPS];
 		char test[64];
 		struct world *w = room_build_named(of[i]);
-		double all = 0, least = 0;
+		double all = 0, min_difference = 0;
 		snprintf(test, sizeof test, "%s, path and bdpt", of[i]);
 		sample_classes(w, "path", of[i], a);
 		sample_classes(w, "bdpt", test, b);
@@ -237,9 +239,9 @@ static void samples_agree(void **state)
 				d[g] = a[k][g] - b[k][g];
 			struct stats_mean m = stats_mean_test(d, GROUPS, 0);
 			if (mean > 0)
-				check_class(test, k, mean / all, m.error / mean, m.p, &least);
+				check_class(test, k, mean / all, m.error / mean, m.p, &min_difference);
 		}
-		end_judging(test, least, 0.15);
+		assert_detectable_difference(test, min_difference, 0.15);
 		world_free(w);
 	}
 }
@@ -279,7 +281,7 @@ static void check_chains(const char *room, const char *integrator, uint64_t step
 {
 	char test[64];
 	struct world *w = room_build_named(room);
-	double all = 0, least = 0;
+	double all = 0, min_difference = 0;
 	snprintf(test, sizeof test, "%s, chains of %s", room, integrator);
 	struct plan p = make_plan(w, integrator, test);
 	p.chains = GROUPS * 32;
@@ -294,15 +296,16 @@ static void check_chains(const char *room, const char *integrator, uint64_t step
 		double t = of->difference_t, p_value = isnan(t) ? 1 : stats_student_t_p(t, GROUPS - 1);
 		if (of->bootstrap > 0)
 			check_class(test, k, of->bootstrap / all,
-				    hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
+				    hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value,
+				    &min_difference);
 	}
-	end_judging(test, least, 0.25);
+	assert_detectable_difference(test, min_difference, 0.25);
 	canvas_image_fini(&img);
 	canvas_free(c);
 	world_free(w);
 }
 
-static void chains_agree(void **state)
+static void chains_agree_on_class_energies(void **state)
 {
 	(void)state;
 	static const char *const of[] = {"glass", "prism"};
@@ -316,7 +319,7 @@ static void chains_agree(void **state)
 
 /* With a box filter of one pixel, the light of a splat lies in its own pixel, so that the sum of a tile equals its
  * first moment. */
-static void film_agrees(const struct plan *p, const struct batch *b)
+static void check_tiles_against_film(const struct plan *p, const struct batch *b)
 {
 	uint32_t tiles = batch_film_tile_count(p), sequences = batch_sequence_count(p),
 		 across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, next = 0;
@@ -344,7 +347,7 @@ static void film_agrees(const struct plan *p, const struct batch *b)
 	assert_true(time > 0.01 * classes && time < 0.99 * classes); /* the crop is a part of the sampled area */
 }
 
-static void moments_are_the_films(void **state)
+static void moments_are_those_of_the_film(void **state)
 {
 	(void)state;
 	static const char *const integrators[] = {"pssmlt", "hslt"};
@@ -380,15 +383,16 @@ static void moments_are_the_films(void **state)
 		p.groups = GROUPS;
 		struct world moved = *w; /* a border wider than the filter needs, so that chains leave the crop */
 		moved.settings.border = p.border;
-		struct canvas *c = run_chains(&moved, &p, film_agrees);
+		struct canvas *c = run_chains(&moved, &p, check_tiles_against_film);
 		assert_int_equal(canvas_image_init(c, false, &img, NULL), 0);
 		float sum = 0;
 		for (uint32_t t = 0; t < batch_film_tile_count(&p); t++) {
 			print_message("%s: tile %u: R %.3f error %.3f share %.3f\n", integrators[i], t,
-				      (double)img.r_hat[t], (double)img.tile_error[t], (double)img.tile_share[t]);
+				      (double)img.r_hat[t], (double)img.tile_error[t],
+				      (double)img.tile_energy_share[t]);
 			assert_true(img.r_hat[t] > 0.99f &&
 				    img.r_hat[t] < (p.epoch < 2000 ? 2 : 1.2f)); /* short chains have mixed less */
-			sum += img.tile_share[t];
+			sum += img.tile_energy_share[t];
 		}
 		assert_true(fabsf(sum - 1) < 1e-5f);
 		canvas_image_fini(&img);
@@ -400,10 +404,10 @@ static void moments_are_the_films(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(techniques_agree),
-		cmocka_unit_test(samples_agree),
-		cmocka_unit_test(chains_agree),
-		cmocka_unit_test(moments_are_the_films),
+		cmocka_unit_test(techniques_give_a_path_one_class),
+		cmocka_unit_test(integrators_of_samples_agree_on_class_energies),
+		cmocka_unit_test(chains_agree_on_class_energies),
+		cmocka_unit_test(moments_are_those_of_the_film),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

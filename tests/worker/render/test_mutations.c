@@ -9,7 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-static void the_canonical_spelling_stays(void **state)
+static void canonical_spelling_is_unchanged(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {NULL, "", "hslt", "hslt=0.9,independent=0.1", "independent,hslt=2e-1"};
@@ -61,7 +61,7 @@ static void other_texts_are_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_canonical_spelling_stays),
+		cmocka_unit_test(canonical_spelling_is_unchanged),
 		cmocka_unit_test(other_texts_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

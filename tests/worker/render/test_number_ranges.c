@@ -20,17 +20,18 @@
 #include <cmocka.h>
 
 enum { TEXT = 8192 };
-static const unsigned numeric = VALUE_INT | VALUE_FLOAT | VALUE_POINT | VALUE_RGB | VALUE_SPECTRUM;
+static const unsigned numeric_types = VALUE_INT | VALUE_FLOAT | VALUE_POINT | VALUE_RGB | VALUE_SPECTRUM;
 
-static const unsigned char sky[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x90\x70\x80";
-static const char obj[] = "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nv 0 1 0\nf 1 2 3\nf 1 4 2\n";
-static const char ply[] =
+static const unsigned char sky_bytes[] =
+	"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x90\x70\x80";
+static const char obj_text[] = "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nv 0 1 0\nf 1 2 3\nf 1 4 2\n";
+static const char ply_text[] =
 	"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 	"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
 /* A volume with two bytes along x. */
-static const char vol[] = "VOL\3\3\0\0\0\2\0\0\0\1\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"
-			  "\0\0\200?\0\0\200?\0\0\200?\10\20";
+static const char vol_bytes[] = "VOL\3\3\0\0\0\2\0\0\0\1\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"
+				"\0\0\200?\0\0\200?\0\0\200?\10\20";
 
 /* Prints the property as XML; returns 0 if the parameter takes no value of this type. */
 static int print_value(char *out, size_t size, const struct param *p, enum value_type type, double x)
@@ -53,7 +54,7 @@ static int print_value(char *out, size_t size, const struct param *p, enum value
 }
 
 /* Returns other properties without which this one has no effect. */
-static const char *needed_beside(const struct plugin_decl *d, const struct param *p)
+static const char *companion_properties(const struct plugin_decl *d, const struct param *p)
 {
 	if (strcmp(p->name, "displacement") == 0)
 		return "<integer name='displacement_level' value='1'/>";
@@ -80,7 +81,7 @@ static const char *file_of(const struct plugin_decl *d)
 }
 
 #define PROPERTY "%s%s%s" /* file, companions, the property itself */
-#define LOOK "<transform name='to_world'><lookat origin='0.1,1,4' target='0,0.3,0' up='0,1,0'/></transform>"
+#define LOOK_AT "<transform name='to_world'><lookat origin='0.1,1,4' target='0,0.3,0' up='0,1,0'/></transform>"
 #define FLOOR \
 	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>%s</shape>"
 #define BALL \
@@ -106,10 +107,10 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 				     : "");
 	bool nested = d->cls == PLUGIN_FILM || d->cls == PLUGIN_RFILTER || d->cls == PLUGIN_SAMPLER;
 	if (d->cls == PLUGIN_SENSOR)
-		snprintf(sensor, sizeof sensor, "\n<sensor type='%s'>" LOOK "%s%s</sensor>", d->type, companion,
+		snprintf(sensor, sizeof sensor, "\n<sensor type='%s'>" LOOK_AT "%s%s</sensor>", d->type, companion,
 			 property);
 	else
-		snprintf(sensor, sizeof sensor, "<sensor type='perspective'>" LOOK "%s%s%s</sensor>",
+		snprintf(sensor, sizeof sensor, "<sensor type='perspective'>" LOOK_AT "%s%s%s</sensor>",
 			 d->cls == PLUGIN_RFILTER ? "<film type='hdrfilm'>" : "", nested ? own : "",
 			 d->cls == PLUGIN_RFILTER ? "</film>" : "");
 	if (d->cls == PLUGIN_BSDF || medium || in_medium)
@@ -128,31 +129,31 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 }
 
 struct counts {
-	size_t params, trials, rendered, refused, bad;
+	size_t params, trials, rendered, refused, failures;
 };
 
-static int try_value(const struct plugin_decl *d, const struct param *p, enum value_type type, double x, char *said,
-		     size_t size, char *text)
+static int render_with_value(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
+			     char *error_text, size_t size, char *text)
 {
 	char property[512];
 	if (!print_value(property, sizeof property, p, type, x))
 		return 0;
-	print_scene(text, d, needed_beside(d, p), property);
+	print_scene(text, d, companion_properties(d, p), property);
 	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
-					    {"sky.hdr", sky, sizeof sky - 1},
-					    {"m.obj", obj, sizeof obj - 1},
-					    {"m.ply", ply, sizeof ply - 1},
-					    {"m.vol", vol, sizeof vol - 1},
+					    {"sky.hdr", sky_bytes, sizeof sky_bytes - 1},
+					    {"m.obj", obj_text, sizeof obj_text - 1},
+					    {"m.ply", ply_text, sizeof ply_text - 1},
+					    {"m.vol", vol_bytes, sizeof vol_bytes - 1},
 					    measured_file_all()[3],
 					    {NULL, NULL, 0}};
-	return scene_trial_run(files, said, size);
+	return scene_trial_run(files, error_text, size);
 }
 
-static void check_inside(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
-			 struct counts *c)
+static void check_value_in_range(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
+				 struct counts *c)
 {
-	char said[1024], text[TEXT], own[120], positive[120];
-	int end = try_value(d, p, type, x, said, sizeof said, text);
+	char error_text[1024], text[TEXT], own[120], positive[120];
+	int end = render_with_value(d, p, type, x, error_text, sizeof error_text, text);
 	if (!end)
 		return;
 	snprintf(own, sizeof own, "%s=%.9g is outside [", p->name, x);
@@ -160,26 +161,27 @@ static void check_inside(const struct plugin_decl *d, const struct param *p, enu
 	c->trials++;
 	c->rendered += end == TRIAL_RENDERED;
 	c->refused += end == TRIAL_REFUSED;
-	if (end == TRIAL_RENDERED || (end == TRIAL_REFUSED && !strstr(said, own) && !strstr(said, positive)))
+	if (end == TRIAL_RENDERED ||
+	    (end == TRIAL_REFUSED && !strstr(error_text, own) && !strstr(error_text, positive)))
 		return;
-	c->bad++;
-	print_message("%s, %s = %g: ends with %d: %s\n", d->type, p->name, x, end, said);
+	c->failures++;
+	print_message("%s, %s = %g: ends with %d: %s\n", d->type, p->name, x, end, error_text);
 }
 
-static void check_beyond(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
-			 struct counts *c)
+static void check_value_out_of_range(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
+				     struct counts *c)
 {
-	char said[1024], text[TEXT];
-	int end = try_value(d, p, type, x, said, sizeof said, text);
+	char error_text[1024], text[TEXT];
+	int end = render_with_value(d, p, type, x, error_text, sizeof error_text, text);
 	if (!end)
 		return;
 	c->trials++;
-	if (end == TRIAL_REFUSED && strstr(said, "s.xml:2: ") &&
-	    (strstr(said, "is outside [") || strstr(said, " must be positive")))
+	if (end == TRIAL_REFUSED && strstr(error_text, "s.xml:2: ") &&
+	    (strstr(error_text, "is outside [") || strstr(error_text, " must be positive")))
 		return;
-	c->bad++;
+	c->failures++;
 	print_message("%s, %s = %g, beyond its range [%g, %g]: ends with %d: %s\n", d->type, p->name, x, p->min, p->max,
-		      end, said);
+		      end, error_text);
 }
 
 /* Returns the next representable number towards `toward`; for integers the next whole number. */
@@ -192,52 +194,53 @@ static void check_param(const struct plugin_decl *d, const struct param *p, stru
 {
 	c->params++;
 	if (!(p->min < p->max)) {
-		c->bad++;
+		c->failures++;
 		print_message("%s of %s has no range\n", p->name, d->type);
 		return;
 	}
 	for (unsigned type = 1; type <= p->types; type <<= 1) {
-		if (!(p->types & type & numeric))
+		if (!(p->types & type & numeric_types))
 			continue;
 		enum value_type t = (enum value_type)type;
-		check_inside(d, p, t, p->min, c);
+		check_value_in_range(d, p, t, p->min, c);
 		if (strcmp(p->name, "displacement_level") != 0) /* 2^27 triangles: gigabytes */
-			check_inside(d, p, t, p->max, c);
+			check_value_in_range(d, p, t, p->max, c);
 		if (type == VALUE_FLOAT && p->min >= 0)
-			check_inside(d, p, t, sqrt(fmax(p->min, 1e-30)) * sqrt(p->max), c);
+			check_value_in_range(d, p, t, sqrt(fmax(p->min, 1e-30)) * sqrt(p->max), c);
 		void (*check)(const struct plugin_decl *, const struct param *, enum value_type, double,
-			      struct counts *) =
-			(p->types & VALUE_CLAMPED) && t != VALUE_SPECTRUM ? check_inside : check_beyond;
+			      struct counts *) = (p->types & VALUE_CLAMPED) && t != VALUE_SPECTRUM
+							 ? check_value_in_range
+							 : check_value_out_of_range;
 		check(d, p, t, next_number(t, p->max, INFINITY), c);
 		check(d, p, t, next_number(t, p->min, -INFINITY), c);
 	}
 }
 
-static void test_ranges(void **state)
+static void every_number_has_a_range_that_is_enforced(void **state)
 {
 	(void)state;
 	struct counts c = {0};
 	const struct param *seen[256];
 	size_t seen_count = 0, numbers = 0; /* every fourth number under sanitizers */
 	for (const struct plugin_decl *d = render_plugins(); d->type; d++) {
-		bool again = false; /* tables shared by several plug-ins */
+		bool is_repeated = false; /* tables shared by several plug-ins */
 		for (size_t i = 0; i < seen_count; i++)
-			again |= seen[i] == d->params;
+			is_repeated |= seen[i] == d->params;
 		assert_true(seen_count < 256);
 		seen[seen_count++] = d->params;
-		for (const struct param *p = d->params; p && p->name && !again; p++)
-			if (p->status == PARAM_UNDERSTOOD && (p->types & numeric) &&
+		for (const struct param *p = d->params; p && p->name && !is_repeated; p++)
+			if (p->status == PARAM_UNDERSTOOD && (p->types & numeric_types) &&
 			    (!test_is_scaled() || numbers++ % 4 == 0))
 				check_param(d, p, &c);
 	}
 	print_message("%zu numbers, %zu trials: %zu rendered, %zu refused by another rule, %zu bad\n", c.params,
-		      c.trials, c.rendered, c.refused, c.bad);
-	assert_int_equal(c.bad, 0);
+		      c.trials, c.rendered, c.refused, c.failures);
+	assert_int_equal(c.failures, 0);
 	assert_true(c.params > 60 && c.rendered > c.params);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_ranges)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_number_has_a_range_that_is_enforced)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,7 +14,7 @@
 
 enum { SAMPLES = 1 << 14, MERGED = 1 << 12, WIDTH = 160, HEIGHT = 90 };
 
-static double share_of(struct world *w, uint64_t seed)
+static double rare_light_share(struct world *w, uint64_t seed)
 {
 	static struct path_context c;
 	static struct path_sample sample;
@@ -44,19 +44,19 @@ static double share_of(struct world *w, uint64_t seed)
 
 /* The share must lie within these bounds for each seed; the shares in the scene's own table (README of tests/bench)
  * keep a distance from them of half as much again or more. */
-static void expect_share(const char *folder, const char *file, double least, double most)
+static void expect_share(const char *folder, const char *file, double min_share, double max_share)
 {
 	struct world *w = world_from_own_scene(folder, file, WIDTH, HEIGHT);
 	for (uint64_t seed = 0; seed < 3; seed++) {
-		double share = share_of(w, seed);
+		double share = rare_light_share(w, seed);
 		printf("%s: %.4f\n", file, share);
-		if (!(share >= least && share <= most))
-			fail_msg("%s: %g, not within %g and %g", file, share, least, most);
+		if (!(share >= min_share && share <= max_share))
+			fail_msg("%s: %g, not within %g and %g", file, share, min_share, max_share);
 	}
 	world_free(w);
 }
 
-static void test_light_that_is_rare(void **state)
+static void rare_light_has_a_large_share(void **state)
 {
 	(void)state;
 	expect_share("../bench/scenes", "pool.xml", 0.03, 0.2);
@@ -64,7 +64,7 @@ static void test_light_that_is_rare(void **state)
 	expect_share("displaced", "water.xml", 0.15, 0.6);
 }
 
-static void test_light_that_is_not(void **state)
+static void common_light_has_a_small_share(void **state)
 {
 	(void)state;
 	expect_share("../bench/scenes", "ring.xml", 0, 0.02);
@@ -75,7 +75,7 @@ static void test_light_that_is_not(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_light_that_is_rare),
-					   cmocka_unit_test(test_light_that_is_not)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(rare_light_has_a_large_share),
+					   cmocka_unit_test(common_light_has_a_small_share)};
 	return cmocka_run_group_tests_name("worker/render/rare_light", tests, NULL, NULL);
 }

@@ -47,14 +47,14 @@ static const struct setting_case cases[] = {
 
 static void run_case(const struct setting_case *c, struct stationary_result *r)
 {
-	struct stationary_options how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_NO_FAULT};
+	struct stationary_options options = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_NO_FAULT};
 	char name[96];
 	snprintf(name, sizeof name, "%s %s", c->scene, c->accuracy);
 	worlds_accuracy = c->accuracy;
-	struct world *w = test_world(c->scene);
+	struct world *w = make_test_world(c->scene);
 	worlds_accuracy = NULL;
 	assert_non_null(w);
-	stationary_run(w, name, &how, r);
+	stationary_run(w, name, &options, r);
 	world_free(w);
 	print_message(
 		"%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n",
@@ -63,7 +63,7 @@ static void run_case(const struct setting_case *c, struct stationary_result *r)
 		r->worst_function >= 0 ? stationary_function_name(r->worst_function) : "", r->cpu_seconds, r->failure);
 }
 
-static void test_stationary(void **state)
+static void settings_leave_the_distribution_of_paths_unchanged(void **state)
 {
 	(void)state;
 	static struct stationary_result r;
@@ -75,7 +75,7 @@ static void test_stationary(void **state)
 	assert_int_equal(wrong, 0);
 }
 
-static void test_bias_is_found(void **state)
+static void planted_bias_is_found(void **state)
 {
 	(void)state;
 	static struct stationary_result r;
@@ -84,7 +84,7 @@ static void test_bias_is_found(void **state)
 }
 
 /* Almost all of the noise comes from drawing wavelengths. */
-static void test_wavelengths(void **state)
+static void fewer_wavelengths_keep_the_mean(void **state)
 {
 	(void)state;
 	static struct agreement_image image[3];
@@ -98,8 +98,8 @@ static void test_wavelengths(void **state)
 				BALL("0,-0.2,0", "0.8",
 				     METAL("0.4")) "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
 		worlds_accuracy = NULL;
-		struct agreement_options how = {"path", 5 << 14, 64, 0, 0};
-		agreement_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &how, &image[i]);
+		struct agreement_options options = {"path", 5 << 14, 64, 0, 0};
+		agreement_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &options, &image[i]);
 		world_free(w);
 	}
 	agreement_check("1 wavelength against 4", &image[1], &image[0]);
@@ -109,9 +109,9 @@ static void test_wavelengths(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stationary),
-		cmocka_unit_test(test_bias_is_found),
-		cmocka_unit_test(test_wavelengths),
+		cmocka_unit_test(settings_leave_the_distribution_of_paths_unchanged),
+		cmocka_unit_test(planted_bias_is_found),
+		cmocka_unit_test(fewer_wavelengths_keep_the_mean),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

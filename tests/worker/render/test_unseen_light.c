@@ -22,13 +22,13 @@
 
 enum { WIDTH = 48, HEIGHT = 36, SAMPLES = 1 << 13, DEPTH = 4 };
 
-struct looking {
+struct light_search {
 	struct path_context context;
 	struct brightness map;
 	uint64_t counters[BATCH_COUNTERS];
 };
 
-static void begin(struct looking *l, const struct world *w, uint64_t seed)
+static void light_search_init(struct light_search *l, const struct world *w, uint64_t seed)
 {
 	struct error e;
 	l->context = (struct path_context){.w = w,
@@ -46,7 +46,7 @@ static void begin(struct looking *l, const struct world *w, uint64_t seed)
 
 /* Returns the mean contribution relative to the brightness at its position, without contributions brighter than usual
  * ones: both integrators have few fireflies here, and one of path's is as bright as the whole image. */
-static double mean_of(struct looking *l, path_tracer *trace, uint64_t seed, uint64_t count)
+static double mean_relative_contribution(struct light_search *l, path_tracer *trace, uint64_t seed, uint64_t count)
 {
 	static struct path_sample sample;
 	double sum = 0;
@@ -56,22 +56,22 @@ static double mean_of(struct looking *l, path_tracer *trace, uint64_t seed, uint
 		trace(&l->context, &s.base, &sample);
 		for (uint32_t k = 0; k < sample.splat_count; k++) {
 			const struct splat *p = &sample.splats[k];
-			double y = (p->xyz[0] + p->xyz[1] + p->xyz[2]) * brightness_scale(&l->map, p->x, p->y);
+			double y = (p->xyz[0] + p->xyz[1] + p->xyz[2]) * brightness_inverse_at(&l->map, p->x, p->y);
 			sum += y < 1 << 12 ? y : 0;
 		}
 	}
 	return sum / (double)count;
 }
 
-static void what_path_lacks(void **state)
+static void path_lacks_light_that_bdpt_finds(void **state)
 {
 	(void)state;
 	const uint64_t drawn = (1u << 17) / test_scale();
-	static struct looking l;
+	static struct light_search l;
 	struct world *w = world_from_own_scene("bulb", "scene.xml", WIDTH, HEIGHT);
-	begin(&l, w, 0);
-	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_bidirectional, 11, drawn),
-	       lacks = 1 - path / both;
+	light_search_init(&l, w, 0);
+	double path = mean_relative_contribution(&l, path_trace, 10, drawn),
+	       both = mean_relative_contribution(&l, path_trace_bidirectional, 11, drawn), lacks = 1 - path / both;
 	for (uint64_t seed = 0; seed < (test_is_scaled() ? 1 : 3); seed++) {
 		struct plan_unseen by_path, by_bdpt;
 		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
@@ -111,16 +111,16 @@ static void what_path_lacks(void **state)
 /* The means of 131,072 samples each are known to a few per cent. Path lacks more than a tenth of the light, which
  * lies everywhere, so the root mean square of the unseen light is about this share; the light that events in the fog
  * send to the camera is not measured. */
-static void what_path_lacks_in_fog(void **state)
+static void path_lacks_light_that_bdpt_finds_in_fog(void **state)
 {
 	(void)state;
 	const uint64_t drawn = (1u << 17) / test_scale();
-	static struct looking l;
+	static struct light_search l;
 	struct world *w = world_from_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
 	assert_true(w->effects.scattering);
-	begin(&l, w, 0);
-	double path = mean_of(&l, path_trace, 10, drawn), both = mean_of(&l, path_trace_bidirectional, 11, drawn),
-	       lacks = (both - path) / path;
+	light_search_init(&l, w, 0);
+	double path = mean_relative_contribution(&l, path_trace, 10, drawn),
+	       both = mean_relative_contribution(&l, path_trace_bidirectional, 11, drawn), lacks = (both - path) / path;
 	for (uint64_t seed = 0; seed < (test_is_scaled() ? 1 : 3); seed++) {
 		struct plan_unseen by_path, by_bdpt;
 		assert_int_equal(unseen_light_estimate(&l.context, &l.map, 0, seed, 0, SAMPLES, &by_path), 0);
@@ -144,7 +144,7 @@ static struct plan_request request_of(const char *integrator, enum plan_kind kin
 	return r;
 }
 
-static double unseen_of(const struct world *w, struct plan_request r)
+static double unseen_light_of_request(const struct world *w, struct plan_request r)
 {
 	struct plan_request again = r;
 	struct error e;
@@ -154,28 +154,28 @@ static double unseen_of(const struct world *w, struct plan_request r)
 	return r.unseen.mean_squares[3];
 }
 
-static void light_unseen_by_a_request(void **state)
+static void unseen_light_is_estimated_for_requests_of_samples(void **state)
 {
 	(void)state;
 	struct error e;
 	struct world *bulb = world_from_own_scene("bulb", "scene.xml", WIDTH, HEIGHT),
 		     *box = world_from_own_scene("box", "box.xml", WIDTH, HEIGHT);
-	double path = unseen_of(bulb, request_of("path", PLAN_SAMPLES));
+	double path = unseen_light_of_request(bulb, request_of("path", PLAN_SAMPLES));
 	assert_true(path > 5e-5);
-	assert_true(unseen_of(bulb, request_of("erpt", PLAN_SAMPLES)) < 0.1 * path);
+	assert_true(unseen_light_of_request(bulb, request_of("erpt", PLAN_SAMPLES)) < 0.1 * path);
 	/* Chains find the light that samples of bdpt find. */
-	double chains = unseen_of(bulb, request_of("hslt", PLAN_CHAINS));
-	assert_true(chains < 0.1 * path && chains == unseen_of(bulb, request_of("bdpt", PLAN_SAMPLES)));
+	double chains = unseen_light_of_request(bulb, request_of("hslt", PLAN_CHAINS));
+	assert_true(chains < 0.1 * path && chains == unseen_light_of_request(bulb, request_of("bdpt", PLAN_SAMPLES)));
 
-	assert_true(unseen_of(box, request_of("path", PLAN_SAMPLES)) == 0); /* no lobe is narrow */
+	assert_true(unseen_light_of_request(box, request_of("path", PLAN_SAMPLES)) == 0); /* no lobe is narrow */
 	struct plan_request crop = request_of("path", PLAN_SAMPLES);
 	crop.crop_width = crop.crop_height = 8;
-	assert_true(unseen_of(bulb, crop) == path);
-	struct plan_request none = request_of("path", PLAN_SAMPLES);
-	none.width = 0;
-	assert_int_equal(render_unseen_light(bulb, &none, &e), -EINVAL);
+	assert_true(unseen_light_of_request(bulb, crop) == path);
+	struct plan_request invalid_request = request_of("path", PLAN_SAMPLES);
+	invalid_request.width = 0;
+	assert_int_equal(render_unseen_light(bulb, &invalid_request, &e), -EINVAL);
 	struct world *fog = world_from_text(WIDTH, HEIGHT, FOGGY_ROOM, "0.05,0.05,0.1");
-	assert_true(unseen_of(fog, request_of("path", PLAN_SAMPLES)) > 1e-3);
+	assert_true(unseen_light_of_request(fog, request_of("path", PLAN_SAMPLES)) > 1e-3);
 	world_free(bulb);
 	world_free(box);
 	world_free(fog);
@@ -183,7 +183,8 @@ static void light_unseen_by_a_request(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(what_path_lacks), cmocka_unit_test(what_path_lacks_in_fog),
-					   cmocka_unit_test(light_unseen_by_a_request)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(path_lacks_light_that_bdpt_finds),
+					   cmocka_unit_test(path_lacks_light_that_bdpt_finds_in_fog),
+					   cmocka_unit_test(unseen_light_is_estimated_for_requests_of_samples)};
 	return cmocka_run_group_tests_name("worker/render/unseen_light", tests, NULL, NULL);
 }

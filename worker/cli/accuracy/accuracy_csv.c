@@ -62,38 +62,38 @@ static void put_row(struct text_file *p, const struct accuracy_context *x, size_
 	const struct accuracy_setting *s = &x->design->settings[i];
 	const struct accuracy_figures *f = &j->figures[i];
 	char name[96];
-	bool reference = i == ACCURACY_REFERENCE, front = f->dominated_by == i;
+	bool reference = i == ACCURACY_REFERENCE, front = f->dominating_index == i;
 	accuracy_setting_name(s, name, sizeof name);
-	text_file_field(p, name);
+	text_file_put_field(p, name);
 	text_file_put(p, ",");
-	text_file_field(p, s->parameter);
+	text_file_put_field(p, s->parameter);
 	text_file_put(p, ",");
-	text_file_field(p, s->value);
+	text_file_put_field(p, s->value);
 	text_file_put(p, ",%s,%u,",
 		      i == ACCURACY_DEFAULT ? "default"
 		      : reference	    ? "reference"
 					    : "sweep",
 		      s->max_depth);
-	text_file_field(p, s->mixture);
+	text_file_put_field(p, s->mixture);
 	text_file_put(p, ",");
-	text_file_field(p, s->accuracy);
+	text_file_put_field(p, s->accuracy);
 	text_file_put(p, ",%llu,%llu", (unsigned long long)f->mutations, (unsigned long long)f->rounds);
 	put_number(p, f->cpu_seconds);
 	put_interval(p, f->mutation_us);
-	put_number(p, f->acceptance);
-	put_number(p, f->failed_walks);
+	put_number(p, f->acceptance_rate);
+	put_number(p, f->failed_walk_share);
 	put_number(p, f->rays_per_mutation);
-	put_interval(p, f->equal_mutations);
-	put_interval(p, f->equal_time);
+	put_interval(p, f->error_at_equal_mutations);
+	put_interval(p, f->error_at_equal_time);
 	put_interval(p, f->bias_mean);
 	put_interval(p, f->bias_worst_block);
-	text_file_put(p, ",%u,%u", f->worst_block % j->blocks_across, f->worst_block / j->blocks_across);
+	text_file_put(p, ",%u,%u", f->worst_block_index % j->blocks_across, f->worst_block_index / j->blocks_across);
 	put_number(p, f->bias_lower_joint);
 	put_number(p, f->bias_upper);
 	text_file_put(p, reference ? ",," : ",%d,", front);
 	if (!front) {
-		accuracy_setting_name(&x->design->settings[f->dominated_by], name, sizeof name);
-		text_file_field(p, name);
+		accuracy_setting_name(&x->design->settings[f->dominating_index], name, sizeof name);
+		text_file_put_field(p, name);
 	}
 	text_file_put(p, "\n");
 }

@@ -130,7 +130,7 @@ static bool set_value(const char *base, const char *name, const char *value, cha
 }
 
 /* Returns why a setting of the renderer has no effect in this scene; NULL if it has one. */
-static const char *why_no_effect(const struct planner *p, const struct render_setting *k)
+static const char *no_effect_reason(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
 		return "it determines what is rendered, not how accurately";
@@ -194,7 +194,7 @@ static void sweep_depth(struct planner *p)
 struct weighted_strategy {
 	char name[32];
 	double weight;
-	bool independent;
+	bool is_independent;
 };
 
 /* Reads a canonical mixture, which has NAME=WEIGHT for each strategy. Returns the number of strategies. */
@@ -206,7 +206,7 @@ static int read_entries(const char *mixture, struct weighted_strategy entry[PLAN
 		plan_strategy_name(mixture, (uint32_t)i, entry[i].name, sizeof entry[i].name);
 		const char *equals = strchr(at, '=');
 		entry[i].weight = equals ? strtod(equals + 1, NULL) : 1;
-		entry[i].independent =
+		entry[i].is_independent =
 			strcmp(entry[i].name, "bidirectional") == 0 || strcmp(entry[i].name, "independent") == 0;
 		at = strchr(at, ',') ? strchr(at, ',') + 1 : at;
 	}
@@ -229,7 +229,7 @@ static double independent_share(const struct weighted_strategy *entry, int n)
 	double total = 0, independent = 0;
 	for (int i = 0; i < n; i++) {
 		total += entry[i].weight;
-		independent += entry[i].independent ? entry[i].weight : 0;
+		independent += entry[i].is_independent ? entry[i].weight : 0;
 	}
 	return total > 0 ? independent / total : 0;
 }
@@ -260,7 +260,7 @@ static void sweep_independent_share(struct planner *p)
 		for (int i = 0; i < n; i++) {
 			changed[i] = base[i];
 			changed[i].weight *=
-				base[i].independent ? shares[k] / current : (1 - shares[k]) / (1 - current);
+				base[i].is_independent ? shares[k] / current : (1 - shares[k]) / (1 - current);
 		}
 		snprintf(value, sizeof value, "%.2g", shares[k]);
 		struct accuracy_setting *setting =
@@ -305,7 +305,7 @@ static void sweep_mixture(struct planner *p)
 		memcpy(changed, base, sizeof base);
 		changed[i].weight = 0;
 		snprintf(value, sizeof value, "without %.31s", base[i].name);
-		if (!base[i].independent && base[i].weight < 0.5 * total)
+		if (!base[i].is_independent && base[i].weight < 0.5 * total)
 			try_mixture(p, s, changed, n, value);
 	}
 	for (size_t k = 0; (name = render_mutation_at(k, &summary)) != NULL; k++) {
@@ -353,7 +353,7 @@ static void add_reference(struct planner *p)
 	for (size_t i = 0; i < sizeof reference_values / sizeof *reference_values; i++) {
 		const struct render_setting *k = find_setting(reference_values[i].parameter);
 		char accuracy[PLAN_ACCURACY_MAX];
-		if (k && !why_no_effect(p, k) &&
+		if (k && !no_effect_reason(p, k) &&
 		    set_value(s->accuracy, reference_values[i].parameter, reference_values[i].value, accuracy))
 			memcpy(s->accuracy, accuracy, sizeof accuracy);
 	}
@@ -374,7 +374,7 @@ static int check_parameters(struct planner *p)
 	const char *parameter;
 	for (const char *at = p->parameters; at && *at;) {
 		size_t n = strcspn(at, ",");
-		struct spelling s = {.wanted = name};
+		struct spelling s = {.wanted_name = name};
 		bool found = false;
 		*names = 0;
 		snprintf(name, sizeof name, "%.*s", (int)(n < sizeof name ? n : sizeof name - 1), at);
@@ -403,7 +403,7 @@ int accuracy_make_design(struct accuracy_design *d, const struct plan_request *b
 	add_reference(&p);
 	const struct render_setting *k;
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
-		const char *reason = why_no_effect(&p, k);
+		const char *reason = no_effect_reason(&p, k);
 		if (!is_listed(parameters, k->name))
 			continue;
 		if (reason)

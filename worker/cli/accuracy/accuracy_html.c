@@ -39,7 +39,7 @@ static const char style[] =
 static void put_paragraph(struct text_file *p, const char *text)
 {
 	text_file_put(p, "<p>");
-	text_file_escaped(p, text);
+	text_file_put_escaped(p, text);
 	text_file_put(p, "</p>\n");
 }
 
@@ -57,8 +57,8 @@ static void put_interval_cell(struct text_file *p, struct interval x, bool sign,
 
 static void put_failed_walks_cell(struct text_file *p, const struct accuracy_figures *f)
 {
-	if (isfinite(f->failed_walks))
-		text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
+	if (isfinite(f->failed_walk_share))
+		text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walk_share);
 	else
 		text_file_put(p, "<td>&#8211;</td>");
 }
@@ -68,13 +68,13 @@ static void put_name_cell(struct text_file *p, const struct accuracy_context *x,
 	char name[96];
 	accuracy_setting_name(&x->design->settings[i], name, sizeof name);
 	text_file_put(p, "<td class=\"t\">");
-	text_file_escaped(p, name);
+	text_file_put_escaped(p, name);
 	text_file_put(p, "</td>");
 }
 
 static void begin_row(struct text_file *p, const struct accuracy_context *x, size_t i)
 {
-	bool front = x->judgement->figures[i].dominated_by == i && i != ACCURACY_REFERENCE;
+	bool front = x->judgement->figures[i].dominating_index == i && i != ACCURACY_REFERENCE;
 	text_file_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
 }
 
@@ -92,22 +92,24 @@ static void put_verdict(struct text_file *p, const struct accuracy_context *x)
 			"what follows may be chance. Give it more minutes (--budget), a smaller film (--size) or fewer "
 			"parameters (--parameters).</p>");
 	text_file_put(p, "<p>");
-	if (d->dominated_by == ACCURACY_DEFAULT) {
+	if (d->dominating_index == ACCURACY_DEFAULT) {
 		text_file_put(
 			p, "<b>The default lies on the front</b>: no other setting has surely less error at equal time "
 			   "without a sign of more bias, or surely less bias without surely more error.");
 	} else {
-		const struct accuracy_figures *b = &f[d->dominated_by];
-		accuracy_setting_name(&x->design->settings[d->dominated_by], name, sizeof name);
+		const struct accuracy_figures *b = &f[d->dominating_index];
+		accuracy_setting_name(&x->design->settings[d->dominating_index], name, sizeof name);
 		text_file_put(p, "<b>The default does not lie on the front</b>: <b>");
-		text_file_escaped(p, name);
+		text_file_put_escaped(p, name);
 		text_file_put(
 			p,
 			"</b> has a relative error of %.3g %% (%.3g to %.3g) in the time in which the default has "
 			"%.3g %% (%.3g to %.3g), that is %.2f times the speed; its bias is at most %.2g %%%s.",
-			100 * b->equal_time.value, 100 * b->equal_time.low, 100 * b->equal_time.high,
-			100 * d->equal_time.value, 100 * d->equal_time.low, 100 * d->equal_time.high,
-			d->equal_time.value * d->equal_time.value / (b->equal_time.value * b->equal_time.value),
+			100 * b->error_at_equal_time.value, 100 * b->error_at_equal_time.low,
+			100 * b->error_at_equal_time.high, 100 * d->error_at_equal_time.value,
+			100 * d->error_at_equal_time.low, 100 * d->error_at_equal_time.high,
+			d->error_at_equal_time.value * d->error_at_equal_time.value /
+				(b->error_at_equal_time.value * b->error_at_equal_time.value),
 			100 * b->bias_upper, b->bias_lower_joint > 0 ? "" : ", none was seen");
 	}
 	text_file_put(p, "</p>");
@@ -117,7 +119,7 @@ static void put_verdict(struct text_file *p, const struct accuracy_context *x)
 			continue;
 		accuracy_setting_name(&x->design->settings[i], name, sizeof name);
 		text_file_put(p, biased++ ? ", " : "<p>Settings whose bias was seen: ");
-		text_file_escaped(p, name);
+		text_file_put_escaped(p, name);
 		text_file_put(p, " (at least %.2g %%)", 100 * f[i].bias_lower_joint);
 	}
 	text_file_put(p, biased ? ".</p>" : "<p>No bias was seen in any setting.</p>");
@@ -146,7 +148,7 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 	text_file_put(p,
 		      "<p><img alt=\"the scene, from the reference image\" width=\"%u\" src=\"data:image/png;base64,",
 		      j->width < 480 ? j->width * (480 / j->width) : j->width);
-	text_file_base64(p, png, size);
+	text_file_put_base64(p, png, size);
 	text_file_put(p, "\"/><br/><span class=\"note\">The scene, from the reference image.</span></p>\n");
 	mem_free(png);
 	return 0;
@@ -155,7 +157,7 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 static void put_fact(struct text_file *p, const char *name, const char *text)
 {
 	text_file_put(p, "<tr><td class=\"t\">%s</td><td class=\"t\">", name);
-	text_file_escaped(p, text);
+	text_file_put_escaped(p, text);
 	text_file_put(p, "</td></tr>\n");
 }
 
@@ -189,7 +191,7 @@ static void put_facts(struct text_file *p, const struct accuracy_context *x)
 	put_fact(p, "Plan of the default", text);
 	snprintf(text, sizeof text,
 		 "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that",
-		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: the figures so far)" : "",
+		 x->design->count, r->wall_seconds, r->was_interrupted ? " (interrupted: the figures so far)" : "",
 		 x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds, ACCURACY_REFERENCE_SHARE);
 	put_fact(p, "Run", text);
 	snprintf(text, sizeof text, "rendered carefully: %s",
@@ -251,25 +253,25 @@ static void put_summary(struct text_file *p, const struct accuracy_context *x)
 		"<th>bias of the worst block, %%</th><th class=\"t\">verdict</th></tr>\n");
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &j->figures[i];
-		double times = f->equal_time.value / j->figures[ACCURACY_DEFAULT].equal_time.value;
+		double times = f->error_at_equal_time.value / j->figures[ACCURACY_DEFAULT].error_at_equal_time.value;
 		if (i == ACCURACY_REFERENCE)
 			continue;
 		begin_row(p, x, i);
 		put_name_cell(p, x, i);
-		put_interval_cell(p, f->equal_time, false, false);
+		put_interval_cell(p, f->error_at_equal_time, false, false);
 		text_file_put(p, "<td>x %.2f</td>", times * times);
 		struct interval not_shown = {NAN, NAN, NAN};
 		put_interval_cell(p, f->bias_mean, true, f->bias_lower_joint > 0);
 		put_interval_cell(p, j->blocks_across * j->blocks_down == 1 ? not_shown : f->bias_worst_block, true,
 				  f->bias_lower_joint > 0);
-		if (f->dominated_by == i) {
+		if (f->dominating_index == i) {
 			text_file_put(p, "<td class=\"t\">on the front%s</td></tr>\n",
 				      f->bias_lower_joint > 0 ? ", biased" : "");
 			continue;
 		}
-		accuracy_setting_name(&x->design->settings[f->dominated_by], name, sizeof name);
+		accuracy_setting_name(&x->design->settings[f->dominating_index], name, sizeof name);
 		text_file_put(p, "<td class=\"t\">beaten by ");
-		text_file_escaped(p, name);
+		text_file_put_escaped(p, name);
 		text_file_put(p, "</td></tr>\n");
 	}
 	text_file_put(p, "</table>\n");
@@ -288,11 +290,11 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 		put_name_cell(p, x, i);
 		text_file_put(p, "<td>%llu</td><td>%.3g <span class=\"note\">(%.3g to %.3g)</span></td><td>%.3g</td>",
 			      (unsigned long long)f->mutations, f->mutation_us.value, f->mutation_us.low,
-			      f->mutation_us.high, 100 * f->acceptance);
+			      f->mutation_us.high, 100 * f->acceptance_rate);
 		put_failed_walks_cell(p, f);
 		text_file_put(p, "<td>%.3g</td>", f->rays_per_mutation);
 		struct interval not_shown = {NAN, NAN, NAN};
-		put_interval_cell(p, i == ACCURACY_REFERENCE ? not_shown : f->equal_mutations, false, false);
+		put_interval_cell(p, i == ACCURACY_REFERENCE ? not_shown : f->error_at_equal_mutations, false, false);
 		text_file_put(p, "</tr>\n");
 	}
 	text_file_put(p,
@@ -303,7 +305,7 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 static void put_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
 {
 	text_file_put(p, "<h3>");
-	text_file_escaped(p, s->parameter);
+	text_file_put_escaped(p, s->parameter);
 	text_file_put(p, "</h3>\n");
 	char text[300];
 	snprintf(text, sizeof text, "%s.", s->summary);
@@ -319,12 +321,12 @@ static void put_sweep(struct text_file *p, const struct accuracy_context *x, con
 		struct interval not_shown = {NAN, NAN, NAN};
 		begin_row(p, x, i);
 		text_file_put(p, "<td class=\"t\">");
-		text_file_escaped(p, s->values[k]);
+		text_file_put_escaped(p, s->values[k]);
 		text_file_put(p, "%s</td><td>%.3g</td><td>%.3g</td>",
 			      i == ACCURACY_DEFAULT && strcmp(s->values[k], "default") != 0 ? " (default)" : "",
-			      f->mutation_us.value, 100 * f->acceptance);
+			      f->mutation_us.value, 100 * f->acceptance_rate);
 		put_failed_walks_cell(p, f);
-		put_interval_cell(p, f->equal_time, false, false);
+		put_interval_cell(p, f->error_at_equal_time, false, false);
 		put_interval_cell(p, f->bias_mean, true, f->bias_lower_joint > 0);
 		put_interval_cell(p, x->judgement->blocks_across == 1 ? not_shown : f->bias_worst_block, true,
 				  f->bias_lower_joint > 0);
@@ -352,9 +354,9 @@ static int put_page(struct text_file *p, const struct accuracy_context *x, struc
 {
 	text_file_put(p, "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head>"
 			 "<meta charset=\"utf-8\"/><title>What accuracy costs: ");
-	text_file_escaped(p, x->scene);
+	text_file_put_escaped(p, x->scene);
 	text_file_put(p, "</title><style>%s</style></head>\n<body>\n<h1>What accuracy costs in time: ", style);
-	text_file_escaped(p, x->scene);
+	text_file_put_escaped(p, x->scene);
 	text_file_put(p, "</h1>\n");
 	put_verdict(p, x);
 	int rc = put_picture(p, x, e);

@@ -22,14 +22,14 @@
 
 struct judge {
 	const struct accuracy_run *run;
-	struct accuracy_judgement *out;
+	struct accuracy_judgement *judgement;
 	double *mean_image;   /* [pixels * 3]: the mean image of all settings */
-	double *weight;	      /* [pixels * 3], for one setting at a time */
+	double *weights;      /* [pixels * 3], for one setting at a time */
 	double *pixel_errors; /* [2][pixels]: errors of the pixels of one setting, and the same sorted */
 	double *rel_mse;      /* [settings] */
 	double *degrees;      /* [settings]: degrees of freedom of rel_mse */
-	double *blocks;	      /* [settings][groups][cells]: means over the blocks, and over the image */
-	size_t cells, groups;
+	double *block_means;  /* [settings][group_count][cell_count]: means over the blocks, and over the image */
+	size_t cell_count, group_count;
 };
 
 static const struct accuracy_job *get_job(const struct judge *j, size_t i)
@@ -46,7 +46,7 @@ static struct interval interval_around(double x, double log_sd)
 
 static int compute_mean_image(struct judge *j, struct error *e)
 {
-	size_t n = j->run->design->count, values = (size_t)j->out->width * j->out->height * 3;
+	size_t n = j->run->design->count, values = (size_t)j->judgement->width * j->judgement->height * 3;
 	for (size_t i = 0; i < n; i++) {
 		struct canvas_image img;
 		if (canvas_image_init(get_job(j, i)->run.canvas, false, &img, e))
@@ -55,7 +55,7 @@ static int compute_mean_image(struct judge *j, struct error *e)
 			j->mean_image[k] += (double)img.rgb[k] / (double)n;
 		/* The report shows the reference, which has the least noise. */
 		for (size_t k = 0; i == ACCURACY_REFERENCE && k < values; k++)
-			j->out->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
+			j->judgement->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
 		canvas_image_fini(&img);
 	}
 	return 0;
@@ -72,25 +72,26 @@ static void compute_rates(struct accuracy_figures *f, const struct canvas_counts
 			failed += n->strategies[k][failures[i]];
 	}
 	double samples = (double)n->counters[COUNT_SAMPLES];
-	f->acceptance = (double)n->counters[COUNT_ACCEPTED] / samples;
+	f->acceptance_rate = (double)n->counters[COUNT_ACCEPTED] / samples;
 	f->rays_per_mutation =
 		((double)n->counters[COUNT_RAYS_CLOSEST] + (double)n->counters[COUNT_RAYS_SHADOW]) / samples;
-	f->failed_walks = walks ? (double)failed / (double)walks : NAN;
+	f->failed_walk_share = walks ? (double)failed / (double)walks : NAN;
 }
 
 /* Computes the weights of the errors of one setting: 1 / (B^2 + (0.01 m)^2), B the mean image of all settings and m its
  * mean, divided by the number of values; 0 for the pixels with the largest errors. */
 static void compute_weights(struct judge *j, const float *error)
 {
-	size_t pixels = (size_t)j->out->width * j->out->height, trimmed = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
+	size_t pixels = (size_t)j->judgement->width * j->judgement->height,
+	       trimmed = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
 	double m = 0;
 	for (size_t k = 0; k < 3 * pixels; k++)
 		m += j->mean_image[k] / (double)(3 * pixels);
 	for (size_t i = 0; i < pixels; i++) {
 		double sum = 0;
 		for (size_t k = 3 * i; k < 3 * i + 3; k++) {
-			j->weight[k] = 1 / (j->mean_image[k] * j->mean_image[k] + 1e-4 * m * m);
-			sum += j->weight[k] * (double)error[k] * (double)error[k];
+			j->weights[k] = 1 / (j->mean_image[k] * j->mean_image[k] + 1e-4 * m * m);
+			sum += j->weights[k] * (double)error[k] * (double)error[k];
 		}
 		j->pixel_errors[i] = sum;
 	}
@@ -99,7 +100,7 @@ static void compute_weights(struct judge *j, const float *error)
 	qsort(sorted, pixels, sizeof *sorted, compare_doubles);
 	double threshold = sorted[trimmed < pixels ? pixels - 1 - trimmed : 0];
 	for (size_t k = 0; k < 3 * pixels; k++)
-		j->weight[k] = j->pixel_errors[k / 3] > threshold ? 0 : j->weight[k] / (double)(3 * pixels);
+		j->weights[k] = j->pixel_errors[k / 3] > threshold ? 0 : j->weights[k] / (double)(3 * pixels);
 }
 
 /* Returns the degrees of freedom of the chi-square distribution that is spread like the groups' distances
@@ -115,17 +116,17 @@ static double degrees_of_freedom(const double *distance, size_t groups, double m
 
 static int compute_error(struct judge *j, size_t i, struct error *e)
 {
-	struct accuracy_figures *f = &j->out->figures[i];
+	struct accuracy_figures *f = &j->judgement->figures[i];
 	struct canvas_image img;
 	double distance[PLAN_GROUPS_MAX], mean = 0;
 	if (canvas_image_init(get_job(j, i)->run.canvas, false, &img, e))
 		return -ENOMEM;
 	compute_weights(j, img.error);
-	canvas_group_distances(get_job(j, i)->run.canvas, j->weight, distance);
-	for (size_t g = 0; g < j->groups; g++)
-		mean += distance[g] / (double)j->groups;
-	j->rel_mse[i] = mean / (double)(j->groups - 1);
-	j->degrees[i] = mean > 0 ? degrees_of_freedom(distance, j->groups, mean) : 1;
+	canvas_group_distances(get_job(j, i)->run.canvas, j->weights, distance);
+	for (size_t g = 0; g < j->group_count; g++)
+		mean += distance[g] / (double)j->group_count;
+	j->rel_mse[i] = mean / (double)(j->group_count - 1);
+	j->degrees[i] = mean > 0 ? degrees_of_freedom(distance, j->group_count, mean) : 1;
 	f->mutations = img.rounds * plan_round_mutations(&get_job(j, i)->plan);
 	f->rounds = img.rounds;
 	f->cpu_seconds = get_job(j, i)->cpu_seconds;
@@ -138,14 +139,14 @@ static void compute_cost(struct judge *j, size_t i)
 {
 	struct accuracy_job *b = &j->run->jobs[i];
 	struct interval c = stats_median(b->costs, b->cost_count);
-	j->out->figures[i].mutation_us = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
+	j->judgement->figures[i].mutation_us = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
 }
 
 /* Converts the errors of all settings to the default's number of mutations, and to its CPU time: errors are inversely
  * proportional to the square root of either. */
-static void scale_errors(struct judge *j, struct stats_point *points)
+static void scale_errors(struct judge *j, struct front_point *points)
 {
-	struct accuracy_judgement *o = j->out;
+	struct accuracy_judgement *o = j->judgement;
 	const struct accuracy_figures *d = &o->figures[ACCURACY_DEFAULT];
 	o->default_mutations = d->mutations;
 	o->default_cpu_seconds = 1e-6 * d->mutation_us.value * (double)d->mutations;
@@ -156,11 +157,12 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 			cost_sd = 0.5 * log(f->mutation_us.high / f->mutation_us.low) /
 				  (2 * stats_t_quantile(LEVEL, 1e9));
 		double error_per_root_mutation = sqrt(j->rel_mse[i] * (double)f->mutations);
-		f->equal_mutations = interval_around(error_per_root_mutation / sqrt((double)o->default_mutations), sd);
-		f->equal_time = interval_around(error_per_root_mutation *
-							sqrt(1e-6 * f->mutation_us.value / o->default_cpu_seconds),
-						hypot(sd, cost_sd));
-		points[i].log_error = log(f->equal_time.value);
+		f->error_at_equal_mutations =
+			interval_around(error_per_root_mutation / sqrt((double)o->default_mutations), sd);
+		f->error_at_equal_time = interval_around(
+			error_per_root_mutation * sqrt(1e-6 * f->mutation_us.value / o->default_cpu_seconds),
+			hypot(sd, cost_sd));
+		points[i].log_error = log(f->error_at_equal_time.value);
 		points[i].log_sd = hypot(sd, cost_sd);
 	}
 }
@@ -180,7 +182,8 @@ static double block_mean(const struct picture *p, uint32_t x0, uint32_t x1, uint
 
 static void file_block_means(const struct judge *j, const struct picture *p, double *out)
 {
-	uint32_t w = p->image.width, h = p->image.height, across = j->out->blocks_across, down = j->out->blocks_down;
+	uint32_t w = p->image.width, h = p->image.height, across = j->judgement->blocks_across,
+		 down = j->judgement->blocks_down;
 	for (uint32_t k = 0; k < across * down; k++)
 		out[k] = block_mean(p, w * (k % across) / across, w * (k % across + 1) / across,
 				    h * (k / across) / down, h * (k / across + 1) / down);
@@ -194,22 +197,22 @@ static void gather_cell(const double *blocks, size_t groups, size_t cells, size_
 }
 
 static void compute_bias(struct judge *j, size_t i, const double *reference, size_t reference_groups,
-			 struct stats_point *point)
+			 struct front_point *point)
 {
-	struct accuracy_figures *f = &j->out->figures[i];
+	struct accuracy_figures *f = &j->judgement->figures[i];
 	double a[PLAN_GROUPS_MAX], b[PLAN_GROUPS_MAX], worst = -1;
-	size_t last = (size_t)j->out->blocks_across * j->out->blocks_down;
+	size_t last = (size_t)j->judgement->blocks_across * j->judgement->blocks_down;
 	/* The bias of every setting is tested in the mean of its image and in every block. bias_lower_joint shares the
 	 * level among all these tests: one half among the means, the other among the blocks. */
 	double settings = (double)j->run->design->count, blocks = last > 0 ? (double)last : 1;
-	for (size_t c = 0; c < j->cells; c++) {
+	for (size_t c = 0; c < j->cell_count; c++) {
 		double t;
-		gather_cell(j->blocks + i * j->groups * j->cells, j->groups, j->cells, c, a);
-		gather_cell(reference, reference_groups, j->cells, c, b);
+		gather_cell(j->block_means + i * j->group_count * j->cell_count, j->group_count, j->cell_count, c, a);
+		gather_cell(reference, reference_groups, j->cell_count, c, b);
 		double cell_level = c == last ? LEVEL : LEVEL / blocks;
-		struct interval joint =
-			stats_relative_difference(a, j->groups, b, reference_groups, 0.5 * cell_level / settings, &t);
-		struct interval d = stats_relative_difference(a, j->groups, b, reference_groups, cell_level, NULL);
+		struct interval joint = stats_relative_difference(a, j->group_count, b, reference_groups,
+								  0.5 * cell_level / settings, &t);
+		struct interval d = stats_relative_difference(a, j->group_count, b, reference_groups, cell_level, NULL);
 		if (!isfinite(d.value))
 			continue;
 		f->bias_lower_joint = fmax(f->bias_lower_joint, fmax(joint.low, -joint.high));
@@ -220,7 +223,7 @@ static void compute_bias(struct judge *j, size_t i, const double *reference, siz
 		} else if (fabs(t) > worst) {
 			worst = fabs(t);
 			f->bias_worst_block = d;
-			f->worst_block = (unsigned)c;
+			f->worst_block_index = (unsigned)c;
 		}
 	}
 	point->changes_image = j->run->design->settings[i].changes_image;
@@ -228,23 +231,24 @@ static void compute_bias(struct judge *j, size_t i, const double *reference, siz
 	point->bias_upper = f->bias_upper;
 }
 
-static void compute_biases(struct judge *j, const struct picture *reference, struct stats_point *points)
+static void compute_biases(struct judge *j, const struct picture *reference, struct front_point *points)
 {
-	const double *reference_blocks = j->blocks + ACCURACY_REFERENCE * j->groups * j->cells;
+	const double *reference_blocks = j->block_means + ACCURACY_REFERENCE * j->group_count * j->cell_count;
 	double file[ACCURACY_CELLS_MAX];
 	for (size_t i = 0; i < j->run->design->count; i++)
-		canvas_group_blocks(get_job(j, i)->run.canvas, j->out->blocks_across, j->out->blocks_down,
-				    j->blocks + i * j->groups * j->cells);
+		canvas_group_blocks(get_job(j, i)->run.canvas, j->judgement->blocks_across, j->judgement->blocks_down,
+				    j->block_means + i * j->group_count * j->cell_count);
 	if (reference)
 		file_block_means(j, reference, file);
 	for (size_t i = 0; i < j->run->design->count; i++)
 		if (reference || i != ACCURACY_REFERENCE)
-			compute_bias(j, i, reference ? file : reference_blocks, reference ? 1 : j->groups, &points[i]);
+			compute_bias(j, i, reference ? file : reference_blocks, reference ? 1 : j->group_count,
+				     &points[i]);
 }
 
 static int judge_all(struct judge *j, const struct picture *reference, struct error *e)
 {
-	static struct stats_point points[ACCURACY_SETTINGS_MAX];
+	static struct front_point points[ACCURACY_SETTINGS_MAX];
 	static size_t dominated_by[ACCURACY_SETTINGS_MAX];
 	size_t n = j->run->design->count;
 	memset(points, 0, sizeof points);
@@ -257,17 +261,17 @@ static int judge_all(struct judge *j, const struct picture *reference, struct er
 		return rc;
 	scale_errors(j, points);
 	for (size_t i = 0; i < n; i++)
-		j->out->is_unreliable |= j->out->figures[i].rounds < 4;
-	j->out->is_unreliable |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
+		j->judgement->is_unreliable |= j->judgement->figures[i].rounds < 4;
+	j->judgement->is_unreliable |= j->judgement->figures[ACCURACY_DEFAULT].error_at_equal_time.value > 0.5;
 	compute_biases(j, reference, points);
 	/* The reference is not a candidate for the front, because it is rendered longer. The last setting takes its
 	 * place. */
 	points[ACCURACY_REFERENCE] = points[n - 1];
 	stats_front(points, n - 1, LEVEL, dominated_by);
 	for (size_t i = 0; i + 1 < n; i++)
-		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].dominated_by =
+		j->judgement->figures[i == ACCURACY_REFERENCE ? n - 1 : i].dominating_index =
 			dominated_by[i] == ACCURACY_REFERENCE ? n - 1 : dominated_by[i];
-	j->out->figures[ACCURACY_REFERENCE].dominated_by = ACCURACY_REFERENCE;
+	j->judgement->figures[ACCURACY_REFERENCE].dominating_index = ACCURACY_REFERENCE;
 	return 0;
 }
 
@@ -282,24 +286,27 @@ int accuracy_judge(const struct accuracy_run *r, const struct picture *reference
 					   .has_reference_file = reference != NULL,
 					   .width = p->crop_width,
 					   .height = p->crop_height};
-	struct judge j = {
-		.run = r, .out = out, .cells = (size_t)out->blocks_across * out->blocks_down + 1, .groups = p->groups};
+	struct judge j = {.run = r,
+			  .judgement = out,
+			  .cell_count = (size_t)out->blocks_across * out->blocks_down + 1,
+			  .group_count = p->groups};
 	out->rgb = mem_alloc(pixels * 3, sizeof *out->rgb);
 	j.mean_image = mem_alloc(pixels * 3, sizeof *j.mean_image);
-	j.weight = mem_alloc(pixels * 3, sizeof *j.weight);
+	j.weights = mem_alloc(pixels * 3, sizeof *j.weights);
 	j.pixel_errors = mem_alloc(pixels * 2, sizeof *j.pixel_errors);
 	j.rel_mse = mem_alloc(n, sizeof *j.rel_mse);
 	j.degrees = mem_alloc(n, sizeof *j.degrees);
-	j.blocks = mem_alloc(n * j.groups * j.cells, sizeof *j.blocks);
-	int rc = !out->rgb || !j.mean_image || !j.weight || !j.pixel_errors || !j.rel_mse || !j.degrees || !j.blocks
+	j.block_means = mem_alloc(n * j.group_count * j.cell_count, sizeof *j.block_means);
+	int rc = !out->rgb || !j.mean_image || !j.weights || !j.pixel_errors || !j.rel_mse || !j.degrees ||
+				 !j.block_means
 			 ? error_set(e, ENOMEM, "no memory for the comparison")
 			 : judge_all(&j, reference, e);
 	mem_free(j.mean_image);
-	mem_free(j.weight);
+	mem_free(j.weights);
 	mem_free(j.pixel_errors);
 	mem_free(j.rel_mse);
 	mem_free(j.degrees);
-	mem_free(j.blocks);
+	mem_free(j.block_means);
 	if (rc)
 		accuracy_judgement_fini(out);
 	return rc;

@@ -17,25 +17,26 @@ struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;
 	struct interval mutation_us; /* microseconds of CPU time per mutation */
-	double acceptance;	     /* share of accepted mutations */
-	double failed_walks;	     /* share of all walks; NAN: there were none */
+	double acceptance_rate;	     /* share of accepted mutations */
+	double failed_walk_share;    /* share of all walks; NAN: there were none */
 	double rays_per_mutation;
-	struct interval equal_mutations; /* error after as many mutations as the default's */
-	struct interval equal_time;	 /* error after as much CPU time as the default's */
-	struct interval bias_mean;	 /* of the image's mean, relative to the reference */
+	struct interval error_at_equal_mutations; /* error after as many mutations as the default's */
+	struct interval error_at_equal_time;	  /* error after as much CPU time as the default's */
+	struct interval bias_mean;		  /* of the image's mean, relative to the reference */
 	struct interval
-		bias_worst_block; /* of the block that differs most significantly; 95 % for all blocks together */
-	unsigned worst_block;	  /* its index: column + row * blocks_across */
-	double bias_lower_joint;  /* lower bound of the bias, all settings and blocks tested together; 0: none */
-	double bias_upper;	  /* upper bound of the bias of the mean or of any block */
-	size_t dominated_by; /* index of a better setting (stats_front); its own: it is on the front, or the reference
-			      */
+		bias_worst_block;   /* of the block that differs most significantly; 95 % for all blocks together */
+	unsigned worst_block_index; /* its index: column + row * blocks_across */
+	double bias_lower_joint;    /* lower bound of the bias, all settings and blocks tested together; 0: none */
+	double bias_upper;	    /* upper bound of the bias of the mean or of any block */
+	size_t dominating_index;    /* index of a better setting (stats_front); its own: it is on the front, or the
+				     * reference
+				     */
 };
 
 struct accuracy_judgement {
 	unsigned blocks_across, blocks_down; /* numbers of blocks */
-	uint64_t default_mutations;	     /* the number of mutations for equal_mutations */
-	double default_cpu_seconds;	     /* the CPU time for equal_time */
+	uint64_t default_mutations;	     /* the number of mutations for error_at_equal_mutations */
+	double default_cpu_seconds;	     /* the CPU time for error_at_equal_time */
 	bool has_reference_file;	     /* the reference is the image of a file */
 	bool is_unreliable; /* too little was rendered to trust the figures: groups that all missed rare light look
 			       exact */

@@ -13,14 +13,14 @@ static void put_plot(struct text_file *p, const struct plot *plot)
 	struct error e;
 	if (plot_svg(plot, &svg, &size, &e)) {
 		text_file_put(p, "<p class=\"note\">");
-		text_file_escaped(p, e.text);
+		text_file_put_escaped(p, e.text);
 		text_file_put(p, "</p>\n");
 		return;
 	}
 	/* Skips the XML declaration, which is not allowed inside a page. */
 	const char *begin = strstr(svg, "<svg");
 	if (begin)
-		text_file_bytes(p, begin, size - (size_t)(begin - svg));
+		text_file_put_bytes(p, begin, size - (size_t)(begin - svg));
 	mem_free(svg);
 }
 
@@ -63,7 +63,7 @@ void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, 
 		const struct accuracy_figures *f = &j->figures[i];
 		double position = (double)k + 1;
 		names[k] = s->values[k];
-		add_point(i == ACCURACY_DEFAULT ? &standard : &error, position, f->equal_time);
+		add_point(i == ACCURACY_DEFAULT ? &standard : &error, position, f->error_at_equal_time);
 		add_point(&mean, position - 0.06, f->bias_mean);
 		if (j->blocks_across * j->blocks_down > 1)
 			add_point(&block, position + 0.06, f->bias_worst_block);
@@ -100,9 +100,9 @@ void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x)
 		const struct accuracy_figures *f = &j->figures[i];
 		if (i == ACCURACY_REFERENCE)
 			continue;
-		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->dominated_by == i ? 1 : 0];
+		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->dominating_index == i ? 1 : 0];
 		size_t k = to->count;
-		add_point(to, 100 * f->equal_time.value, f->bias_mean);
+		add_point(to, 100 * f->error_at_equal_time.value, f->bias_mean);
 		accuracy_setting_name(&x->design->settings[i], to->names[k], sizeof to->names[k]);
 		to->labels[k] = i != ACCURACY_DEFAULT && f->bias_lower_joint > 0 ? to->names[k] : "";
 	}
@@ -114,7 +114,7 @@ void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x)
 	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)",
 				   .x_label = "relative error at equal time, %",
 				   .y_label = "bias of the mean, %",
-				   .log_x = true,
+				   .is_log_x = true,
 				   .series_count = 3,
 				   .series = s});
 	text_file_put(p, "</div>\n");

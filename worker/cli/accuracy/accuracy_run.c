@@ -3,7 +3,7 @@
  * Renders the settings alternately in short rounds, so that changes of the machine's speed affect all of them alike.
  * The next round belongs to the setting that has used the smallest part of its share. A short pilot with the default
  * determines the length of rounds. Settings that differ in nothing that is built share a world. Leases run as in
- * hslt-render (local.h).
+ * hslt-render (local_run.h).
  *
  * Fails if there is not enough memory for all films, before anything is rendered, or if a lease fails. A signal ends
  * the rounds; that is a failure only if some setting has no complete round yet.
@@ -147,7 +147,7 @@ static int start_setting(struct accuracy_run *r, size_t i, struct error *e)
 		return rc;
 	j->run = (struct local_run){.world = j->world, .plan = &j->plan, .threads = r->threads, .stop = r->stop};
 	rc = local_start(&j->run, &j->job, e);
-	if (!rc && j->run.bootstrap_result.black && j->run.canvas)
+	if (!rc && j->run.bootstrap_result.is_black && j->run.canvas)
 		rc = error_set(e, EINVAL, "the bootstrap found no light: there is nothing to compare");
 	return rc;
 }
@@ -274,7 +274,7 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 	if (!rc && !is_stopped(r))
 		rc = render_rounds(r, begin, e);
 	r->wall_seconds = clock_seconds() - begin;
-	r->interrupted = is_stopped(r);
+	r->was_interrupted = is_stopped(r);
 	for (size_t i = 0; !rc && i < d->count; i++)
 		if (!r->jobs[i].run.canvas || canvas_complete_rounds(r->jobs[i].run.canvas) < 1)
 			rc = error_set(e, EINTR, "interrupted before each setting had a round: no report");

@@ -4,7 +4,7 @@
 #define WORKER_CLI_ACCURACY_ACCURACY_RUN_H
 
 #include "worker/cli/accuracy/accuracy_design.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 
 enum { ACCURACY_COSTS_MAX = 4096 }; /* rounds of a setting whose cost is kept, at most */
 
@@ -38,7 +38,7 @@ struct accuracy_run {
 	size_t world_count;
 	struct world *worlds[ACCURACY_SETTINGS_MAX];
 	double wall_seconds;
-	bool interrupted; /* *stop was set */
+	bool was_interrupted; /* *stop was set */
 };
 
 /* Renders all settings. An interruption is a failure (-EINTR) only if some setting has no complete round; otherwise

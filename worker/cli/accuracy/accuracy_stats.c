@@ -60,7 +60,7 @@ struct interval stats_median(double *x, size_t count)
 	return (struct interval){middle, x[k], x[count - 1 - k]};
 }
 
-static bool dominates(const struct stats_point *j, const struct stats_point *i, double z)
+static bool dominates(const struct front_point *j, const struct front_point *i, double z)
 {
 	if (j->changes_image)
 		return false;
@@ -72,7 +72,7 @@ static bool dominates(const struct stats_point *j, const struct stats_point *i, 
 	return (less_error && !more_bias) || (less_bias && !(error_difference > margin));
 }
 
-void stats_front(const struct stats_point *p, size_t n, double level, size_t *dominated_by)
+void stats_front(const struct front_point *p, size_t n, double level, size_t *dominated_by)
 {
 	double z = n > 1 ? stats_t_quantile(2 * level / (double)(n - 1), 1e9) : 0;
 	for (size_t i = 0; i < n; i++) {

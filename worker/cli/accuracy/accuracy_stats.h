@@ -27,7 +27,7 @@ struct interval stats_relative_difference(const double *a, size_t a_count, const
 struct interval stats_median(double *x, size_t count);
 
 /* The figures of one setting by which stats_front compares it. */
-struct stats_point {
+struct front_point {
 	double log_error, log_sd; /* logarithm of the error at equal time, and its standard deviation */
 	double bias_lower_single; /* lower bound of the bias by the interval of this setting alone; 0: it contains 0 */
 	double bias_lower_joint;  /* lower bound when all settings are tested together; above 0: chance does not explain
@@ -45,6 +45,6 @@ struct stats_point {
  * a probability of error of `level`, shared among the n - 1 other settings. dominated_by[i]: of the settings that beat
  * i, the one with the smallest error; i itself if it is on the front.
  */
-void stats_front(const struct stats_point *p, size_t n, double level, size_t *dominated_by);
+void stats_front(const struct front_point *p, size_t n, double level, size_t *dominated_by);
 
 #endif

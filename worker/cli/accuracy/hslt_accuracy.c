@@ -9,7 +9,7 @@
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/progress.h"
 #include "common/exr/output_files.h"
 #include "worker/cli/accuracy/accuracy_csv.h"
@@ -17,7 +17,7 @@
 #include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
-#include "worker/cli/base/place.h"
+#include "worker/cli/base/source_place.h"
 
 #include <stdio.h>
 
@@ -30,14 +30,14 @@ struct arguments {
 	bool quiet;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"output", 'o', "FILE", "The report (HTML); -: stdout", OPTION_OUTPUT(struct arguments, render.output)},
 	{"csv", 0, "FILE", "Also write the figures as comma-separated values", OPTION_OUTPUT(struct arguments, csv)},
 	{"budget", 0, "MINUTES", "Total time (10, 90s, 2h), divided equally; more makes the intervals narrower",
-	 OPTION_TIME(struct arguments, budget_seconds, 0, 1e6, 60), .min_excluded = true, .max_excluded = true,
+	 OPTION_TIME(struct arguments, budget_seconds, 0, 1e6, 60), .excludes_min = true, .excludes_max = true,
 	 .default_value = "10"},
 	{"seconds", 0, "S", "CPU seconds for each setting, instead of a budget",
-	 OPTION_SECONDS(struct arguments, setting_seconds, 0, 1e9), .min_excluded = true, .max_excluded = true},
+	 OPTION_SECONDS(struct arguments, setting_seconds, 0, 1e9), .excludes_min = true, .excludes_max = true},
 	{"rounds", 0, "N",
 	 "Rounds of each setting, instead of a budget: with --epoch, --chains and --bootstrap, everything "
 	 "but times is reproducible",
@@ -84,7 +84,7 @@ static const struct program program = {
 		"much as a large one and takes less memory.\n"
 		"If it is interrupted after every setting has had a round, it reports what was rendered and exits with 1.",
 	.exit_codes = "0 done, 1 failed, 2 usage",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
 	.shared_options = &render_option_table,
 	.parse_word = option_scene,
 };
@@ -93,7 +93,7 @@ struct session {
 	struct arguments *args;
 	char *folder, *name;
 	struct scene scene;
-	bool scene_read, is_usage_error; /* `scene` must be freed; the command line is wrong */
+	bool is_scene_read, is_usage_error; /* `scene` must be freed; the command line is wrong */
 	struct asset_folders folders;
 	struct output_files outputs;
 	struct guarded_source guarded;
@@ -125,10 +125,10 @@ static int load_scene(struct session *s, struct error *e)
 	rc = option_scene_read(&s->scene, &s->assets, s->name, r, e);
 	if (rc)
 		return rc;
-	s->scene_read = true;
+	s->is_scene_read = true;
 	for (uint32_t i = 0; !s->args->quiet && i < s->scene.note_count; i++)
-		place_print(stderr, "note: ", s->args->render.scene, s->scene.notes[i]);
-	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
+		source_place_print(stderr, "note: ", s->args->render.scene, s->scene.notes[i]);
+	return world_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
 /* Checks that the reference has the size of the renders, before any time is spent on them. */
@@ -212,13 +212,13 @@ static void print_summary(const struct session *s)
 		fprintf(stderr,
 			"too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --parameters)\n");
 	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%",
-		100 * d->equal_time.value, s->judgement.default_cpu_seconds, 100 * d->bias_upper);
-	if (d->dominated_by == ACCURACY_DEFAULT) {
+		100 * d->error_at_equal_time.value, s->judgement.default_cpu_seconds, 100 * d->bias_upper);
+	if (d->dominating_index == ACCURACY_DEFAULT) {
 		fprintf(stderr, "; on the front\n");
 		return;
 	}
-	accuracy_setting_name(&s->design.settings[d->dominated_by], name, sizeof name);
-	fprintf(stderr, "; beaten by %s: %.2f %%\n", name, 100 * f[d->dominated_by].equal_time.value);
+	accuracy_setting_name(&s->design.settings[d->dominating_index], name, sizeof name);
+	fprintf(stderr, "; beaten by %s: %.2f %%\n", name, 100 * f[d->dominating_index].error_at_equal_time.value);
 }
 
 static int run_session(struct session *s, struct error *e)
@@ -238,9 +238,9 @@ static int run_session(struct session *s, struct error *e)
 		rc = write_reports(s, e);
 	if (!rc && !s->args->quiet)
 		print_summary(s);
-	if (!rc && s->run.interrupted)
+	if (!rc && s->run.was_interrupted)
 		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far",
-			       target_display_name(s->args->render.output));
+			       output_target_display_name(s->args->render.output));
 	return rc;
 }
 
@@ -258,11 +258,11 @@ int main(int argc, char **argv)
 	accuracy_run_fini(&s.run);
 	accuracy_judgement_fini(&s.judgement);
 	picture_fini(&s.reference);
-	if (s.scene_read)
+	if (s.is_scene_read)
 		scene_fini(&s.scene);
 	mem_free(s.folder);
 	mem_free(s.name);
 	if (rc)
-		place_print(stderr, "hslt-accuracy: ", a.render.scene, e.text);
+		source_place_print(stderr, "hslt-accuracy: ", a.render.scene, e.text);
 	return rc ? s.is_usage_error ? 2 : 1 : 0;
 }

@@ -12,9 +12,9 @@
 #include "common/base/mem.h"
 #include "common/base/picture_name.h"
 #include "common/base/spelling.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/text.h"
-#include "worker/render/choose.h"
+#include "worker/render/choose_integrator.h"
 #include "worker/render/settings/accuracy_settings.h"
 
 #include <dirent.h>
@@ -42,7 +42,7 @@ int option_scene(void *target, size_t index, char *word, struct error *e)
 int option_image(void *target, char *arg, struct error *e)
 {
 	const char *format = picture_name_format(arg);
-	((struct render_arguments *)target)->output = target_from_arg(arg);
+	((struct render_arguments *)target)->output = output_target_from_arg(arg);
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
 	return error_set(
@@ -98,7 +98,7 @@ bool integrator_is_undecided(const struct plan_request *r)
 
 /* ---- arguments ---- */
 
-static int take_integrator(void *target, char *arg, struct error *e)
+static int parse_integrator(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	(void)e;
@@ -107,7 +107,7 @@ static int take_integrator(void *target, char *arg, struct error *e)
 }
 
 /* Takes "640x360", or "640" if the height is to follow from the scene's aspect ratio. */
-static int take_size(void *target, char *arg, struct error *e)
+static int parse_size(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[2] = {0, 0};
@@ -124,7 +124,7 @@ static int take_size(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static int take_crop(void *target, char *arg, struct error *e)
+static int parse_crop(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[4];
@@ -139,7 +139,7 @@ static int take_crop(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static int take_mutations(void *target, char *arg, struct error *e)
+static int parse_mutations(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	bool is_count = *arg >= '0' && *arg <= '9';
@@ -178,14 +178,14 @@ static int add_setting(struct render_arguments *a, const char *text, struct erro
 	return rc ? error_prefix(e, -EINVAL, "--set") : 0;
 }
 
-static int take_set(void *target, char *arg, struct error *e)
+static int parse_setting(void *target, char *arg, struct error *e)
 {
 	if (strcmp(arg, "help") == 0)
 		list_settings();
-	struct spelling s = {.wanted = arg};
+	struct spelling s = {.wanted_name = arg};
 	char hint[64];
 	spelling_offer(&s, "help");
-	if (s.best)
+	if (s.best_match)
 		return error_set(e, EINVAL, "--set: '%s' is no setting%s", arg, spelling_hint(&s, hint, sizeof hint));
 	return add_setting(target, arg, e);
 }
@@ -199,7 +199,7 @@ static int set_sensor(struct render_arguments *a, uint32_t n, struct error *e)
 }
 
 /* Takes the number of a sensor. Anything else is an id, which is looked up later in the scene (find_sensor). */
-static int take_sensor(void *target, char *arg, struct error *e)
+static int parse_sensor(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n = 0;
@@ -215,7 +215,7 @@ static int take_sensor(void *target, char *arg, struct error *e)
 static int find_sensor(const struct scene *s, struct render_arguments *a, struct error *e)
 {
 	char hint[128], ids[256] = "";
-	struct spelling spelling = {.wanted = a->sensor};
+	struct spelling spelling = {.wanted_name = a->sensor};
 	uint32_t count = 0;
 	for (uint32_t i = 0; i < s->object_count; i++) {
 		const struct scene_node *n = s->objects[i];
@@ -246,13 +246,13 @@ int option_scene_read(struct scene *s, const struct asset_source *assets, const 
 	return rc;
 }
 
-static int take_lenient(void *target, char *arg, struct error *e)
+static int parse_lenient(void *target, char *arg, struct error *e)
 {
 	(void)arg;
 	return add_setting(target, RENDER_LENIENT, e);
 }
 
-static int take_effects(void *target, char *arg, struct error *e)
+static int parse_effects(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	return render_canonical_effects(arg, a->render.effects, e) ? error_prefix(e, -EINVAL, "--effects") : 0;
@@ -295,11 +295,11 @@ static const struct option_row scene_rows[] = {
 	{"integrator", 'i', "NAME",
 	 "(" RENDER_INTEGRATOR_DEFAULT ": " RENDER_CHOICES_TEXT " or " RENDER_INTEGRATOR_CHAINS
 	 ", chosen by a short pilot); the scene's own is ignored",
-	 OPTION_CUSTOM(take_integrator), .values = integrator_name},
+	 OPTION_CUSTOM(parse_integrator), .values = integrator_name},
 	{"size", 0, "W[xH]",
 	 "Size of the film in pixels, with the scene's field of view; without H also with its aspect ratio",
-	 OPTION_CUSTOM(take_size)},
-	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_CUSTOM(take_crop)},
+	 OPTION_CUSTOM(parse_size)},
+	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_CUSTOM(parse_crop)},
 	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX),
 	 .default_value = "0"},
 	{"min-depth", 0, "K", "Length of the shortest paths, in edges (1: emitters seen directly)",
@@ -308,20 +308,20 @@ static const struct option_row scene_rows[] = {
 	 OPTION_COUNT(RENDER, plan.max_depth, 1, PLAN_DEPTH_MAX)},
 	{"set", 0, "NAME=VALUE",
 	 "Settings that trade accuracy for time, separated by commas; may be repeated; --set help describes them",
-	 OPTION_CUSTOM(take_set), .append_default = list_setting_defaults},
+	 OPTION_CUSTOM(parse_setting), .append_default = list_setting_defaults},
 	{"effects", 0, "LIST",
 	 "Effects to simulate or omit, whether or not the scene needs them: all, or a list such as -dispersion,+aperture "
 	 "(hslt-render --explain shows them)",
-	 OPTION_CUSTOM(take_effects)},
+	 OPTION_CUSTOM(parse_effects)},
 	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_CUSTOM(option_define)},
 	{"path", 0, "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_CUSTOM(option_path)},
 	{"sensor", 0, "N|ID",
 	 "Sensor of the scene to use: its number, counted from 1 (1), or its id; the same as --set sensor=N",
-	 OPTION_CUSTOM(take_sensor)},
+	 OPTION_CUSTOM(parse_sensor)},
 	{"lenient", 0, NULL,
 	 "Leave out or replace what is not supported, with a note for each; the same as --set lenient=yes",
-	 OPTION_CUSTOM(take_lenient)},
+	 OPTION_CUSTOM(parse_lenient)},
 	{0},
 };
 
@@ -331,11 +331,11 @@ static const struct option_row bound_rows[] = {
 	{"mutations", 0, "N|LIST",
 	 "N: total number of mutations or samples. LIST: the strategies that propose mutations, with weights "
 	 "(1), such as hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once as each",
-	 OPTION_CUSTOM(take_mutations), .append_default = list_strategies},
+	 OPTION_CUSTOM(parse_mutations), .append_default = list_strategies},
 	{"time", 0, "SECONDS", "Wall-clock time (90, 5m, 2h), checked after complete rounds",
-	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .min_excluded = true, .max_excluded = true},
+	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .excludes_min = true, .excludes_max = true},
 	{"target-error", 0, "E", "Estimated relative error: 0.02 or 2%", OPTION_RATIO(RENDER, plan.target_error, 0, 1),
-	 .min_excluded = true},
+	 .excludes_min = true},
 	{0},
 };
 
@@ -381,11 +381,11 @@ const struct option_table render_option_table = {groups, check_options};
 static int check_integrator(const struct integrator_properties *i, const struct render_summary *summary,
 			    bool is_undecided, struct error *e)
 {
-	if (i->only_from_camera && summary->has_beam)
+	if (i->is_camera_only && summary->has_beam)
 		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->name);
-	if (!i->only_from_camera && summary->has_rolling_shutter)
+	if (!i->is_camera_only && summary->has_rolling_shutter)
 		return error_set(e, EINVAL, RENDER_NO_ROLLING_SHUTTER, i->name);
-	if (i->ends_on_emitters && !is_undecided && render_effect_is_on(summary, "medium-light"))
+	if (i->must_end_on_emitter && !is_undecided && render_effect_is_on(summary, "medium-light"))
 		return error_set(e, EINVAL, RENDER_NO_MEDIUM_LIGHT, i->name);
 	return 0;
 }
@@ -423,13 +423,13 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	memcpy(p->effects, a->render.effects, sizeof p->effects);
 	if (!p->max_depth)
 		p->max_depth = s->max_depth;
-	if (!p->min_depth && s->hide_emitters && p->max_depth == 1)
+	if (!p->min_depth && s->hides_emitters && p->max_depth == 1)
 		return error_set(
 			e, EINVAL,
 			"nothing is left to render: paths of one edge show emitters alone, and the scene hides "
 			"these (hide_emitters); --max-depth 2 shows what they light");
 	if (!p->min_depth)
-		p->min_depth = s->hide_emitters ? 2 : 1;
+		p->min_depth = s->hides_emitters ? 2 : 1;
 	/* Leaves out longer paths, which carry no light in this scene; but not if the requested minimum is longer
 	 * still, because no paths would be left. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
@@ -454,7 +454,7 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 /* Sets the error for a scene file that does not exist, with the nearest name in its folder. */
 static int missing_scene_error(const char *path, const char *folder, const char *name, struct error *e)
 {
-	struct spelling suggestion = {.wanted = name};
+	struct spelling suggestion = {.wanted_name = name};
 	struct dirent *entry;
 	char hint[512] = "";
 	struct stat link;

@@ -10,7 +10,7 @@
 
 enum { PAGE_MAX = 1 << 28 };
 
-void text_file_bytes(struct text_file *p, const void *bytes, size_t count)
+void text_file_put_bytes(struct text_file *p, const void *bytes, size_t count)
 {
 	p->text.limit = PAGE_MAX;
 	p->has_failed = p->has_failed || !buf_append(&p->text, bytes, count);
@@ -26,7 +26,7 @@ void text_file_put(struct text_file *p, const char *format, ...)
 	if (n < 0 || (size_t)n >= sizeof line)
 		p->has_failed = true;
 	else
-		text_file_bytes(p, line, (size_t)n);
+		text_file_put_bytes(p, line, (size_t)n);
 }
 
 size_t text_file_character_length(const char *at)
@@ -38,7 +38,7 @@ size_t text_file_character_length(const char *at)
 	return is_noncharacter || control ? 0 : n;
 }
 
-void text_file_escaped(struct text_file *p, const char *text)
+void text_file_put_escaped(struct text_file *p, const char *text)
 {
 	while (*text) {
 		size_t n = text_file_character_length(text);
@@ -49,14 +49,14 @@ void text_file_escaped(struct text_file *p, const char *text)
 					  : n		 ? NULL
 							 : "?";
 		if (replacement)
-			text_file_bytes(p, replacement, strlen(replacement));
+			text_file_put_bytes(p, replacement, strlen(replacement));
 		else
-			text_file_bytes(p, text, n);
+			text_file_put_bytes(p, text, n);
 		text += n ? n : 1;
 	}
 }
 
-void text_file_field(struct text_file *p, const char *text)
+void text_file_put_field(struct text_file *p, const char *text)
 {
 	if (!strpbrk(text, ",\"\n\r")) {
 		text_file_put(p, "%s", text);
@@ -64,14 +64,14 @@ void text_file_field(struct text_file *p, const char *text)
 	}
 	text_file_put(p, "\"");
 	for (; *text; text++) {
-		text_file_bytes(p, text, 1);
+		text_file_put_bytes(p, text, 1);
 		if (*text == '"')
-			text_file_bytes(p, text, 1);
+			text_file_put_bytes(p, text, 1);
 	}
 	text_file_put(p, "\"");
 }
 
-void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t count)
+void text_file_put_base64(struct text_file *p, const unsigned char *bytes, size_t count)
 {
 	static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 	for (size_t i = 0; i < count; i += 3) {
@@ -80,7 +80,7 @@ void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t co
 			     (remaining > 2 ? bytes[i + 2] : 0u);
 		char four[4] = {digits[v >> 18], digits[v >> 12 & 63], remaining > 1 ? digits[v >> 6 & 63] : '=',
 				remaining > 2 ? digits[v & 63] : '='};
-		text_file_bytes(p, four, 4);
+		text_file_put_bytes(p, four, 4);
 	}
 }
 

@@ -15,13 +15,13 @@ struct text_file {
 };
 
 __attribute__((format(printf, 2, 3))) void text_file_put(struct text_file *p, const char *format, ...);
-void text_file_bytes(struct text_file *p, const void *bytes, size_t count);
+void text_file_put_bytes(struct text_file *p, const void *bytes, size_t count);
 /* Appends text to XML or HTML: special characters are escaped; invalid UTF-8 and characters that XML does not allow
  * become '?'. */
-void text_file_escaped(struct text_file *p, const char *text);
+void text_file_put_escaped(struct text_file *p, const char *text);
 /* Appends a field of comma-separated values, in quotes if necessary. */
-void text_file_field(struct text_file *p, const char *text);
-void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t count);
+void text_file_put_field(struct text_file *p, const char *text);
+void text_file_put_base64(struct text_file *p, const unsigned char *bytes, size_t count);
 /* Writes the file atomically. Returns -ENOMEM if any text could not be appended, or an error of image_file_write. */
 int text_file_write(const struct text_file *p, const char *path, struct error *e);
 void text_file_fini(struct text_file *p);

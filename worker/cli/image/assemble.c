@@ -49,7 +49,7 @@ struct sums {
 	double pixels;
 	bool has_mse; /* every crop has a relMSE and its interval */
 	double cpu_seconds, wall_seconds;
-	int mixed;
+	int has_mixed_fingerprints;
 	bool too_short, disagree, agree;
 	char disagreement[TEXT_SIZE];
 };
@@ -192,7 +192,7 @@ static void add_header(struct assembly *a, const struct exr_image *img)
 	s->cpu_seconds += get_number(img, "hslt:cpuSeconds");
 	s->wall_seconds = fmax(s->wall_seconds, get_number(img, "hslt:wallSeconds"));
 	const struct exr_attribute *mixed = exr_find_attribute(img, "hslt:mixed");
-	s->mixed |= mixed && mixed->type == EXR_ATTRIBUTE_INT && mixed->integer;
+	s->has_mixed_fingerprints |= mixed && mixed->type == EXR_ATTRIBUTE_INT && mixed->integer;
 	add_convergence(s, img);
 	for (size_t i = 0; i < a->first_header.attribute_count; i++)
 		a->is_kept[i] &= attributes_equal(&a->first_header.attributes[i],
@@ -312,7 +312,7 @@ static int encode_image(struct assembly *a, size_t count, unsigned char **bytes,
 	if (isfinite(s->cpu_seconds))
 		put_number(f, "hslt:cpuSeconds", s->cpu_seconds);
 	put_number(f, "hslt:wallSeconds", s->wall_seconds);
-	put_int(f, "hslt:mixed", s->mixed);
+	put_int(f, "hslt:mixed", s->has_mixed_fingerprints);
 	put_int(f, "hslt:crops", (int)count);
 	int rc = exr_write(f, bytes, size, e);
 	f->attributes = NULL;

@@ -105,20 +105,20 @@ static int compute_errors(const struct picture *a, const struct picture *b, doub
 		return error_set(e, ENOMEM, "no memory for the errors of %zu pixels", n);
 	for (size_t i = 0; i < n; i++) {
 		pixel[i] = compute_pixel_error(a, b, i, min_denominator);
-		r->not_finite += isinf(pixel[i].squared) != 0;
+		r->not_finite_count += isinf(pixel[i].squared) != 0;
 	}
-	r->pixels = n;
-	r->trimmed = (size_t)(trim * (double)n * (1 + 4 * DBL_EPSILON));
-	if (r->trimmed)
+	r->pixel_count = n;
+	r->trimmed_count = (size_t)(trim * (double)n * (1 + 4 * DBL_EPSILON));
+	if (r->trimmed_count)
 		qsort(pixel, n, sizeof *pixel, compare_worst_first);
-	for (size_t i = r->trimmed; i < n; i++) {
+	for (size_t i = r->trimmed_count; i < n; i++) {
 		relative += pixel[i].relative;
 		squared += pixel[i].squared;
 	}
 	mem_free(pixel);
-	double kept_count = (double)(n - r->trimmed);
+	double kept_count = (double)(n - r->trimmed_count);
 	r->rel_mse = relative / kept_count;
-	r->relative_error = sqrt(r->rel_mse);
+	r->rel_error = sqrt(r->rel_mse);
 	r->rmse = sqrt(squared / kept_count);
 	return 0;
 }
@@ -138,8 +138,8 @@ int compare_to_reference(const struct picture *a, const struct picture *b, doubl
 	if (r->rmse == 0)
 		r->psnr = INFINITY;
 	for (int k = 0; k < 3; k++) {
-		r->mean_a[k] = plane_mean(a->rgb[k], r->pixels);
-		r->mean_b[k] = plane_mean(b->rgb[k], r->pixels);
+		r->mean_a[k] = plane_mean(a->rgb[k], r->pixel_count);
+		r->mean_b[k] = plane_mean(b->rgb[k], r->pixel_count);
 		r->ratio[k] = r->mean_a[k] / r->mean_b[k];
 	}
 	r->luminance_ratio = rec709_luminance(r->mean_a) / rec709_luminance(r->mean_b);
@@ -147,7 +147,7 @@ int compare_to_reference(const struct picture *a, const struct picture *b, doubl
 }
 
 /* Returns the colour for t in [0,1]. */
-static void heat_colour(double t, unsigned char rgb[3])
+static void heatmap_colour(double t, unsigned char rgb[3])
 {
 	static const double stops[6][3] = {{0, 0, 0},	   {70, 0, 110},   {190, 20, 60},
 					   {245, 110, 10}, {255, 215, 70}, {255, 255, 255}};
@@ -168,7 +168,7 @@ int compare_heatmap(const struct picture *a, const struct picture *b, unsigned c
 		if (isinf(p.squared))
 			rgb[i * 3] = 0, rgb[i * 3 + 1] = rgb[i * 3 + 2] = 255;
 		else
-			heat_colour((log10(sqrt(p.relative)) + 3) / 3, rgb + i * 3);
+			heatmap_colour((log10(sqrt(p.relative)) + 3) / 3, rgb + i * 3);
 	}
 	return 0;
 }

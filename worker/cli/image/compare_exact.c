@@ -7,13 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 
-struct difference {
+struct first_difference {
 	char *text;
 	size_t size;
 };
 
-__attribute__((format(printf, 2, 3))) static bool set_difference(const struct difference *result, const char *format,
-								 ...)
+__attribute__((format(printf, 2, 3))) static bool set_difference(const struct first_difference *result,
+								 const char *format, ...)
 {
 	va_list ap;
 	va_start(ap, format);
@@ -22,7 +22,7 @@ __attribute__((format(printf, 2, 3))) static bool set_difference(const struct di
 	return false;
 }
 
-static bool has_same_shape(const struct exr_image *a, const struct exr_image *b, const struct difference *result)
+static bool has_same_shape(const struct exr_image *a, const struct exr_image *b, const struct first_difference *result)
 {
 	if (a->width != b->width || a->height != b->height)
 		return set_difference(result, "%ux%u and %ux%u pixels", a->width, a->height, b->width, b->height);
@@ -39,7 +39,7 @@ static bool has_same_shape(const struct exr_image *a, const struct exr_image *b,
 }
 
 static bool has_same_plane(const struct exr_image *a, const struct exr_image *b, uint32_t c,
-			   const struct difference *result)
+			   const struct first_difference *result)
 {
 	size_t pixels = (size_t)a->width * a->height, count = 0, first = 0;
 	for (size_t i = pixels; i-- > 0;)
@@ -56,7 +56,7 @@ static bool has_same_plane(const struct exr_image *a, const struct exr_image *b,
 }
 
 static bool has_same_value(const struct exr_attribute *a, const struct exr_attribute *b,
-			   const struct difference *result)
+			   const struct first_difference *result)
 {
 	if (a->type != b->type)
 		return set_difference(result, "%s is of two types", a->name);
@@ -69,7 +69,7 @@ static bool has_same_value(const struct exr_attribute *a, const struct exr_attri
 	return a->integer == b->integer || set_difference(result, "%s is %d and %d", a->name, a->integer, b->integer);
 }
 
-static bool has_same_header(const struct exr_image *a, const struct exr_image *b, const struct difference *result)
+static bool has_same_header(const struct exr_image *a, const struct exr_image *b, const struct first_difference *result)
 {
 	for (size_t i = 0; i < a->attribute_count; i++) {
 		const char *name = a->attributes[i].name;
@@ -89,7 +89,7 @@ static bool has_same_header(const struct exr_image *a, const struct exr_image *b
 
 bool compare_exact(const struct exr_image *a, const struct exr_image *b, char *why, size_t why_size)
 {
-	const struct difference result = {why, why_size};
+	const struct first_difference result = {why, why_size};
 	set_difference(&result, "%s", "");
 	if (!has_same_shape(a, b, &result))
 		return false;

@@ -15,12 +15,12 @@ struct arguments {
 	size_t crop_count;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"output", 'o', "FILE", "The image; -: stdout", OPTION_OUTPUT(struct arguments, output)},
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int parse_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index == CROPS_MAX)
@@ -54,8 +54,8 @@ static const struct program program = {
 		   "is the mean over pixels. Header attributes on which all crops agree are kept, counts are added.\n"
 		   "deploy/crops.sh submits a grid of crops to one coordinator or several, and calls hslt-assemble.",
 	.exit_codes = "0 done, 1 failed, 2 usage, 5 done, but chains of some crop disagree",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
-	.parse_word = take_word,
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
+	.parse_word = parse_word,
 };
 
 int main(int argc, char **argv)

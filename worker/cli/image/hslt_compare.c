@@ -8,7 +8,7 @@
  */
 #include "common/base/mem.h"
 #include "common/base/program.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/text.h"
 #include "common/estimate/stated_error.h"
 #include "common/exr/output_files.h"
@@ -29,7 +29,7 @@ struct arguments {
 	int stdin_count; /* number of images from stdin */
 };
 
-static int take_size(void *target, char *arg, struct error *e)
+static int parse_size(void *target, char *arg, struct error *e)
 {
 	struct arguments *a = target;
 	uint32_t n[2];
@@ -40,11 +40,11 @@ static int take_size(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"exact", 0, NULL, "Only check whether all bits are equal", OPTION_FLAG(struct arguments, exact)},
 	{"trim", 0, "F", "Omit the worst share F of the pixels: 0.001 or 0.1%",
-	 OPTION_RATIO(struct arguments, trim, 0, 1), .max_excluded = true},
-	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_CUSTOM(take_size)},
+	 OPTION_RATIO(struct arguments, trim, 0, 1), .excludes_max = true},
+	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_CUSTOM(parse_size)},
 	{"heatmap", 0, "FILE.png", "Write relative errors as colours, from black (0.1 %) to white (100 %)",
 	 OPTION_TEXT(struct arguments, heatmap)},
 	{"max-relmse", 0, "X", "Fail when the relMSE is above X",
@@ -53,7 +53,7 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int parse_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
@@ -74,7 +74,7 @@ static int check_options(void *target, struct error *e)
 	const struct arguments *a = target;
 	if (!a->paths[1])
 		return error_set(e, EINVAL, "A.exr and B.exr are needed");
-	if (a->heatmap && strcmp(target_from_arg(a->heatmap), TARGET_STDOUT) == 0)
+	if (a->heatmap && strcmp(output_target_from_arg(a->heatmap), TARGET_STDOUT) == 0)
 		return error_set(e, EINVAL, "--heatmap takes the name of a file: the figures go to stdout");
 	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->max_rel_mse >= 0))
 		return error_set(e, EINVAL, "--exact can only be combined with --json");
@@ -96,8 +96,8 @@ static const struct program program = {
 		"RMSE and PSNR, not from the means.\n--exact compares every channel and the header, except for "
 		"hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end, hslt:sceneHash and hslt:date. - is stdin.",
 	.exit_codes = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
-	.parse_word = take_word,
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
+	.parse_word = parse_word,
 };
 
 static void print_json(json_t *o)
@@ -129,25 +129,25 @@ static void print_figures(const struct arguments *a, const struct compare_result
 	if (a->json) {
 		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1,
 				     "a", text_to_json(a->paths[0]), "b", text_to_json(a->paths[1]), "relMSE",
-				     number_to_json(r->rel_mse), "relativeError", number_to_json(r->relative_error),
-				     "rmse", number_to_json(r->rmse), "psnr", number_to_json(r->psnr), "peak",
+				     number_to_json(r->rel_mse), "relativeError", number_to_json(r->rel_error), "rmse",
+				     number_to_json(r->rmse), "psnr", number_to_json(r->psnr), "peak",
 				     number_to_json(r->peak), "meanA", triple_to_json(r->mean_a), "meanB",
 				     triple_to_json(r->mean_b), "meanRatio", triple_to_json(r->ratio), "luminanceRatio",
-				     number_to_json(r->luminance_ratio), "pixels", (json_int_t)r->pixels, "leftOut",
-				     (json_int_t)r->trimmed, "notFinite", (json_int_t)r->not_finite, "relMSEDefinition",
-				     REL_MSE_DEFINITION));
+				     number_to_json(r->luminance_ratio), "pixels", (json_int_t)r->pixel_count,
+				     "leftOut", (json_int_t)r->trimmed_count, "notFinite",
+				     (json_int_t)r->not_finite_count, "relMSEDefinition", REL_MSE_DEFINITION));
 		return;
 	}
 	printf("relMSE          %.6g (" REL_MSE_DEFINITION ")\n", r->rel_mse);
-	printf("relative error  %.4g %%\n", 100 * r->relative_error);
+	printf("relative error  %.4g %%\n", 100 * r->rel_error);
 	printf("RMSE            %.6g\n", r->rmse);
 	printf("PSNR            %.2f dB (peak %.6g)\n", r->psnr, r->peak);
 	printf("mean A/B        R %.6f  G %.6f  B %.6f  luminance %.6f\n", r->ratio[0], r->ratio[1], r->ratio[2],
 	       r->luminance_ratio);
-	if (r->trimmed)
-		printf("left out        %zu of %zu pixels\n", r->trimmed, r->pixels);
-	if (r->not_finite)
-		printf("not finite      %zu pixels of A\n", r->not_finite);
+	if (r->trimmed_count)
+		printf("left out        %zu of %zu pixels\n", r->trimmed_count, r->pixel_count);
+	if (r->not_finite_count)
+		printf("not finite      %zu pixels of A\n", r->not_finite_count);
 }
 
 static int compare_bits(const struct arguments *a, const struct picture *p, int *code)

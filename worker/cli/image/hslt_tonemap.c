@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/program.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/exr/output_files.h"
 #include "worker/cli/image/picture.h"
 #include "worker/cli/image/tonemap.h"
@@ -14,13 +14,13 @@ struct arguments {
 	double stops;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"exposure", 'e', "STOPS", "Exposure in stops: each doubles the brightness",
 	 OPTION_NUMBER(struct arguments, stops, -100, 100), .default_value = "0"},
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int parse_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
@@ -29,7 +29,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	if (index == 0)
 		a->input = dash ? "/dev/stdin" : word;
 	else
-		a->output = target_from_arg(word);
+		a->output = output_target_from_arg(word);
 	return 0;
 }
 
@@ -57,8 +57,8 @@ static const struct program program = {
 	.details = "Values are multiplied by 2^STOPS and clipped to [0,1]. NaN becomes 0, infinities become 0 or "
 		   "255; both are counted on stderr. - is stdin or stdout.",
 	.exit_codes = "0 done, 1 failed, 2 usage",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
-	.parse_word = take_word,
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
+	.parse_word = parse_word,
 };
 
 static int tonemap_file(const struct arguments *a, struct error *e)

@@ -38,18 +38,18 @@ static void put_quoted(struct text_file *s, const char *text)
 {
 	enum { QUOTED_MAX = 400 };
 	const char *end = text + strlen(text);
-	text_file_bytes(s, "'", 1);
+	text_file_put_bytes(s, "'", 1);
 	for (size_t done = 0; text < end && done < QUOTED_MAX; done++) {
 		size_t n = text_file_character_length(text);
 		if (n == 0 || *text == '\t' || *text == '\n')
-			text_file_bytes(s, *text > 0 ? " " : "?", 1);
+			text_file_put_bytes(s, *text > 0 ? " " : "?", 1);
 		else if (*text == '\'')
-			text_file_bytes(s, "''", 2);
+			text_file_put_bytes(s, "''", 2);
 		else
-			text_file_bytes(s, text, n);
+			text_file_put_bytes(s, text, n);
 		text += n ? n : 1;
 	}
-	text_file_bytes(s, "'", 1);
+	text_file_put_bytes(s, "'", 1);
 }
 
 /* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008), which can be distinguished with all kinds of colour
@@ -61,8 +61,8 @@ static void put_axis(struct text_file *s, char which, const struct plot_axis *a,
 {
 	text_file_put(s, "set %clabel ", which);
 	put_quoted(s, label);
-	text_file_put(s, "\nset %crange [%.9g:%.9g]\n", which, a->low, a->high);
-	if (!a->log)
+	text_file_put(s, "\nset %crange [%.9g:%.9g]\n", which, a->min, a->max);
+	if (!a->is_log)
 		return;
 	text_file_put(s, "set logscale %c\nset %ctics (", which, which);
 	for (size_t i = 0; i < a->tic_count; i++)
@@ -113,11 +113,11 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 			continue;
 		double y = r->y ? r->y[i] : r->low[i];
 		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) &&
-			    (!p->log_y || r->high[i] > 0);
+			    (!p->is_log_y || r->high[i] > 0);
 		double low = bars ? r->low[i] : y, high = bars ? r->high[i] : y;
 		/* On a logarithmic axis, a bar that reaches 0 extends to the edge. */
 		text_file_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y,
-			      p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
+			      p->is_log_y && !(low > y_axis->min) ? y_axis->min : low, high);
 	}
 	text_file_put(s, "EOD\n");
 	for (size_t i = 0; r->labels && i < r->count; i++) {
@@ -182,7 +182,7 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	/* Plots in the same page need distinct ids for their parts; these are derived from the contents, so that they
 	 * are reproducible. */
 	put_style(s, png, fnv_add(FNV_OFFSET_BASIS, body.text.bytes, body.text.size));
-	text_file_bytes(s, body.text.bytes, body.text.size);
+	text_file_put_bytes(s, body.text.bytes, body.text.size);
 	s->has_failed = s->has_failed || body.has_failed;
 	text_file_fini(&body);
 	return s->has_failed ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;

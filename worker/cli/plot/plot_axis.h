@@ -8,8 +8,8 @@
 enum { PLOT_TICS_MAX = 32 };
 
 struct plot_axis {
-	double low, high; /* low < high */
-	bool log;
+	double min, max; /* min < high */
+	bool is_log;
 	size_t tic_count; /* 0 for a linear axis, for which gnuplot chooses the tics */
 	double tics[PLOT_TICS_MAX];
 };

@@ -19,7 +19,7 @@ struct plot_series {
 
 struct plot {
 	const char *title, *x_label, *y_label;
-	bool log_x, log_y;
+	bool is_log_x, is_log_y;
 	size_t series_count;
 	const struct plot_series *series;
 	const char *const *x_names; /* [x_name_count], printed at x = 1, 2, ... instead of numbers; NULL: numbers */

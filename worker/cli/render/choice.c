@@ -3,7 +3,7 @@
 
 #include "common/base/clock.h"
 #include "common/json/estimate_json.h"
-#include "worker/render/rays.h"
+#include "worker/render/count_rays.h"
 #include "worker/render/unseen_light.h"
 
 #include <stdio.h>
@@ -20,18 +20,18 @@ static int choose_integrator(const struct world *w, struct render_arguments *a, 
 
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
-	*out = (struct choice){.made = integrator_is_undecided(&a->plan)};
-	int rc = out->made ? choose_integrator(w, a, out, e) : 0;
+	*out = (struct choice){.is_made = integrator_is_undecided(&a->plan)};
+	int rc = out->is_made ? choose_integrator(w, a, out, e) : 0;
 	if (!rc)
 		rc = render_unseen_light(w, &a->plan, e);
-	return !rc && plan_wants_rays(&a->plan) ? render_count_rays(w, &a->plan, &a->plan.rays, e) : rc;
+	return !rc && plan_needs_ray_count(&a->plan) ? render_count_rays(w, &a->plan, &a->plan.rays, e) : rc;
 }
 
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e)
 {
 	struct scene scene;
 	struct world *w;
-	*out = (struct choice){.made = false};
+	*out = (struct choice){.is_made = false};
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_source_for_folders(&folders);
 	int rc = option_scene_read(&scene, &assets, name, a, e);
@@ -48,7 +48,7 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 
 void choice_print(const struct choice *c, const char *integrator)
 {
-	if (c->made)
+	if (c->is_made)
 		fprintf(stderr, "integrator %s, chosen by a pilot of %.1f s; hslt-render --explain says why\n",
 			integrator, c->seconds);
 }
@@ -74,13 +74,13 @@ static json_t *considered_to_json(void)
 
 json_t *choice_to_json(const struct choice *c)
 {
-	if (!c->made)
+	if (!c->is_made)
 		return json_null();
 	const struct render_choice *f = &c->result;
 	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:f s:o s:o}", "why", c->summary, "considered",
 			 considered_to_json(), "pilotSamples", (json_int_t)f->sample_count, "pilotSeconds", c->seconds,
 			 "pathMissesLight", (int)f->path_misses_light, "surfacesFocusLight", (int)f->has_narrow_lobes,
-			 "surfacesRefract", (int)f->transmits, "mergedRareShare", f->merging.rare_share,
+			 "surfacesRefract", (int)f->has_transmission, "mergedRareShare", f->merging.rare_share,
 			 "shareFoundByPath", f->found_fraction, "path", found_to_json(&f->path), "bdpt",
 			 f->is_settled ? json_null() : found_to_json(&f->bdpt));
 }

@@ -1,19 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Measures what must be known about a scene before a plan is made for it: the integrator (worker/render/choose.h) if
- * none was given, how much light its samples hardly ever find (worker/render/unseen_light.h), and how many
- * rays they take (worker/render/rays.h) if a time or an error ends the render. One thread.
+ * Measures what must be known about a scene before a plan is made for it: the integrator
+ * (worker/render/choose_integrator.h) if none was given, how much light its samples hardly ever find
+ * (worker/render/unseen_light.h), and how many rays they take (worker/render/count_rays.h) if a time or an error ends
+ * the render. One thread.
  */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H
 
 #include "worker/cli/base/options.h"
-#include "worker/render/choose.h"
+#include "worker/render/choose_integrator.h"
 
 #include <jansson.h>
 
 struct choice {
-	bool made; /* false: an integrator was given, and the rest is empty */
+	bool is_made; /* false: an integrator was given, and the rest is empty */
 	struct render_choice result;
 	double seconds;	   /* wall-clock time that the choice took */
 	char summary[512]; /* the choice in one line, for the user */

@@ -11,7 +11,7 @@
 #include "common/json/estimate_json.h"
 #include "common/plan/plan_text.h"
 #include "worker/cli/plot/plot.h"
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -53,7 +53,7 @@ static int plan_row(const struct estimate *s, struct row *r, struct error *e)
 	struct plan_request request = *s->request;
 	request.target_error = r->target;
 	int rc = plan_make(&request, &r->plan, e);
-	if (rc || !(s->speed > 0) || !plan_wants_speed(&request, &r->plan))
+	if (rc || !(s->speed > 0) || !plan_needs_speed(&request, &r->plan))
 		return rc;
 	request.speed = s->speed;
 	return plan_make(&request, &r->plan, e);
@@ -283,8 +283,8 @@ static int draw_estimate(const struct estimate *s, const struct rows *rows, cons
 	struct plot p = {.title = s->scene,
 			 .x_label = "seconds of CPU time",
 			 .y_label = "relative error, %",
-			 .log_x = true,
-			 .log_y = true,
+			 .is_log_x = true,
+			 .is_log_y = true,
 			 .series_count = series,
 			 .series = list};
 	return plot_write(&p, path, e);

@@ -13,15 +13,15 @@
 /* clang-format off */
 #define ESTIMATE_ROWS(type) \
 	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost", OPTION_FLAG(type, estimate)}, \
-	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(type, pilot, 0, 1e9), .min_excluded = true, \
-	 .max_excluded = true}, \
+	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(type, pilot, 0, 1e9), .excludes_min = true, \
+	 .excludes_max = true}, \
 	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(type, plot)}
 /* clang-format on */
 
 struct estimate {
 	const char *scene, *machine;	    /* name of the file; where it is rendered, as "this machine, 2 threads" */
 	const struct plan_request *request; /* of the render being predicted; each row sets its own target error */
-	const struct plan *plan;	    /* its plan for its own target error, or the one that pilot.h chose */
+	const struct plan *plan; /* its plan for its own target error, or the one that pilot_request.h chose */
 	const struct plan *pilot;
 	const struct forecast_history *looks; /* the pilot's estimates of its error */
 	double cpu_seconds, seconds;	      /* CPU and wall-clock time of the pilot, its bootstrap included */

@@ -3,7 +3,7 @@
 #ifndef WORKER_CLI_RENDER_ETA_H
 #define WORKER_CLI_RENDER_ETA_H
 
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 
 /* Returns the seconds until the first bound ends the render; NAN: not known yet. Of the plan, the bound on time is
  * used. forecast: the seconds from the first bootstrap sample to the target error; 0: unknown. Work counts at the speed

@@ -29,8 +29,8 @@ static void print_explanation(const char *name, const struct render_summary *m, 
 	char note[512];
 	printf("%s: %llu shape%s, %llu triangle%s\n\n", name, (unsigned long long)m->shapes, m->shapes == 1 ? "" : "s",
 	       (unsigned long long)m->triangles, m->triangles == 1 ? "" : "s");
-	for (size_t i = 0; i < m->line_count; i++) {
-		const struct effect_line *l = &m->lines[i];
+	for (size_t i = 0; i < m->effect_line_count; i++) {
+		const struct effect_line *l = &m->effect_lines[i];
 		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, effect_state(l), l->reason, "",
 		       l->is_on ? "omitting it would save" : "saves", l->savings);
 	}
@@ -40,9 +40,9 @@ static void print_explanation(const char *name, const struct render_summary *m, 
 		       simulated_depth(p));
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
-	printf("\n%s\n", c->made ? c->summary
-				 : "as requested; otherwise a pilot would choose among " RENDER_CHOICES_TEXT
-				   " and " RENDER_INTEGRATOR_CHAINS);
+	printf("\n%s\n", c->is_made ? c->summary
+				    : "as requested; otherwise a pilot would choose among " RENDER_CHOICES_TEXT
+				      " and " RENDER_INTEGRATOR_CHAINS);
 	for (size_t i = 0; render_scene_note(m, i, note, sizeof note); i++)
 		printf("note: %s\n", note);
 }
@@ -53,8 +53,8 @@ static int print_json(const char *name, const struct render_summary *m, const st
 	char note[512];
 	render_other_scene_note(m, note, sizeof note);
 	json_t *effects = json_array();
-	for (size_t i = 0; i < m->line_count; i++) {
-		const struct effect_line *l = &m->lines[i];
+	for (size_t i = 0; i < m->effect_line_count; i++) {
+		const struct effect_line *l = &m->effect_lines[i];
 		json_array_append_new(effects,
 				      json_pack("{s:s s:b s:b s:s s:s}", "name", l->name, "on", (int)l->is_on, "forced",
 						(int)l->is_forced, "why", l->reason, "saves", l->savings));
@@ -79,7 +79,7 @@ static int summarise_scene(const char *folder, const char *name, struct render_a
 	int rc = option_scene_read(&scene, &assets, name, a, e);
 	if (rc)
 		return rc;
-	rc = render_check(&scene, &assets, &a->render, m, e);
+	rc = world_check(&scene, &assets, &a->render, m, e);
 	scene_fini(&scene);
 	return rc;
 }

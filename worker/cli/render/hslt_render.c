@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The program hslt-render. It reads the options and the scene, chooses the integrator (choice.h), makes the plan,
- * renders it (local.h) and writes the image. Until the integrator is chosen, a signal ends the program at once; after
- * that, the image of the complete rounds is written, and the exit code says that the render was interrupted.
+ * renders it (local_run.h) and writes the image. Until the integrator is chosen, a signal ends the program at once;
+ * after that, the image of the complete rounds is written, and the exit code says that the render was interrupted.
  *
  * A failure ends with one line on stderr and the exit code of its kind (docs/design.md). The image is replaced
  * atomically or not at all.
@@ -11,7 +11,7 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/program.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/progress.h"
 #include "common/blob/blob.h"
 #include "common/exr/image_file.h"
@@ -28,8 +28,8 @@
 #include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
-#include "worker/cli/base/place.h"
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/base/source_place.h"
+#include "worker/cli/render/pilot_request.h"
 #include "worker/cli/render/stats.h"
 #include "worker/render/fingerprint.h"
 
@@ -44,7 +44,7 @@ struct arguments {
 	bool quiet, estimate, explain, json;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_CUSTOM(option_image)},
 	{"threads", 0, "N", "Threads (one per processor); does not change the bits",
 	 OPTION_COUNT(struct arguments, threads, 1, 1024)},
@@ -107,7 +107,7 @@ static const struct program program = {
 		"0 done, 1 failed, 2 usage, 4 another bound was reached before the target error, 5 chains disagree "
 		"(the image is there, and its "
 		"note says where)",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
 	.shared_options = &render_option_table,
 	.parse_word = option_scene,
 };
@@ -167,7 +167,7 @@ static int load_scene(struct session *s, struct error *e)
 		return rc;
 	option_plan_scene(&s->args->render, &s->inputs);
 	for (uint32_t i = 0; !s->args->quiet && i < scene.note_count; i++)
-		place_print(stderr, "note: ", s->args->render.scene, scene.notes[i]);
+		source_place_print(stderr, "note: ", s->args->render.scene, scene.notes[i]);
 	text_join_lines(s->scene_notes, sizeof s->scene_notes, scene.notes, scene.note_count);
 	rc = scene_append_missing_count(&scene, &assets,
 					world_new(&s->world, &scene, &assets, &s->args->render.render, e), e);
@@ -217,7 +217,7 @@ static int make_plan(struct session *s, struct error *e)
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
-		place_print(stderr, "hslt-render: note: ", s->args->render.scene, text);
+		source_place_print(stderr, "hslt-render: note: ", s->args->render.scene, text);
 	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB for Embree\n", s->build_seconds,
 		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
 	return 0;
@@ -317,7 +317,7 @@ static int render_image(struct session *s, struct error *e)
 		progress_end(&s->progress);
 	if (rc)
 		return rc;
-	if (!s->run.canvas || (canvas_complete_rounds(s->run.canvas) == 0 && !s->run.bootstrap_result.black))
+	if (!s->run.canvas || (canvas_complete_rounds(s->run.canvas) == 0 && !s->run.bootstrap_result.is_black))
 		return error_set(e, EINTR, "interrupted before the first round was complete: there is no image%s",
 				 s->kept_bootstrap.message);
 	rc = canvas_image_init(s->run.canvas, false, &s->image, e);
@@ -329,10 +329,11 @@ static int render_image(struct session *s, struct error *e)
 static int write_image(const struct session *s, struct error *e)
 {
 	struct header_effect effects[RENDER_EFFECTS_MAX];
-	for (size_t i = 0; i < s->summary.line_count; i++)
-		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].is_on,
-						    s->summary.lines[i].is_forced, s->summary.lines[i].reason,
-						    s->summary.lines[i].savings};
+	for (size_t i = 0; i < s->summary.effect_line_count; i++)
+		effects[i] =
+			(struct header_effect){s->summary.effect_lines[i].name, s->summary.effect_lines[i].is_on,
+					       s->summary.effect_lines[i].is_forced, s->summary.effect_lines[i].reason,
+					       s->summary.effect_lines[i].savings};
 	char camera[RENDER_CAMERA_TEXT_MAX];
 	render_camera_text(&s->summary, camera, sizeof camera);
 	struct header_extra x = {.scene = s->name,
@@ -340,12 +341,12 @@ static int write_image(const struct session *s, struct error *e)
 				 .inputs = &s->inputs,
 				 .camera = camera,
 				 .scene_notes = s->scene_notes,
-				 .effect_count = s->summary.line_count,
+				 .effect_count = s->summary.effect_line_count,
 				 .effects = effects,
 				 .wall_seconds = s->run.seconds,
 				 .cpu_seconds = s->run.cpu_seconds,
 				 .worker_count = s->args->threads,
-				 .end_name = merge_end_name(s->run.end, s->run.bootstrap_result.black)};
+				 .end_name = merge_end_name(s->run.end, s->run.bootstrap_result.is_black)};
 	unsigned char *bytes;
 	size_t size;
 	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
@@ -360,8 +361,8 @@ static int write_image(const struct session *s, struct error *e)
 static const char *end_text(const struct session *s)
 {
 	const struct plan_request *r = &s->args->render.plan;
-	if (s->run.end != MERGE_ROUNDS || s->run.bootstrap_result.black)
-		return merge_end_name(s->run.end, s->run.bootstrap_result.black);
+	if (s->run.end != MERGE_ROUNDS || s->run.bootstrap_result.is_black)
+		return merge_end_name(s->run.end, s->run.bootstrap_result.is_black);
 	return s->uses_scene_spp ? "the scene's samples per pixel" : r->mutations ? "--mutations" : "--spp";
 }
 
@@ -381,13 +382,13 @@ static void print_summary(const struct session *s)
 	convergence_print_table(i->classes, i->b, &s->convergence, text, sizeof text);
 	if (s->args->stats)
 		fputs(text, stderr);
-	if (s->args->stats && i->counts.counters[COUNT_SPREAD])
+	if (s->args->stats && i->counts.counters[COUNT_REDISTRIBUTED])
 		fprintf(stderr,
 			"chains that spread what is too bright for a sample: %.3g %% of the light, %.3g %% of the variance "
 			"of the mean, %.3g %% of the rays\n",
 			100 * i->chains_energy_share, 100 * i->chains_variance_share, 100 * stats_chains_rays(i));
 	strategy_print_note(p, &i->counts, i->is_black, text, sizeof text);
-	strategy_append_beyond(i->beyond_share, text, sizeof text);
+	strategy_append_overlong(i->overlong_share, text, sizeof text);
 	convergence_append_note(&s->convergence, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
@@ -482,7 +483,7 @@ static int run_session(struct session *s, struct error *e)
 		warn_unknown_error(s);
 	if (!rc && s->run.end == MERGE_CONTINUES)
 		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s",
-			       target_display_name(s->args->render.output), (unsigned long long)s->image.rounds,
+			       output_target_display_name(s->args->render.output), (unsigned long long)s->image.rounds,
 			       s->image.rounds == 1 ? "" : "s");
 	return rc;
 }
@@ -505,12 +506,12 @@ int main(int argc, char **argv)
 	mem_free(s.folder);
 	mem_free(s.name);
 	if (rc) {
-		place_print(stderr, "hslt-render: ", a.render.scene, e.text);
+		source_place_print(stderr, "hslt-render: ", a.render.scene, e.text);
 		return s.is_usage_error ? 2 : 1;
 	}
 	if (s.convergence.verdict == CHAINS_DISAGREE)
 		return 5;
 	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && s.run.end != MERGE_BLACK &&
-		      !s.run.bootstrap_result.black;
+		      !s.run.bootstrap_result.is_black;
 	return missed ? 4 : 0;
 }

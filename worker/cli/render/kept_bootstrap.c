@@ -103,10 +103,10 @@ static bool is_kept_bootstrap(const char *path)
 {
 	char begin[sizeof magic];
 	FILE *f = fopen(path, "rb");
-	bool ours = f && fread(begin, sizeof begin, 1, f) == 1 && memcmp(begin, magic, sizeof magic) == 0;
+	bool matches = f && fread(begin, sizeof begin, 1, f) == 1 && memcmp(begin, magic, sizeof magic) == 0;
 	if (f)
 		fclose(f);
-	return ours;
+	return matches;
 }
 
 /* Returns the error's sentence without the path at its beginning. */
@@ -136,8 +136,8 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 			rc = checked_file_expect_end(&f, &e);
 		checked_file_close(&f);
 	}
-	k->resumed = bootstrap_missing_count(b) < missing_before;
-	k->damaged = rc == -EBADMSG && is_kept_bootstrap(k->path);
+	k->was_resumed = bootstrap_missing_count(b) < missing_before;
+	k->is_damaged = rc == -EBADMSG && is_kept_bootstrap(k->path);
 	if (rc)
 		snprintf(text, size, "%.300s is not used: %.128s", k->path, without_path(&e, k->path));
 	else
@@ -195,6 +195,6 @@ void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
 
 void kept_bootstrap_end(const struct kept_bootstrap *k)
 {
-	if (k->resumed || k->damaged)
+	if (k->was_resumed || k->is_damaged)
 		unlink(k->path);
 }

@@ -31,8 +31,8 @@ struct kept_bootstrap {
 	uint64_t files_bytes;		    /* sum of the sizes of the files */
 	char path[KEPT_PATH_SIZE];	    /* "": nothing can be kept */
 	char identity_text[KEPT_TEXT_SIZE]; /* fingerprint, plan and defines */
-	bool resumed;			    /* leases were added from the file */
-	bool damaged;			    /* the file is a kept bootstrap, but damaged */
+	bool was_resumed;		    /* leases were added from the file */
+	bool is_damaged;		    /* the file is a kept bootstrap, but damaged */
 	char message[KEPT_PATH_SIZE + 256]; /* set by kept_bootstrap_write: the end of a sentence for the user */
 };
 

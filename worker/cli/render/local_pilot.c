@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/render/local_pilot.h"
 
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 
 static void on_round(void *user, const struct local_round *r)
 {
@@ -39,7 +39,7 @@ static int run_pilot(struct local_pilot *p, const struct plan_request *request, 
 				.on_round = on_round,
 				.user = p};
 	rc = local_run(r, e);
-	bool has_no_canvas = !r->canvas, black = r->bootstrap_result.black;
+	bool has_no_canvas = !r->canvas, black = r->bootstrap_result.is_black;
 	canvas_free(r->canvas);
 	if (!rc && has_no_canvas)
 		rc = error_set(e, EINTR, "interrupted before the first round of the pilot was complete");

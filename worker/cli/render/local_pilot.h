@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Runs a pilot on this machine (pilot.h): a probe, then a short render whose estimates of the error are kept. Threads
- * as in local.h. */
+/* Runs a pilot on this machine (pilot_request.h): a probe, then a short render whose estimates of the error are kept.
+ * Threads as in local_run.h. */
 #ifndef WORKER_CLI_RENDER_LOCAL_PILOT_H
 #define WORKER_CLI_RENDER_LOCAL_PILOT_H
 
 #include "common/estimate/forecast.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 
 struct local_pilot {
 	/* Set by the caller. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/render/speed.h"
 
-#include "worker/cli/render/local.h"
-#include "worker/render/rays.h"
+#include "worker/cli/render/local_run.h"
+#include "worker/render/count_rays.h"
 
 enum {
 	CHAINS = 16,
@@ -54,7 +54,7 @@ static int measure_in_world(const struct world *w, struct plan_request *r, doubl
 			return rc;
 		double seconds = l.cpu_seconds - l.bootstrap_cpu_seconds;
 		canvas_free(l.canvas);
-		if (l.bootstrap_result.black && r->kind == PLAN_CHAINS)
+		if (l.bootstrap_result.is_black && r->kind == PLAN_CHAINS)
 			return 0;
 		if (seconds >= min_seconds || r->epoch >= EPOCH_MAX) {
 			*speed = fmin((double)plan_round_mutations(&p) / fmax(seconds, 1e-6), PLAN_SPEED_MAX);

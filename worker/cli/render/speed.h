@@ -2,7 +2,7 @@
 /*
  * Measures how fast one thread of this machine renders a scene, which determines the length of an epoch
  * (plan_request.speed). This is a render of its own, of about a second. It is measured in CPU time, so that other
- * programs on the machine do not matter. Threads as in local.h.
+ * programs on the machine do not matter. Threads as in local_run.h.
  */
 #ifndef WORKER_CLI_RENDER_SPEED_H
 #define WORKER_CLI_RENDER_SPEED_H

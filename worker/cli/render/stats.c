@@ -21,9 +21,9 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 	[COUNT_STUCK] = "stuck",
 	[COUNT_LONGEST_STUCK] = "longestStuck",
 	[COUNT_STATES_LOST] = "statesLost",
-	[COUNT_SPREAD] = "spread",
-	[COUNT_SPREAD_MUTATIONS] = "spreadMutations",
-	[COUNT_SPREAD_RAYS] = "spreadRays",
+	[COUNT_REDISTRIBUTED] = "spread",
+	[COUNT_REDISTRIBUTION_MUTATIONS] = "spreadMutations",
+	[COUNT_REDISTRIBUTION_RAYS] = "spreadRays",
 };
 
 static json_t *plan_to_json(const struct stats *s)
@@ -54,17 +54,17 @@ static json_t *image_to_json(const struct canvas_image *i)
 			 *b_doubt ? json_null() : json_real_or_null(i->b_error), "bErrorDoubt", b_doubt, "relMSE",
 			 json_real_or_null(i->rel_mse), "relMSEUpper",
 			 *doubt ? json_null() : json_real_or_null(i->rel_mse_upper), "relMSE95",
-			 json_real_or_null(i->rel_mse_95[0]), json_real_or_null(i->rel_mse_95[1]), "relMSEDefinition",
-			 REL_MSE_DEFINITION, "relMSEDoubt", doubt, "relMSEUnseen", i->rel_mse_unseen, "unvisitedPixels",
-			 (json_int_t)i->unvisited_count, "beyondShare", json_real_or_null(i->beyond_share), "counters",
-			 counters);
+			 json_real_or_null(i->rel_mse_interval_95[0]), json_real_or_null(i->rel_mse_interval_95[1]),
+			 "relMSEDefinition", REL_MSE_DEFINITION, "relMSEDoubt", doubt, "relMSEUnseen",
+			 i->rel_mse_unseen, "unvisitedPixels", (json_int_t)i->unvisited_count, "beyondShare",
+			 json_real_or_null(i->overlong_share), "counters", counters);
 }
 
 double stats_chains_rays(const struct canvas_image *i)
 {
 	const uint64_t *c = i->counts.counters;
 	double total = (double)c[COUNT_RAYS_CLOSEST] + (double)c[COUNT_RAYS_SHADOW];
-	return total > 0 ? (double)c[COUNT_SPREAD_RAYS] / total : 0;
+	return total > 0 ? (double)c[COUNT_REDISTRIBUTION_RAYS] / total : 0;
 }
 
 static json_t *part_to_json(const char *name, double energy, double variance, double rays)
@@ -79,7 +79,7 @@ static json_t *parts_to_json(const struct canvas_image *i)
 {
 	json_t *parts = json_array();
 	double rays = stats_chains_rays(i);
-	if (i->counts.counters[COUNT_SPREAD] > 0) {
+	if (i->counts.counters[COUNT_REDISTRIBUTED] > 0) {
 		json_array_append_new(parts, part_to_json("samples", 1 - i->chains_energy_share,
 							  1 - i->chains_variance_share, 1 - rays));
 		json_array_append_new(parts,
@@ -91,10 +91,11 @@ static json_t *parts_to_json(const struct canvas_image *i)
 static json_t *effects_to_json(const struct render_summary *m)
 {
 	json_t *effects = json_array();
-	for (size_t i = 0; i < m->line_count; i++)
-		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", m->lines[i].name, "on",
-							 (int)m->lines[i].is_on, "forced", (int)m->lines[i].is_forced,
-							 "why", m->lines[i].reason, "saves", m->lines[i].savings));
+	for (size_t i = 0; i < m->effect_line_count; i++)
+		json_array_append_new(
+			effects, json_pack("{s:s s:b s:b s:s s:s}", "name", m->effect_lines[i].name, "on",
+					   (int)m->effect_lines[i].is_on, "forced", (int)m->effect_lines[i].is_forced,
+					   "why", m->effect_lines[i].reason, "saves", m->effect_lines[i].savings));
 	return effects;
 }
 
@@ -103,10 +104,10 @@ static json_t *end_to_json(const struct stats *s)
 	const struct plan *p = s->run->plan;
 	char note[STRATEGY_NOTE_MAX];
 	strategy_print_note(p, &s->image->counts, s->image->is_black, note, sizeof note);
-	strategy_append_beyond(s->image->beyond_share, note, sizeof note);
+	strategy_append_overlong(s->image->overlong_share, note, sizeof note);
 	convergence_append_note(s->convergence, note, sizeof note);
 	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end",
-			 merge_end_name(s->run->end, s->run->bootstrap_result.black), "mixture", p->mutations,
+			 merge_end_name(s->run->end, s->run->bootstrap_result.is_black), "mixture", p->mutations,
 			 "strategies", strategy_to_json(p->mutations, &s->image->counts), "note", note, "agreement",
 			 convergence_to_json(s->convergence), "classes", classes_to_json(s->image->classes));
 }

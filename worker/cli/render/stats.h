@@ -10,7 +10,7 @@
 #include "common/estimate/forecast.h"
 #include "common/plan/plan_text.h"
 #include "worker/cli/render/choice.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 
 struct stats {
 	const char *scene; /* name of its file */

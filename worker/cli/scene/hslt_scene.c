@@ -4,7 +4,7 @@
 
 #include "common/base/program.h"
 #include "worker/cli/base/options.h"
-#include "worker/cli/base/place.h"
+#include "worker/cli/base/source_place.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -15,7 +15,7 @@ struct arguments {
 	bool json, lenient;
 };
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_CUSTOM(option_define)},
 	{"path", 'p', "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_CUSTOM(option_path)},
@@ -32,7 +32,7 @@ static const char *verb_at(size_t i)
 	return verbs[i];
 }
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
+static int parse_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
@@ -67,9 +67,9 @@ static const struct program program = {
 		"and its files with the first digits of their SHA-256.\ncompatibility: what is supported of Mitsuba's "
 		"scenes, all plug-ins and parameters, as in docs/compatibility.md.",
 	.exit_codes = "0 the scene can be rendered, 1 it cannot, 2 usage",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
 	.verbs = verb_at,
-	.parse_word = take_word,
+	.parse_word = parse_word,
 };
 
 int main(int argc, char **argv)
@@ -85,6 +85,6 @@ int main(int argc, char **argv)
 	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.render, a.lenient, &bad, &e)
 					      : scene_report_show(&a.render, a.lenient, a.json, &e);
 	if (rc)
-		place_print(stderr, "hslt-scene: ", a.render.scene, e.text);
+		source_place_print(stderr, "hslt-scene: ", a.render.scene, e.text);
 	return rc || bad ? 1 : 0;
 }

@@ -12,7 +12,7 @@
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
-#include "worker/cli/base/place.h"
+#include "worker/cli/base/source_place.h"
 #include "worker/render/gltf/gltf.h"
 #include "worker/render/scene/lenient.h"
 
@@ -106,7 +106,7 @@ static void print_problems(struct problem_list *p, const char *scene)
 	if (p->count)
 		qsort(p->problems, p->count, sizeof *p->problems, compare_places);
 	for (size_t i = 0; i < p->count; i++) {
-		place_print(stdout, "", scene, p->problems[i].text);
+		source_place_print(stdout, "", scene, p->problems[i].text);
 		mem_free(p->problems[i].text);
 	}
 	mem_free(p->problems);
@@ -145,7 +145,8 @@ static bool is_at_place(const char *text, const char *file, size_t n, unsigned l
 
 /* Returns whether a problem found by building may only follow from one of the first `read_count` problems, found by
  * reading: it has no line, or the line of such a problem, or of an object that lacks something. */
-static bool may_follow(const struct scene *s, const struct problem_list *list, size_t read_count, const char *text)
+static bool may_follow_from_problem(const struct scene *s, const struct problem_list *list, size_t read_count,
+				    const char *text)
 {
 	unsigned long line;
 	size_t n = parse_place(text, &line);
@@ -174,13 +175,13 @@ static uint32_t find_build_problems(const struct scene *s, const struct asset_so
 	uint32_t problems = 0;
 	int rc = report_init(&found, &arena, &e);
 	if (!rc)
-		rc = render_check_all(s, assets, &default_options, &found, m, &e);
+		rc = world_check_all(s, assets, &default_options, &found, m, &e);
 	for (uint32_t i = 0; i < found.problem_count; i++)
-		if (!before || !may_follow(s, list, before, found.problems[i])) {
+		if (!before || !may_follow_from_problem(s, list, before, found.problems[i])) {
 			add_problem(list, found.problems[i]);
 			problems++;
 		}
-	if (rc && (!before || !may_follow(s, list, before, e.text))) {
+	if (rc && (!before || !may_follow_from_problem(s, list, before, e.text))) {
 		add_problem(list, e.text);
 		problems++;
 	}
@@ -211,10 +212,10 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 		problems += find_build_problems(s, assets, &list, &m);
 	print_problems(&list, scene);
 	for (uint32_t i = 0; i < s->note_count; i++)
-		place_print(stdout, "note: ", scene, s->notes[i]);
+		source_place_print(stdout, "note: ", scene, s->notes[i]);
 	char text[512];
 	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
-		place_print(stdout, "note: ", scene, text);
+		source_place_print(stdout, "note: ", scene, text);
 	uint64_t pixels = (uint64_t)scene_settings_width(&m.settings) * scene_settings_height(&m.settings);
 	if (!problems && pixels > PLAN_PIXELS_MAX) {
 		printf("note: the image has %llu pixels; a render has at most %d: --crop or --size is needed\n",
@@ -284,9 +285,9 @@ static json_t *files_to_json(const struct scene *s, const struct opened_scene *o
 static json_t *effects_to_json(const struct render_summary *m)
 {
 	json_t *on = json_array();
-	for (size_t i = 0; i < m->line_count; i++)
-		if (m->lines[i].is_on)
-			json_array_append_new(on, json_string(m->lines[i].name));
+	for (size_t i = 0; i < m->effect_line_count; i++)
+		if (m->effect_lines[i].is_on)
+			json_array_append_new(on, json_string(m->effect_lines[i].name));
 	return on;
 }
 
@@ -296,7 +297,7 @@ static json_t *scene_to_json(const struct scene *s, const struct opened_scene *o
 {
 	static struct render_summary m; /* too large for the stack */
 	const struct render_options default_options = {0};
-	if (render_check(s, &o->assets, &default_options, &m, e))
+	if (world_check(s, &o->assets, &default_options, &m, e))
 		return NULL;
 	json_t *files = files_to_json(s, o, e), *notes = json_array();
 	if (!files)

@@ -2,7 +2,7 @@
 #include "worker/cli/submit/farm_pilot.h"
 
 #include "common/base/mem.h"
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 
 #include <stdio.h>
 
@@ -29,7 +29,7 @@ static int run_pilot(struct farm_pilot *p, const char *kind, const struct plan_r
 		rc = submit_wait(p->client, &job, &p->outcome, e);
 	if (!rc && p->outcome.exit_code == 3)
 		rc = error_set(e, ECANCELED, "the %s, job j%llu, ended without an image: %s", kind,
-			       (unsigned long long)job.job, p->outcome.why);
+			       (unsigned long long)job.job, p->outcome.reason);
 	return rc;
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pilot on a farm (pilot.h): a probe and a short render, each a job of its own, whose estimates of the error come
- * with the job's status. One thread; shows progress on stderr.
+ * A pilot on a farm (pilot_request.h): a probe and a short render, each a job of its own, whose estimates of the error
+ * come with the job's status. One thread; shows progress on stderr.
  */
 #ifndef WORKER_CLI_SUBMIT_FARM_PILOT_H
 #define WORKER_CLI_SUBMIT_FARM_PILOT_H

@@ -10,7 +10,7 @@
  */
 #include "common/base/crash.h"
 #include "common/base/program.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include "common/base/text.h"
 #include "common/estimate/stated_error.h"
 #include "worker/cli/base/interrupt.h"
@@ -18,9 +18,9 @@
 #include "worker/cli/render/estimate.h"
 #include "worker/cli/submit/farm_pilot.h"
 #include "worker/cli/base/options.h"
-#include "worker/cli/base/place.h"
+#include "worker/cli/base/source_place.h"
 #include "worker/cli/submit/reconnect.h"
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 #include "worker/cli/render/speed.h"
 
 #include <jansson.h>
@@ -45,7 +45,7 @@ static bool writes_to_stdout(const struct arguments *a)
 	return a->render.output && strcmp(a->render.output, TARGET_STDOUT) == 0;
 }
 
-static int take_priority(void *target, char *arg, struct error *e)
+static int parse_priority(void *target, char *arg, struct error *e)
 {
 	struct arguments *a = target;
 	char *end;
@@ -56,22 +56,22 @@ static int take_priority(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-static const struct option_row rows[] = {
+static const struct option_row option_rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct arguments, coordinator),
-	 .environment = "HSLT_COORDINATOR", .required = true},
+	 .environment = "HSLT_COORDINATOR", .is_required = true},
 	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_CUSTOM(option_image)},
-	{"priority", 0, "P", "-100 to 100, higher first", OPTION_CUSTOM(take_priority), .default_value = "0"},
+	{"priority", 0, "P", "-100 to 100, higher first", OPTION_CUSTOM(parse_priority), .default_value = "0"},
 	{"name", 0, "NAME", "Displayed name of the job (the scene's file name)",
 	 OPTION_NAME(struct arguments, name, JOB_NAME_MAX)},
 	{"wait", 0, NULL, "Show progress and fetch the image", OPTION_FLAG(struct arguments, wait)},
 	{"patience", 0, "SECONDS", "With --wait: how long to try to reconnect to the coordinator",
-	 OPTION_SECONDS(struct arguments, patience_seconds, 0, 1e9), .min_excluded = true, .max_excluded = true,
+	 OPTION_SECONDS(struct arguments, patience_seconds, 0, 1e9), .excludes_min = true, .excludes_max = true,
 	 .default_value = "600"},
 	{"json", 0, NULL, "Print one JSON object instead of the id, or of the estimate's table",
 	 OPTION_FLAG(struct arguments, json)},
 	ESTIMATE_ROWS(struct arguments),
 	{"mixed", 0, NULL, "Accept workers of any numeric fingerprint, without equal bits",
-	 OPTION_FLAG(struct arguments, request.mixed)},
+	 OPTION_FLAG(struct arguments, request.is_mixed)},
 	{"verify", 0, "P", "Share or percentage of the epochs on which two workers must agree before they count",
 	 OPTION_RATIO(struct arguments, request.verify_fraction, 0, 1), .default_value = "0"},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
@@ -92,7 +92,7 @@ static int check_options(void *target, struct error *e)
 	const struct arguments *a = target;
 	if (!a->render.scene || (!a->render.output && !a->estimate))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
-	if (a->request.verify_fraction > 0 && a->request.mixed)
+	if (a->request.verify_fraction > 0 && a->request.is_mixed)
 		return error_set(e, EINVAL, "results of --mixed workers cannot be compared: no --verify");
 	if (a->estimate && (a->render.output || a->wait))
 		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --wait");
@@ -125,7 +125,7 @@ static const struct program program = {
 		"chains disagree (the image is "
 		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited "
 		"(the job continues)",
-	.options = {(const struct option_group[]){{NULL, rows}, {0}}, check_options},
+	.options = {(const struct option_group[]){{NULL, option_rows}, {0}}, check_options},
 	.shared_options = &render_option_table,
 	.parse_word = option_scene,
 };
@@ -143,7 +143,7 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
 		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
-				      "output", target_to_arg(a->render.output), "plan", plan, "state", state);
+				      "output", output_target_to_arg(a->render.output), "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -162,8 +162,8 @@ static void set_end_message(const struct arguments *a, uint64_t job)
 	static char text[512];
 	unsigned long long id = job;
 	char fetch[256], cancel[64];
-	int width =
-		snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, target_to_arg(a->render.output));
+	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id,
+			     output_target_to_arg(a->render.output));
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(
 		text, sizeof text,
@@ -177,7 +177,7 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 			struct error *e)
 {
 	struct submitted_job job;
-	struct submit_outcome end = {0};
+	struct submit_outcome outcome = {0};
 	char plan[PLAN_TEXT_MAX] = "", rule[STATED_ERROR_TEXT_MAX];
 	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience_seconds};
 	int rc = submit_send(*cl, &a->request, files, &job, plan, sizeof plan, e);
@@ -193,15 +193,15 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 		print_id(a, job.job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = reconnect_job(cl, &o, &job, a->render.output, &end, e);
-	if (!rc && !end.has_result)
+	rc = reconnect_job(cl, &o, &job, a->render.output, &outcome, e);
+	if (!rc && !outcome.has_result)
 		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job,
-			end.why);
-	if (!rc && *end.note)
-		fprintf(stderr, "hslt-submit: note: %s\n", end.note);
+			outcome.reason);
+	if (!rc && *outcome.note)
+		fprintf(stderr, "hslt-submit: note: %s\n", outcome.note);
 	if (!rc && a->json)
-		print_id(a, job.job, plan, end.state);
-	*code = (int)end.exit_code;
+		print_id(a, job.job, plan, outcome.state);
+	*code = (int)outcome.exit_code;
 	return rc;
 }
 
@@ -244,7 +244,7 @@ static void measure_speed(struct arguments *a, const struct scene_files *files)
 	struct plan plan;
 	struct error e;
 	double speed;
-	if (a->estimate || plan_make(&a->render.plan, &plan, &e) || !plan_wants_speed(&a->render.plan, &plan))
+	if (a->estimate || plan_make(&a->render.plan, &plan, &e) || !plan_needs_speed(&a->render.plan, &plan))
 		return;
 	if (speed_measure(&a->render, files->folder, files->scene, &speed, &e)) {
 		fprintf(stderr, "hslt-submit: note: no pilot for the length of epochs: %s\n", e.text);
@@ -280,7 +280,7 @@ static void print_notes(const struct arguments *a, const struct scene_files *fil
 {
 	char note[512];
 	for (size_t i = 0; render_scene_note(&files->summary, i, note, sizeof note); i++)
-		place_print(stderr, "hslt-submit: note: ", a->render.scene, note);
+		source_place_print(stderr, "hslt-submit: note: ", a->render.scene, note);
 }
 
 int main(int argc, char **argv)
@@ -298,11 +298,11 @@ int main(int argc, char **argv)
 	if (!rc)
 		rc = scene_files_read(&files, a.render.scene, &a.render, &outputs, &e);
 	if (rc) {
-		place_print(stderr, "hslt-submit: ", a.render.scene, e.text);
+		source_place_print(stderr, "hslt-submit: ", a.render.scene, e.text);
 		return 1;
 	}
 	for (size_t i = 0; i < files.note_count; i++)
-		place_print(stderr, "note: ", a.render.scene, files.notes[i]);
+		source_place_print(stderr, "note: ", a.render.scene, files.notes[i]);
 	rc = a.estimate ? pilot_plan_from_scene(&a.render, &files.summary, &e)
 			: render_plan_from_scene(&a.render, &files.summary, &e);
 	if (rc) {

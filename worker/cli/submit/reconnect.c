@@ -2,7 +2,7 @@
 #include "worker/cli/submit/reconnect.h"
 
 #include "common/base/clock.h"
-#include "common/base/target.h"
+#include "common/base/output_target.h"
 #include <stdio.h>
 
 static const double initial_pause = 0.25, max_pause = 10;
@@ -19,11 +19,11 @@ static bool is_connection_lost(int rc)
 }
 
 static int wait_and_fetch(struct client *cl, const struct submitted_job *job, const char *output,
-			  struct submit_outcome *end, struct error *e)
+			  struct submit_outcome *outcome, struct error *e)
 {
-	int rc = submit_wait(cl, job, end, e);
+	int rc = submit_wait(cl, job, outcome, e);
 	/* Fetches also if the job made an image that has been deleted since: the coordinator's error tells that. */
-	if (!rc && (end->has_result || end->exit_code != 3))
+	if (!rc && (outcome->has_result || outcome->exit_code != 3))
 		rc = client_fetch(cl, job->job, FARM__WHAT__WHAT_RESULT, output, e);
 	return rc;
 }
@@ -45,10 +45,10 @@ static int reconnect_client(struct client **cl, const struct reconnect *o, struc
 }
 
 int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted_job *job, const char *output,
-		  struct submit_outcome *end, struct error *e)
+		  struct submit_outcome *outcome, struct error *e)
 {
 	int rc;
-	while (is_connection_lost(rc = wait_and_fetch(*cl, job, output, end, e))) {
+	while (is_connection_lost(rc = wait_and_fetch(*cl, job, output, outcome, e))) {
 		client_close(*cl);
 		*cl = NULL;
 		fprintf(stderr, "hslt-submit: %s; trying again for %g s\n", e->text, o->patience_seconds);
@@ -59,16 +59,16 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 				"no coordinator at %s for %g s. The job is in its spool and continues when it is back: hslt-job "
 				"fetch j%llu -o %s",
 				o->coordinator, o->patience_seconds, (unsigned long long)job->job,
-				target_to_arg(output));
+				output_target_to_arg(output));
 		if (rc == -EKEYEXPIRED) {
 			struct error why = *e;
 			return error_set(e, EKEYEXPIRED, "%s. The job continues: hslt-job fetch j%llu -o %s", why.text,
-					 (unsigned long long)job->job, target_to_arg(output));
+					 (unsigned long long)job->job, output_target_to_arg(output));
 		}
 		if (rc)
 			break;
 	}
-	if (rc && end->has_result) {
+	if (rc && outcome->has_result) {
 		struct error why = *e;
 		rc = error_set(e, -rc, "%s. The image stays on the farm: hslt-job fetch j%llu -o FILE", why.text,
 			       (unsigned long long)job->job);

@@ -19,6 +19,6 @@ struct reconnect {
  * certificate stayed expired for as long (in both cases the sentence says how to get the image later), -ESTALE if
  * another job has the number now, or another error of the client. */
 int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted_job *job, const char *output,
-		  struct submit_outcome *end, struct error *e);
+		  struct submit_outcome *outcome, struct error *e);
 
 #endif

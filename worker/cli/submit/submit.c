@@ -93,7 +93,7 @@ int scene_files_read(struct scene_files *files, const char *path, struct render_
 	rc = option_scene_read(&scene, &assets, files->scene, a, e);
 	if (!rc) {
 		rc = scene_append_missing_count(&scene, &assets,
-						render_check(&scene, &assets, &a->render, &files->summary, e), e);
+						world_check(&scene, &assets, &a->render, &files->summary, e), e);
 		if (!rc)
 			rc = copy_notes(files, &scene, e);
 		scene_fini(&scene);
@@ -138,7 +138,7 @@ static void lists_fini(struct message_lists *l)
 static int lists_init(struct message_lists *l, const struct submit_request *r, struct scene_files *files,
 		      struct error *e)
 {
-	size_t lines = files->summary.line_count;
+	size_t lines = files->summary.effect_line_count;
 	*l = (struct message_lists){mem_alloc(files->file_count, sizeof *l->files),
 				    mem_alloc(files->file_count, sizeof *l->file_refs),
 				    mem_alloc(r->args->define_count, sizeof *l->defines),
@@ -165,11 +165,11 @@ static int lists_init(struct message_lists *l, const struct submit_request *r, s
 	for (size_t i = 0; i < lines; i++) {
 		Farm__Effect *f = l->effect_refs[i] = &l->effects[i];
 		farm__effect__init(f);
-		f->name = text_unconst(files->summary.lines[i].name);
-		f->on = files->summary.lines[i].is_on;
-		f->why = files->summary.lines[i].reason;
-		f->forced = files->summary.lines[i].is_forced;
-		f->saves = text_unconst(files->summary.lines[i].savings);
+		f->name = text_unconst(files->summary.effect_lines[i].name);
+		f->on = files->summary.effect_lines[i].is_on;
+		f->why = files->summary.effect_lines[i].reason;
+		f->forced = files->summary.effect_lines[i].is_forced;
+		f->saves = text_unconst(files->summary.effect_lines[i].savings);
 	}
 	return 0;
 }
@@ -213,12 +213,12 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.brightest = files->summary.brightness_bound;
 	s.n_files = files->file_count;
 	s.files = l.file_refs;
-	s.n_effects = files->summary.line_count;
+	s.n_effects = files->summary.effect_line_count;
 	s.effects = l.effect_refs;
 	s.n_notes = files->note_count;
 	s.notes = files->notes;
 	s.output = text_unconst(r->output);
-	s.mixed = r->mixed;
+	s.mixed = r->is_mixed;
 	s.verify = r->verify_fraction;
 	rc = client_send(cl, ENVELOPE_OF(SUBMIT, submit, &s), NULL, 0, e);
 	lists_fini(&l);
@@ -339,38 +339,38 @@ static void show_status(struct progress *p, const Farm__JobStatus *s)
 	progress_show(p, s->progress, s->state, detail);
 }
 
-static void copy_looks(const Farm__JobStatus *s, struct submit_outcome *end)
+static void copy_looks(const Farm__JobStatus *s, struct submit_outcome *outcome)
 {
-	end->cpu_seconds = s->cpu_seconds;
-	end->bootstrap_cpu_seconds = s->bootstrap_cpu_seconds;
-	end->bootstrap_seconds = s->bootstrap_seconds;
-	end->looks.count = 0;
+	outcome->cpu_seconds = s->cpu_seconds;
+	outcome->bootstrap_cpu_seconds = s->bootstrap_cpu_seconds;
+	outcome->bootstrap_seconds = s->bootstrap_seconds;
+	outcome->looks.count = 0;
 	for (size_t i = 0; i < s->n_looks; i++) {
-		struct forecast_look l = {.doubtful = s->looks[i]->doubtful != 0};
+		struct forecast_look l = {.is_doubtful = s->looks[i]->doubtful != 0};
 		FORECAST_COPY_LOOK(&l, s->looks[i]);
-		forecast_add_look(&end->looks, &l);
+		forecast_add_look(&outcome->looks, &l);
 	}
 }
 
 /* Shows a status and stores its contents in *end. *ended: the job has ended. */
 static int apply_status(struct progress *p, const Farm__JobStatus *s, const struct submitted_job *job,
-			struct submit_outcome *end, bool *ended, struct error *e)
+			struct submit_outcome *outcome, bool *ended, struct error *e)
 {
 	if (s->submitted != job->submitted_at)
 		return error_set(e, ESTALE, "j%llu is another job now, '%s': the coordinator uses another spool",
 				 (unsigned long long)job->job, s->name);
 	show_status(p, s);
 	*ended = s->ended;
-	copy_looks(s, end);
-	end->exit_code = s->exit_code;
-	end->has_result = s->fetchable;
-	text_copy(end->state, sizeof end->state, s->state);
-	text_copy(end->why, sizeof end->why, s->why);
-	text_copy(end->note, sizeof end->note, s->note);
+	copy_looks(s, outcome);
+	outcome->exit_code = s->exit_code;
+	outcome->has_result = s->fetchable;
+	text_copy(outcome->state, sizeof outcome->state, s->state);
+	text_copy(outcome->reason, sizeof outcome->reason, s->why);
+	text_copy(outcome->note, sizeof outcome->note, s->note);
 	return 0;
 }
 
-int submit_wait(struct client *cl, const struct submitted_job *job, struct submit_outcome *end, struct error *e)
+int submit_wait(struct client *cl, const struct submitted_job *job, struct submit_outcome *outcome, struct error *e)
 {
 	struct progress p;
 	int rc = client_send(cl, ENVELOPE(WATCH, watch, .job = job->job), NULL, 0, e);
@@ -383,7 +383,7 @@ int submit_wait(struct client *cl, const struct submitted_job *job, struct submi
 			break;
 		const Farm__Envelope *envelope = message.envelope.message;
 		if (envelope->body_case == FARM__ENVELOPE__BODY_JOB_STATUS)
-			rc = apply_status(&p, envelope->job_status, job, end, &ended, e);
+			rc = apply_status(&p, envelope->job_status, job, outcome, &ended, e);
 		client_message_fini(&message);
 	}
 	progress_end(&p);

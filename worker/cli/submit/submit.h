@@ -37,7 +37,7 @@ void scene_files_fini(struct scene_files *files);
 struct submit_request {
 	const char *name, *output; /* output: name of the image file for a later fetch, or "" */
 	int priority;
-	bool mixed;		/* workers of any numeric fingerprint may take part */
+	bool is_mixed;		/* workers of any numeric fingerprint may take part */
 	double verify_fraction; /* share of the epochs that two workers compute */
 	const struct render_arguments *args;
 };
@@ -59,10 +59,10 @@ struct submit_outcome {
 	char state[16];		       /* "done", "failed" or "cancelled" */
 	struct forecast_history looks; /* estimates of the error; their times count from the first round on */
 	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
-	char why[256], note[1024]; /* why there is no result; notes on the image */
+	char reason[256], note[1024]; /* why there is no result; notes on the image */
 };
 
 /* Shows progress on stderr until the job has ended. Returns -ESTALE if another job has the number now. */
-int submit_wait(struct client *cl, const struct submitted_job *job, struct submit_outcome *end, struct error *e);
+int submit_wait(struct client *cl, const struct submitted_job *job, struct submit_outcome *outcome, struct error *e);
 
 #endif

@@ -245,7 +245,7 @@ static bool find_similar_entry(const char *folder, const char *subfolder, const 
 			close(fd);
 		return false;
 	}
-	struct spelling s = {.wanted = wanted};
+	struct spelling s = {.wanted_name = wanted};
 	const struct dirent *entry;
 	for (int i = 0; i < ENTRIES_COMPARED_MAX && (entry = readdir(dir)); i++) {
 		if (entry->d_name[0] == '.' || !has_same_digits(entry->d_name, wanted))
@@ -253,9 +253,9 @@ static bool find_similar_entry(const char *folder, const char *subfolder, const 
 		spelling_offer(&s, entry->d_name);
 	}
 	closedir(dir);
-	if (s.best)
-		snprintf(best, NAME_MAX + 1, "%s", s.best);
-	return s.best != NULL;
+	if (s.best_match)
+		snprintf(best, NAME_MAX + 1, "%s", s.best_match);
+	return s.best_match != NULL;
 }
 
 static bool is_file(const char *folder, const char *name)

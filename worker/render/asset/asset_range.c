@@ -48,47 +48,47 @@ static int64_t decode_base64(const unsigned char *text, size_t n, unsigned char 
 	return (int64_t)count;
 }
 
-int asset_range_decode_base64(struct asset_range *p, const char *name, struct error *e)
+int asset_range_decode_base64(struct asset_range *r, const char *name, struct error *e)
 {
-	p->decoded = mem_alloc(p->size / 4 * 3 + 3, 1);
-	if (!p->decoded)
+	r->decoded = mem_alloc(r->size / 4 * 3 + 3, 1);
+	if (!r->decoded)
 		return error_set(e, ENOMEM, "%s: out of memory", name);
-	int64_t size = decode_base64(p->bytes, p->size, p->decoded);
+	int64_t size = decode_base64(r->bytes, r->size, r->decoded);
 	if (size < 0) {
-		mem_free(p->decoded);
+		mem_free(r->decoded);
 		return error_set(e, EINVAL, "%s: the embedded data is not base64", name);
 	}
-	p->bytes = p->decoded;
-	p->size = (size_t)size;
+	r->bytes = r->decoded;
+	r->size = (size_t)size;
 	return 0;
 }
 
-int asset_range_open(struct asset_range *p, const struct asset_source *assets, const char *name, uint64_t offset,
+int asset_range_open(struct asset_range *r, const struct asset_source *assets, const char *name, uint64_t offset,
 		     uint64_t count, bool base64, struct error *e)
 {
-	int rc = assets->open(assets->user, name, &p->file, e);
+	int rc = assets->open(assets->user, name, &r->file, e);
 	if (rc)
 		return rc;
-	uint64_t size = p->file.size;
-	p->file_is_open = true;
-	p->decoded = NULL;
+	uint64_t size = r->file.size;
+	r->is_file_open = true;
+	r->decoded = NULL;
 	if (count == UINT64_MAX)
 		count = offset < size ? size - offset : 0;
-	p->bytes = p->file.bytes + offset;
-	p->size = (size_t)count;
+	r->bytes = r->file.bytes + offset;
+	r->size = (size_t)count;
 	if (offset > size || count > size - offset)
 		rc = error_set(e, EINVAL, "%s has %llu bytes, too few for %llu bytes from byte %llu on", name,
 			       (unsigned long long)size, (unsigned long long)count, (unsigned long long)offset);
 	else if (base64)
-		rc = asset_range_decode_base64(p, name, e);
+		rc = asset_range_decode_base64(r, name, e);
 	if (rc)
-		assets->close(assets->user, &p->file);
+		assets->close(assets->user, &r->file);
 	return rc;
 }
 
-void asset_range_close(struct asset_range *p, const struct asset_source *assets)
+void asset_range_close(struct asset_range *r, const struct asset_source *assets)
 {
-	mem_free(p->decoded);
-	if (p->file_is_open)
-		assets->close(assets->user, &p->file);
+	mem_free(r->decoded);
+	if (r->is_file_open)
+		assets->close(assets->user, &r->file);
 }

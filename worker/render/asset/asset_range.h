@@ -14,7 +14,7 @@ struct asset_range {
 	const unsigned char *bytes;
 	size_t size;
 	struct asset file;
-	bool file_is_open;
+	bool is_file_open;
 	unsigned char *decoded; /* the bytes decoded from base64; NULL: `bytes` points into the file */
 };
 

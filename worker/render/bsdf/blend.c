@@ -7,27 +7,27 @@
 /* The light that each part scatters, and the probability with which a sample chooses that part. */
 struct part_weights {
 	spectrum weight[BLEND_PARTS_MAX];
-	double chance[BLEND_PARTS_MAX];
+	double probability[BLEND_PARTS_MAX];
 };
 
 static void compute_part_weights(const struct blend *m, const struct bsdf_point *p, struct part_weights *s)
 {
 	double sum = 0;
 	if (!m->has_fixed_weights) {
-		int weighted_part = m->weight_is_of_first ? 0 : 1;
+		int weighted_part = m->is_weight_of_first ? 0 : 1;
 		spectrum weight = texture_eval(&m->weight, &p->texture_point, p->wavelengths);
 		s->weight[weighted_part] = weight;
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			s->weight[1 - weighted_part].v[i] = 1 - weight.v[i];
-		s->chance[0] = spectrum_mean(s->weight[0]);
-		s->chance[1] = spectrum_mean(s->weight[1]);
+		s->probability[0] = spectrum_mean(s->weight[0]);
+		s->probability[1] = spectrum_mean(s->weight[1]);
 		return;
 	}
 	for (uint32_t k = 0; k < m->count; k++)
 		sum += m->fixed_weight[k];
 	for (uint32_t k = 0; k < m->count; k++) {
 		s->weight[k] = spectrum_constant(m->fixed_weight[k]);
-		s->chance[k] = m->fixed_weight[k] / sum;
+		s->probability[k] = m->fixed_weight[k] / sum;
 	}
 }
 
@@ -44,25 +44,25 @@ static double mix_pdf(const struct blend *m, const struct part_weights *s, const
 {
 	double sum = 0;
 	for (uint32_t k = 0; k < m->count; k++)
-		sum += s->chance[k] * m->part[k].ops->pdf_solid(&m->part[k], p, wo, wi);
+		sum += s->probability[k] * m->part[k].ops->pdf_solid(&m->part[k], p, wo, wi);
 	return sum;
 }
 
 /* Sums the specular lobes of all parts: those of one mode have the same direction (blend.h). */
 static spectrum mix_delta(const struct blend *m, const struct part_weights *s, const struct bsdf_point *p, vec3 wo,
-			  unsigned mode, vec3 *wi, double *chance)
+			  unsigned mode, vec3 *wi, double *probability)
 {
 	spectrum sum = spectrum_constant(0);
-	double total_chance = 0;
+	double total_probability = 0;
 	for (uint32_t k = 0; k < m->count; k++) {
-		double part_chance;
-		spectrum weight = bsdf_eval_delta(&m->part[k], p, wo, mode, wi, &part_chance);
+		double part_probability;
+		spectrum weight = bsdf_eval_delta(&m->part[k], p, wo, mode, wi, &part_probability);
 		if (spectrum_is_zero(weight))
 			continue;
 		sum = spectrum_add(sum, spectrum_mul(s->weight[k], weight));
-		total_chance += s->chance[k] * part_chance;
+		total_probability += s->probability[k] * part_probability;
 	}
-	*chance = total_chance;
+	*probability = total_probability;
 	return sum;
 }
 
@@ -93,11 +93,11 @@ double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3
 }
 
 spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			  double *chance)
+			  double *probability)
 {
 	struct part_weights s;
 	compute_part_weights(b->data, p, &s);
-	return mix_delta(b->data, &s, p, wo, mode, wi, chance);
+	return mix_delta(b->data, &s, p, wo, mode, wi, probability);
 }
 
 bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
@@ -107,11 +107,11 @@ bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, con
 	uint32_t k = 0;
 	double rest = u[2];
 	compute_part_weights(m, p, &s);
-	while (k + 1 < m->count && rest >= s.chance[k])
-		rest -= s.chance[k++];
-	if (!(s.chance[k] > 0))
+	while (k + 1 < m->count && rest >= s.probability[k])
+		rest -= s.probability[k++];
+	if (!(s.probability[k] > 0))
 		return false;
-	const double next[3] = {u[0], u[1], fmin(rest / s.chance[k], 1 - 0x1p-53)};
+	const double next[3] = {u[0], u[1], fmin(rest / s.probability[k], 1 - 0x1p-53)};
 	if (!m->part[k].ops->sample(&m->part[k], p, wo, next, out))
 		return false;
 	if (out->mode & BSDF_DELTA) {
@@ -127,15 +127,15 @@ bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, con
 int blend_merge_part(struct bsdf *b, const struct bsdf *part, const char *type, const struct scene_node *n,
 		     struct error *e)
 {
-	if ((part->modes & BSDF_TRANSMIT) && !part->transmits_only_straight) {
-		bool differs = !b->transmits_only_straight && b->eta != part->eta;
+	if ((part->modes & BSDF_TRANSMIT) && !part->is_straight_transmitter) {
+		bool differs = !b->is_straight_transmitter && b->eta != part->eta;
 		if (part->is_dispersive || differs)
 			return node_error(n, e, ENOTSUP, "its part \"%s\" %s", type,
 					  part->is_dispersive
 						  ? "is dispersive, which is not supported in a blend"
 						  : "has a different index of refraction than an earlier part");
 		b->eta = part->eta;
-		b->transmits_only_straight = false;
+		b->is_straight_transmitter = false;
 	}
 	b->is_two_sided |= part->is_two_sided;
 	b->has_mirrored_back |= part->has_mirrored_back;
@@ -155,7 +155,7 @@ int blend_merge_part(struct bsdf *b, const struct bsdf *part, const char *type, 
 struct blend *blend_begin(struct bsdf *b, uint32_t count)
 {
 	struct blend *m = b->data;
-	b->is_black = b->transmits_only_straight = true;
+	b->is_black = b->is_straight_transmitter = true;
 	m->count = count;
 	return m;
 }

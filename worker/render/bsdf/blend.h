@@ -18,7 +18,7 @@ struct blend {
 	uint32_t count;
 	struct bsdf part[BLEND_PARTS_MAX];
 	struct texture weight;	 /* weight of one of two parts; the other part has the rest */
-	bool weight_is_of_first; /* the weight is that of the first part, otherwise that of the second */
+	bool is_weight_of_first; /* the weight is that of the first part, otherwise that of the second */
 	bool has_fixed_weights;	 /* the parts have the constant weights `fixed_weight` instead of `weight` */
 	double fixed_weight[BLEND_PARTS_MAX];
 };

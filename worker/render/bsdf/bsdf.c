@@ -70,15 +70,15 @@ static bool may_have_delta(const struct bsdf *b, unsigned mode)
 {
 	if (mode & BSDF_STRAIGHT)
 		return b->modes & BSDF_STRAIGHT;
-	return !(mode & BSDF_TRANSMIT) || !b->transmits_only_straight;
+	return !(mode & BSDF_TRANSMIT) || !b->is_straight_transmitter;
 }
 
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			 double *chance)
+			 double *probability)
 {
 	if (!b->ops->eval_delta || !may_have_delta(b, mode))
 		return spectrum_constant(0);
-	return b->ops->eval_delta(b, p, wo, mode, wi, chance);
+	return b->ops->eval_delta(b, p, wo, mode, wi, probability);
 }
 
 spectrum bsdf_eval_zero(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

@@ -54,7 +54,7 @@ struct relief_map;
 struct bsdf_build {
 	const struct asset_source *assets;
 	struct arena *arena;
-	bool dialect_3;
+	bool is_dialect_3;
 	double min_roughness;		    /* metal and glass with a roughness below this one are created as smooth */
 	struct attribute_table *attributes; /* of the mesh that has this BSDF; NULL: none */
 	bool has_black_backs;		    /* opaque materials without `twosided` reflect nothing on their back */
@@ -67,7 +67,7 @@ struct bsdf_build {
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
 {
-	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes, b->volumes, false};
+	return (struct texture_build){b->assets, b->arena, b->is_dialect_3, b->attributes, b->volumes, false};
 }
 
 struct bsdf_ops {
@@ -81,7 +81,7 @@ struct bsdf_ops {
 	spectrum (*eval_halfvec)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	/* See bsdf_eval_delta. NULL: the BSDF has no specular lobe. */
 	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			       double *chance);
+			       double *probability);
 	/* u[0], u[1]: direction; u[2]: lobe. Returns false if the light is absorbed. */
 	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 		       struct bsdf_sample *out);
@@ -97,7 +97,7 @@ struct bsdf {
 			      only */
 	double eta; /* index below the surface (against the normal) over the one above, at 587.6 nm where it depends on
 		       the wavelength; 1: opaque, or not known. Lobes with BSDF_STRAIGHT ignore it */
-	bool transmits_only_straight; /* every lobe that transmits has BSDF_STRAIGHT: eta has no meaning */
+	bool is_straight_transmitter; /* every lobe that transmits has BSDF_STRAIGHT: eta has no meaning */
 	bool is_dispersive;	/* the index depends on the wavelength: use bsdf_eta; paths carry one wavelength only */
 	const struct ior *ior;	/* laws of dispersion of both sides, by enum ior_side; NULL: only eta is known */
 	bool is_two_sided;	/* scatters light that arrives from below the normal */
@@ -142,11 +142,11 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 
 /* Evaluates the exactly specular lobe `mode` (REFLECT, TRANSMIT or TRANSMIT | STRAIGHT, with or without the DELTA bit)
- * for wo: its direction wi, and the probability `chance` with which `sample` chooses it. Returns its weight f |wi.z| (f
- * as in struct bsdf_sample), or zero if there is no such lobe or light is totally reflected; wi and chance are then
- * undefined. */
+ * for wo: its direction wi, and the probability `probability` with which `sample` chooses it. Returns its weight f
+ * |wi.z| (f as in struct bsdf_sample), or zero if there is no such lobe or light is totally reflected; wi and chance
+ * are then undefined. */
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			 double *chance);
+			 double *probability);
 
 /* Creates b from n, with b->data in build->arena. Returns 0, or a negative error code with a sentence in e: -ENOTSUP if
  * the type of n is not known, or the code of the plug-in. */

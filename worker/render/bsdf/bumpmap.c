@@ -73,10 +73,10 @@ static spectrum shadowed_eval_halfvec(const struct bsdf *b, const struct bsdf_po
 }
 
 static spectrum shadowed_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				    double *chance)
+				    double *probability)
 {
 	const struct shadowed *s = b->data;
-	spectrum weight = bsdf_eval_delta(&s->inner, p, wo, mode, wi, chance);
+	spectrum weight = bsdf_eval_delta(&s->inner, p, wo, mode, wi, probability);
 	return spectrum_is_zero(weight) ? weight : spectrum_scale(shadowing_factor(s, p, wo, *wi), weight);
 }
 
@@ -128,11 +128,11 @@ static double height_from_rgb(const double x[3], bool grey)
 	return grey ? x[0] : rec709_luminance(x);
 }
 
-static void eval_height(const void *data, double u, double v, struct relief_value *out)
+static void eval_height(const void *data, double u, double v, struct relief_sample *out)
 {
 	const struct relief_map *b = data;
-	struct texture_jet j;
-	texture_jet(&b->texture, u, v, &j);
+	struct texture_derivatives j;
+	texture_eval_derivatives(&b->texture, u, v, &j);
 	double mixed = b->scale * height_from_rgb(j.duv, j.is_grey);
 	out->x = (vec3){b->scale * height_from_rgb(j.du, j.is_grey), b->scale * height_from_rgb(j.dv, j.is_grey), 0};
 	out->du = (vec3){b->scale * height_from_rgb(j.duu, j.is_grey), mixed, 0};
@@ -140,11 +140,11 @@ static void eval_height(const void *data, double u, double v, struct relief_valu
 }
 
 /* Components of the image from 0 to 1 stand for those of a normal from -1 to 1. */
-static void eval_normal(const void *data, double u, double v, struct relief_value *out)
+static void eval_normal(const void *data, double u, double v, struct relief_sample *out)
 {
 	const struct relief_map *b = data;
-	struct texture_jet j;
-	texture_jet(&b->texture, u, v, &j);
+	struct texture_derivatives j;
+	texture_eval_derivatives(&b->texture, u, v, &j);
 	double k = b->scale;
 	out->x = (vec3){k * (2 * j.x[0] - 1), k * (2 * j.x[1] - 1), 2 * j.x[2] - 1};
 	out->du = (vec3){2 * k * j.du[0], 2 * k * j.du[1], 2 * j.du[2]};
@@ -181,7 +181,7 @@ static int get_relief_map(const struct scene_node *n, const struct scene_node *t
 		.relief = {.kind = kind,
 			   .eval = kind == RELIEF_HEIGHT ? eval_height : eval_normal,
 			   .flips_invalid_normals =
-				   !build->under && node_bool(n, "flip_invalid_normals", build->dialect_3),
+				   !build->under && node_bool(n, "flip_invalid_normals", build->is_dialect_3),
 			   .uses_handedness = node_bool(n, "handedness", false),
 			   .under = build->under},
 		.node = texture,
@@ -237,8 +237,8 @@ static int create_relief_bsdf(struct bsdf *b, const struct scene_node *n, const 
 		b->relief = &map->relief;
 	b->is_textured = true;
 	b->uses_tangents |= kind == RELIEF_NORMAL;
-	return node_bool(n, "use_shadowing_function", build->dialect_3) ? add_shadowing(b, &map->relief, n, build, e)
-									: 0;
+	return node_bool(n, "use_shadowing_function", build->is_dialect_3) ? add_shadowing(b, &map->relief, n, build, e)
+									   : 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -108,7 +108,7 @@ static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 }
 
 /* Returns the probability of sampling the boundary's own reflection. */
-static double reflection_chance(const struct layer *l, vec3 wo)
+static double reflection_probability(const struct layer *l, vec3 wo)
 {
 	double t = boundary_transmittance(l, fabs(wo.z)), r = (1 - t) * l->c->max_specular;
 	return r + t > 0 ? r / (r + t) : 0;
@@ -121,42 +121,42 @@ static double coat_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
 	struct refracted_ray o, i;
-	double chance = reflection_chance(&l, wo), lobe = 0, below = 0;
+	double probability = reflection_probability(&l, wo), lobe = 0, below = 0;
 	if (c->rough)
 		rough_boundary_reflect(&l.boundary, facing_up(wo), facing_up(wi), &lobe);
 	if (c->inner.has_smooth && refract_into(&l, wo, &o) && refract_into(&l, wi, &i))
 		below = c->inner.ops->pdf_solid(&c->inner, p, o.direction, i.direction) *
 			(wi.z / i.direction.z / (c->eta * c->eta));
-	return chance * lobe + (1 - chance) * below;
+	return probability * lobe + (1 - probability) * below;
 }
 
 static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				double *chance)
+				double *probability)
 {
 	struct layer l = layer_at(b, p);
 	const struct coat *c = l.c;
 	struct refracted_ray o;
 	vec3 unused;
 	spectrum f = spectrum_constant(0);
-	double inner_chance, total_chance = 0;
+	double inner_probability, total_probability = 0;
 	if (!(mode & BSDF_REFLECT) || !(fabs(wo.z) >= DBL_MIN) || (wo.z < 0 && !b->is_two_sided))
 		return f;
-	double outer_chance = reflection_chance(&l, wo);
+	double outer_probability = reflection_probability(&l, wo);
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
 	if (!c->rough) {
-		total_chance = outer_chance;
+		total_probability = outer_probability;
 		f = spectrum_scale(1 - boundary_transmittance(&l, fabs(wo.z)),
 				   texture_eval(&c->specular, &p->texture_point, p->wavelengths));
 	}
 	if (c->inner.has_delta && refract_into(&l, wo, &o)) {
-		spectrum below = bsdf_eval_delta(&c->inner, p, o.direction, BSDF_REFLECT, &unused, &inner_chance);
+		spectrum below = bsdf_eval_delta(&c->inner, p, o.direction, BSDF_REFLECT, &unused, &inner_probability);
 		if (!spectrum_is_zero(below)) {
-			total_chance += (1 - outer_chance) * inner_chance;
+			total_probability += (1 - outer_probability) * inner_probability;
 			below = spectrum_mul(below, absorption_transmittance(c, p, o.direction, o.direction));
 			f = spectrum_add(f, spectrum_scale(o.transmittance * o.transmittance, below));
 		}
 	}
-	*chance = total_chance;
+	*probability = total_probability;
 	return f;
 }
 
@@ -178,9 +178,9 @@ static bool sample_lobe(const struct bsdf *b, const struct layer *l, const struc
 	const struct coat *c = l->c;
 	struct bsdf_sample inner;
 	struct refracted_ray o;
-	double chance = reflection_chance(l, wo);
+	double probability = reflection_probability(l, wo);
 	*is_delta = false;
-	if (u[2] < chance) {
+	if (u[2] < probability) {
 		*is_delta = !c->rough;
 		if (*is_delta)
 			return false;
@@ -188,7 +188,7 @@ static bool sample_lobe(const struct bsdf *b, const struct layer *l, const struc
 		wi->z = copysign(1, wo.z) * wi->z;
 		return scatters_between(b, wo, *wi);
 	}
-	const double rest[3] = {u[0], u[1], fmin((u[2] - chance) / (1 - chance), 1 - 0x1p-53)};
+	const double rest[3] = {u[0], u[1], fmin((u[2] - probability) / (1 - probability), 1 - 0x1p-53)};
 	if (!refract_into(l, wo, &o) || !c->inner.ops->sample(&c->inner, p, o.direction, rest, &inner))
 		return false;
 	*is_delta = inner.mode & BSDF_DELTA;

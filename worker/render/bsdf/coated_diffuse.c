@@ -17,7 +17,7 @@ int coated_diffuse_read(struct coated_diffuse *c, struct bsdf *b, const struct s
 	if (code)
 		return code;
 	c->eta = inside / outside;
-	c->nonlinear = node_bool(n, "nonlinear", false);
+	c->is_nonlinear = node_bool(n, "nonlinear", false);
 	double d = texture_max(&c->diffuse), s = texture_max(&c->specular);
 	b->is_black = d + s == 0;
 	c->specular_weight = d + s > 0 ? s / (d + s) : 0;
@@ -35,13 +35,13 @@ spectrum coated_diffuse_eval(const struct coated_diffuse *c, const struct bsdf_p
 	if (!(common > 0)) /* escape is 0, too, if no light at all enters the coating */
 		return spectrum_constant(0);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double bounce_reflectance = c->nonlinear ? rho.v[i] : 1;
+		double bounce_reflectance = c->is_nonlinear ? rho.v[i] : 1;
 		rho.v[i] *= common / (c->eta * c->eta * (1 - bounce_reflectance) + bounce_reflectance * escape);
 	}
 	return rho;
 }
 
-double coated_diffuse_specular_chance(const struct coated_diffuse *c, double reflected)
+double coated_diffuse_specular_probability(const struct coated_diffuse *c, double reflected)
 {
 	double s = reflected * c->specular_weight, d = (1 - reflected) * (1 - c->specular_weight);
 	return s + d > 0 ? s / (s + d) : 0;

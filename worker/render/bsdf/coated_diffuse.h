@@ -7,7 +7,7 @@
  *   f_diffuse = T(wo) T(wi) / eta^2  rho / (1 - rho' (1 - E)) / pi
  *
  * T is the share of light from outside that the boundary transmits, E the share of diffuse light from inside that it
- * lets out, and rho the reflectance of the base. rho' is 1, or rho if `nonlinear` is set: then colours become more
+ * lets out, and rho the reflectance of the base. rho' is 1, or rho if `is_nonlinear` is set: then colours become more
  * saturated, as those of light that meets the base several times. By reciprocity, E is the share of diffuse light from
  * outside that the boundary lets in, over eta^2; with this form a white base loses no light, and a small E loses no
  * precision.
@@ -24,7 +24,7 @@ struct coated_diffuse {
 	struct texture diffuse, specular;
 	double eta;		/* index of the coating over the one outside */
 	double specular_weight; /* specular reflectance over the sum of both, to choose a lobe */
-	bool nonlinear;
+	bool is_nonlinear;
 };
 
 /* Reads the parameters into c, and sets b's modes, colour and texture flags. Returns 0 or a negative error code. */
@@ -44,6 +44,6 @@ spectrum coated_diffuse_eval(const struct coated_diffuse *c, const struct bsdf_p
 
 /* Returns the probability of sampling the specular lobe. reflected: the share of wo's light that the boundary
  * reflects. */
-double coated_diffuse_specular_chance(const struct coated_diffuse *c, double reflected);
+double coated_diffuse_specular_probability(const struct coated_diffuse *c, double reflected);
 
 #endif

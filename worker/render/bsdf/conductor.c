@@ -6,12 +6,12 @@
 #include <float.h>
 
 static spectrum conductor_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				     double *chance)
+				     double *probability)
 {
 	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
 		return spectrum_constant(0);
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
-	*chance = 1;
+	*probability = 1;
 	return metal_fresnel(b->data, p, wo.z);
 }
 

@@ -9,21 +9,21 @@
 /* Returns f |wi.z| of one lobe, given the Fresnel terms f at its angle. eta: index beyond over index on wo's side.
  * *chance is 0 if there is no such lobe. */
 static spectrum eval_lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
-			  const struct fresnel *f, vec3 *wi, double *chance)
+			  const struct fresnel *f, vec3 *wi, double *probability)
 {
-	*chance = 0;
+	*probability = 0;
 	if (mode & BSDF_REFLECT) {
 		if (!(fabs(wo.z) >= DBL_MIN && f->reflectance > 0)) /* 1 / wo.z must be finite */
 			return spectrum_constant(0);
 		*wi = (vec3){-wo.x, -wo.y, wo.z};
-		*chance = fresnel_chance(f, true);
+		*probability = fresnel_reflection_probability(f, true);
 		return spectrum_scale(f->reflectance, texture_eval(&g->reflectance, &p->texture_point, p->wavelengths));
 	}
 	if (!(f->cos_t >= DBL_MIN && f->transmittance > 0))
 		return spectrum_constant(0);
 	double scale = p->transport == TRANSPORT_RADIANCE ? 1 / (eta * eta) : 1;
 	*wi = (vec3){-wo.x / eta, -wo.y / eta, -copysign(f->cos_t, wo.z)};
-	*chance = fresnel_chance(f, false);
+	*probability = fresnel_reflection_probability(f, false);
 	return spectrum_scale(f->transmittance * scale,
 			      texture_eval(&g->transmittance, &p->texture_point, p->wavelengths));
 }
@@ -35,11 +35,11 @@ static double eta_beyond(const struct bsdf *b, const struct bsdf_point *p, vec3 
 }
 
 static spectrum dielectric_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
-				      vec3 *wi, double *chance)
+				      vec3 *wi, double *probability)
 {
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
-	return eval_lobe(b->data, p, wo, mode, eta, &f, wi, chance);
+	return eval_lobe(b->data, p, wo, mode, eta, &f, wi, probability);
 }
 
 static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -47,7 +47,7 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 {
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
-	bool reflect = u[2] < fresnel_chance(&f, true);
+	bool reflect = u[2] < fresnel_reflection_probability(&f, true);
 	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA,
 				    .eta = reflect ? 1 : eta};
 	spectrum weight = eval_lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);

@@ -43,12 +43,12 @@ static inline struct fresnel fresnel_dielectric(double c, double eta)
  * Transmitted paths become rarer by at most a tenth. */
 #define FRESNEL_REFLECT_CHANCE_MIN 0.1
 #define FRESNEL_REFLECT_BOOST_MAX 8
-static inline double fresnel_chance(const struct fresnel *f, bool reflect)
+static inline double fresnel_reflection_probability(const struct fresnel *f, bool reflect)
 {
-	double reflect_chance = fmin(FRESNEL_REFLECT_CHANCE_MIN, FRESNEL_REFLECT_BOOST_MAX * f->reflectance);
-	if (!(f->transmittance > 0) || !(f->reflectance < reflect_chance))
+	double reflection_probability = fmin(FRESNEL_REFLECT_CHANCE_MIN, FRESNEL_REFLECT_BOOST_MAX * f->reflectance);
+	if (!(f->transmittance > 0) || !(f->reflectance < reflection_probability))
 		return reflect ? f->reflectance : f->transmittance;
-	return reflect ? reflect_chance : 1 - reflect_chance;
+	return reflect ? reflection_probability : 1 - reflection_probability;
 }
 
 /* Returns the reflectance of a conductor with the index eta - i k, relative to the index here. eta = 0, k = 1 is a

@@ -50,7 +50,7 @@
 /* For importance that arrives from outside: the probability of passing straight through, and those of choosing each
  * lobe. */
 #define STRAIGHT_CHANCE 0.5
-static const double adjoint_chance[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
+static const double adjoint_probability[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
 
 struct hair {
 	struct hair_fibre fibre;
@@ -149,23 +149,23 @@ static spectrum hair_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 	return spectrum_scale(1 / fabs(light.z), eval_scattering(b->data, p, camera, light));
 }
 
-static void compute_lobe_chances(const struct hair *h, const struct bsdf_point *p, const struct view *s,
-				 double chance[HAIR_LOBES])
+static void compute_lobe_probabilities(const struct hair *h, const struct bsdf_point *p, const struct view *s,
+				       double probability[HAIR_LOBES])
 {
 	spectrum sigma = absorption_for_sampling(h, p);
 	double share[HAIR_LOBES], sum = 0;
-	hair_lobe_shares(&s->entry, 1, chance);
+	hair_lobe_shares(&s->entry, 1, probability);
 	for (int k = 0; k < HAIR_LOBES; k++)
-		chance[k] *= UNABSORBED_WEIGHT;
+		probability[k] *= UNABSORBED_WEIGHT;
 	for (int l = 0; l < SPECTRUM_LANES; l++) {
 		hair_lobe_shares(&s->entry, exp(-sigma.v[l] * s->entry.passage_length), share);
 		for (int k = 0; k < HAIR_LOBES; k++)
-			chance[k] += share[k];
+			probability[k] += share[k];
 	}
 	for (int k = 0; k < HAIR_LOBES; k++)
-		sum += chance[k];
+		sum += probability[k];
 	for (int k = 0; k < HAIR_LOBES; k++)
-		chance[k] /= sum;
+		probability[k] /= sum;
 }
 
 /* Returns the density (solid angle) with which a path from a light continues towards a camera. */
@@ -178,7 +178,7 @@ static double adjoint_pdf(const struct hair *h, bool culls_backfaces, vec3 light
 		if (p == 0 && light.z > 0)
 			azimuthal = 0.5 * (cosine + hair_azimuthal_pdf(&h->fibre,
 								       camera_angles.phi + light_angles.phi - WARP_PI));
-		sum += adjoint_chance[p] *
+		sum += adjoint_probability[p] *
 		       hair_longitudinal_pdf(&h->fibre, p, light_angles.theta, camera_angles.theta) * azimuthal;
 	}
 	return light.z > 0 && !culls_backfaces ? (1 - STRAIGHT_CHANCE) * sum : sum;
@@ -187,35 +187,35 @@ static double adjoint_pdf(const struct hair *h, bool culls_backfaces, vec3 light
 static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct hair *h = b->data;
-	double chance[HAIR_LOBES], lobe[HAIR_LOBES], sum = 0;
+	double probability[HAIR_LOBES], lobe[HAIR_LOBES], sum = 0;
 	if (p->transport == TRANSPORT_IMPORTANCE)
 		return wi.z > 0 && fabs(wo.z) >= COSINE_MIN ? adjoint_pdf(h, p->culls_backfaces, wo, wi) : 0;
 	if (!(wo.z > 0 && fabs(wi.z) >= COSINE_MIN))
 		return 0;
 	struct view s = view_from(h, wo);
-	compute_lobe_chances(h, p, &s, chance);
+	compute_lobe_probabilities(h, p, &s, probability);
 	eval_lobes(h, &s, wi, lobe);
 	for (int k = 0; k < HAIR_LOBES; k++)
-		sum += chance[k] * lobe[k];
+		sum += probability[k] * lobe[k];
 	return sum;
 }
 
 /* Returns the index of the interval of cumulative probability that *u falls in, and rescales *u to be uniform again. */
-static int pick_index(const double *chance, int count, double *u)
+static int pick_index(const double *probability, int count, double *u)
 {
 	int k = 0;
-	while (k + 1 < count && *u >= chance[k])
-		*u -= chance[k++];
-	*u = chance[k] > 0 ? min_of(*u / chance[k], 1 - 0x1p-53) : 0;
+	while (k + 1 < count && *u >= probability[k])
+		*u -= probability[k++];
+	*u = probability[k] > 0 ? min_of(*u / probability[k], 1 - 0x1p-53) : 0;
 	return k;
 }
 
 static vec3 sample_radiance(const struct hair *h, const struct bsdf_point *p, vec3 wo, const double u[3])
 {
 	struct view s = view_from(h, wo);
-	double chance[HAIR_LOBES], rest = u[2];
-	compute_lobe_chances(h, p, &s, chance);
-	int k = pick_index(chance, HAIR_LOBES, &rest);
+	double probability[HAIR_LOBES], rest = u[2];
+	compute_lobe_probabilities(h, p, &s, probability);
+	int k = pick_index(probability, HAIR_LOBES, &rest);
 	double azimuth_change = k < HAIR_LOBES - 1 ? hair_azimuth_change(k, s.gamma, s.entry.gamma_t) +
 							     hair_sample_azimuthal(&h->fibre, rest)
 						   : 2 * WARP_PI * rest;
@@ -228,7 +228,7 @@ static vec3 sample_importance(const struct hair *h, vec3 wo, const double u[2], 
 {
 	static const double halves[2] = {0.5, 0.5};
 	struct angles light_angles = angles_from_direction(wo);
-	int k = pick_index(adjoint_chance, HAIR_LOBES, &rest);
+	int k = pick_index(adjoint_probability, HAIR_LOBES, &rest);
 	struct hair_angle theta = hair_sample_longitudinal(&h->fibre, k, light_angles.theta, u[0], u[1]);
 	if (k == 0 && wo.z > 0 && pick_index(halves, 2, &rest) == 0) {
 		double phi = WARP_PI - light_angles.phi + hair_sample_azimuthal(&h->fibre, rest);
@@ -243,13 +243,13 @@ static bool can_pass_straight(const struct bsdf_point *p, vec3 wo)
 }
 
 static spectrum hair_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				double *chance)
+				double *probability)
 {
 	(void)b;
 	if (!(mode & BSDF_STRAIGHT) || !can_pass_straight(p, wo))
 		return spectrum_constant(0);
 	*wi = vec3_neg(wo);
-	*chance = p->transport == TRANSPORT_RADIANCE ? 1 : STRAIGHT_CHANCE;
+	*probability = p->transport == TRANSPORT_RADIANCE ? 1 : STRAIGHT_CHANCE;
 	return spectrum_constant(1);
 }
 
@@ -260,8 +260,8 @@ static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	bool is_radiance = p->transport == TRANSPORT_RADIANCE;
 	double rest = u[2];
 	if (can_pass_straight(p, wo)) {
-		static const double branch_chance[2] = {STRAIGHT_CHANCE, 1 - STRAIGHT_CHANCE};
-		if (is_radiance || pick_index(branch_chance, 2, &rest) == 0)
+		static const double branch_probability[2] = {STRAIGHT_CHANCE, 1 - STRAIGHT_CHANCE};
+		if (is_radiance || pick_index(branch_probability, 2, &rest) == 0)
 			return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 	} else if (!(is_radiance || p->culls_backfaces ? wo.z >= COSINE_MIN : wo.z < 0)) {
 		return false;

@@ -87,7 +87,7 @@ static spectrum hk_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 
 /* Returns the probability of sampling the straight lobe: the light that passes straight through over the sum of that
  * and the scattered light, as if no scattered light were absorbed on its way out. */
-static double straight_chance(spectrum depth, spectrum scattered, double cosine)
+static double straight_probability(spectrum depth, spectrum scattered, double cosine)
 {
 	double straight = 0, other = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
@@ -104,17 +104,18 @@ static double hk_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 	if (!(fabs(wo.z) >= COSINE_MIN && fabs(wi.z) >= COSINE_MIN))
 		return 0;
 	spectrum scattered, depth = eval_optical_depth(l, p, &scattered);
-	return (1 - straight_chance(depth, scattered, fabs(wo.z))) * phase_eval(&l->phase, p->texture_point.p, wo, wi);
+	return (1 - straight_probability(depth, scattered, fabs(wo.z))) *
+	       phase_eval(&l->phase, p->texture_point.p, wo, wi);
 }
 
 static spectrum hk_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			      double *chance)
+			      double *probability)
 {
 	if (!(mode & BSDF_STRAIGHT) || !(fabs(wo.z) >= COSINE_MIN))
 		return spectrum_constant(0);
 	spectrum scattered, f = eval_optical_depth(b->data, p, &scattered);
 	*wi = vec3_neg(wo);
-	*chance = straight_chance(f, scattered, fabs(wo.z));
+	*probability = straight_probability(f, scattered, fabs(wo.z));
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		f.v[i] = transmittance(f.v[i], fabs(wo.z));
 	return f;
@@ -128,7 +129,7 @@ static bool hk_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
 	if (!(fabs(wo.z) >= COSINE_MIN))
 		return false;
 	spectrum scattered, depth = eval_optical_depth(l, p, &scattered);
-	if (u[2] < straight_chance(depth, scattered, fabs(wo.z)))
+	if (u[2] < straight_probability(depth, scattered, fabs(wo.z)))
 		return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 	return bsdf_sample_smooth(b, p, wo, phase_sample(&l->phase, p->texture_point.p, wo, u, &unused), out);
 }
@@ -171,7 +172,7 @@ static int hk_create(struct bsdf *b, const struct scene_node *n, const struct bs
 {
 	struct layer *l = b->data;
 	const struct volume_build default_build = {
-		.assets = build->assets, .arena = build->arena, .dialect_3 = build->dialect_3, .world_scale = 1};
+		.assets = build->assets, .arena = build->arena, .is_dialect_3 = build->is_dialect_3, .world_scale = 1};
 	int code = read_coefficients(l, b, n, build, e);
 	if (!code)
 		code = phase_create(&l->phase, node_child(n, PLUGIN_PHASE, 0),

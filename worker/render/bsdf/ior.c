@@ -49,13 +49,13 @@ static const struct {
 static int refuse_name(const struct scene_node *n, const char *property, const char *material, struct error *e)
 {
 	char hint[128], list[512] = "";
-	struct spelling s = {.wanted = material};
+	struct spelling s = {.wanted_name = material};
 	for (size_t i = 0; i < sizeof named_indices / sizeof *named_indices; i++) {
 		spelling_offer(&s, named_indices[i].name);
 		spelling_append_to_list(list, sizeof list, named_indices[i].name);
 	}
-	if (!s.best && strcasestr(material, "glas")) /* the usual crown glass */
-		s.best = "bk7";
+	if (!s.best_match && strcasestr(material, "glas")) /* the usual crown glass */
+		s.best_match = "bk7";
 	return node_error(n, e, ENOTSUP, "%s: unknown material \"%.64s\"%s; a number is accepted, too (known: %s)",
 			  property, material, spelling_hint(&s, hint, sizeof hint), list);
 }

@@ -31,11 +31,11 @@ static spectrum lobe_filter_eval_halfvec(const struct bsdf *b, const struct bsdf
 }
 
 static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
-				       vec3 *wi, double *chance)
+				       vec3 *wi, double *probability)
 {
 	const struct lobe_filter *x = b->data;
 	return is_removed(x, mode & BSDF_TRANSMIT, true) ? spectrum_constant(0)
-							 : bsdf_eval_delta(&x->inner, p, wo, mode, wi, chance);
+							 : bsdf_eval_delta(&x->inner, p, wo, mode, wi, probability);
 }
 
 static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],

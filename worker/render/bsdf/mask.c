@@ -14,7 +14,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!inner || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs exactly one BSDF inside");
 	struct blend *m = blend_begin(b, 2);
-	m->weight_is_of_first = true;
+	m->is_weight_of_first = true;
 	int code = bsdf_create(&m->part[0], inner, build, e);
 	if (!code)
 		code = bsdf_mirror_back(&m->part[0], build, e);
@@ -25,8 +25,8 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!code)
 		code = blend_merge_part(b, &m->part[1], "null", n, e);
 	if (!code)
-		code = (build->dialect_3 ? bsdf_read_number : bsdf_read_texture)(b, &m->weight, n, "opacity", 0.5,
-										 build, e);
+		code = (build->is_dialect_3 ? bsdf_read_number : bsdf_read_texture)(b, &m->weight, n, "opacity", 0.5,
+										    build, e);
 	if (code)
 		return code;
 	b->relief = m->part[0].relief;

@@ -134,7 +134,7 @@ static double eval_at_wavelength(const struct measured_material *m, const struct
 		return nodes_sum(n, m->spectra, m->wavelength_count, 0);
 	if (!(nm < m->nm[m->wavelength_count - 1]))
 		return nodes_sum(n, m->spectra, m->wavelength_count, m->wavelength_count - 1);
-	uint32_t i = search_cell(m->nm, m->wavelength_count - 1, nm);
+	uint32_t i = search_find_cell(m->nm, m->wavelength_count - 1, nm);
 	double fraction = (nm - m->nm[i]) / (m->nm[i + 1] - m->nm[i]);
 	return (1 - fraction) * nodes_sum(n, m->spectra, m->wavelength_count, i) +
 	       fraction * nodes_sum(n, m->spectra, m->wavelength_count, i + 1);

@@ -66,7 +66,7 @@ static struct cell find_cell(const struct axis *a, double x)
 		return (struct cell){0, 0, 0};
 	if (!(x < a->value[last]))
 		return (struct cell){last, last, 0};
-	uint32_t i = search_cell(a->value, last, x);
+	uint32_t i = search_find_cell(a->value, last, x);
 	return (struct cell){i, i + 1, (x - a->value[i]) / (a->value[i + 1] - a->value[i])};
 }
 

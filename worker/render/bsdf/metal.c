@@ -44,13 +44,13 @@ static const char *chemical_symbol(const char *name)
 static int refuse_name(const char *name, const struct scene_node *n, struct error *e)
 {
 	char hint[128], known[512] = "";
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
 		spelling_offer(&s, metals[i].name);
 		spelling_append_to_list(known, sizeof known, metals[i].name);
 	}
 	spelling_append_to_list(known, sizeof known, "none");
-	s.best = chemical_symbol(name) ? chemical_symbol(name) : s.best;
+	s.best_match = chemical_symbol(name) ? chemical_symbol(name) : s.best_match;
 	return node_error(n, e, ENOTSUP, "unknown conductor \"%.64s\"%s; eta and k are accepted, too (known: %s)", name,
 			  spelling_hint(&s, hint, sizeof hint), known);
 }
@@ -100,13 +100,14 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	       struct error *e)
 {
 	double outside;
-	int code = set_named_metal(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
+	int code =
+		set_named_metal(m, node_string(n, "material", build->is_dialect_3 ? "none" : "Cu"), n, build->arena, e);
 	if (!code)
 		code = read_optional(&m->eta, n, "eta", build, e);
 	if (!code)
 		code = read_optional(&m->k, n, "k", build, e);
 	if (!code)
-		code = ior_read(n, "ext_eta", build->dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
+		code = ior_read(n, "ext_eta", build->is_dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
 	if (!code)
 		code = bsdf_read_texture(b, &m->reflectance, n, "specular_reflectance", 1, build, e);
 	if (code)

@@ -11,9 +11,9 @@
 
 struct phong {
 	struct texture diffuse, specular;
-	struct texture exponent; /* no spectrum; at most EXPONENT_MAX */
-	double scale;		 /* factor of both reflectances */
-	double specular_chance;	 /* probability of sampling the specular lobe */
+	struct texture exponent;     /* no spectrum; at most EXPONENT_MAX */
+	double scale;		     /* factor of both reflectances */
+	double specular_probability; /* probability of sampling the specular lobe */
 };
 
 /* Returns the lobe without its normalisation; zero at more than 90 degrees from the mirror direction. */
@@ -50,7 +50,7 @@ static double phong_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 		return 0;
 	double exponent = exponent_at(ph, p),
 	       lobe = (exponent + 1) / (2 * WARP_PI) * unnormalized_lobe(exponent, wo, wi);
-	return ph->specular_chance * lobe + (1 - ph->specular_chance) * wi.z / WARP_PI;
+	return ph->specular_probability * lobe + (1 - ph->specular_probability) * wi.z / WARP_PI;
 }
 
 /* Samples a direction around the mirror direction of wo. */
@@ -67,8 +67,8 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0))
 		return false;
-	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(exponent_at(ph, p), wo, u[0], u[1])
-					     : warp_cosine_hemisphere(u[0], u[1]);
+	vec3 wi = u[2] < ph->specular_probability ? sample_lobe(exponent_at(ph, p), wo, u[0], u[1])
+						  : warp_cosine_hemisphere(u[0], u[1]);
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
@@ -101,13 +101,13 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	double d = texture_max(&ph->diffuse), s = texture_max(&ph->specular);
 	b->is_black = d + s == 0;
 	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
-	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
+	ph->specular_probability = d + s > 0 ? s / (d + s) : 0;
 	code = bsdf_check_energy(n, d + s, e);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	double alpha = sqrt(2 / (exponent + 2));
 	b->min_alpha = s > 0 ? alpha : INFINITY;
-	b->mean_alpha = ph->specular_chance * alpha + (1 - ph->specular_chance);
+	b->mean_alpha = ph->specular_probability * alpha + (1 - ph->specular_probability);
 	return code;
 }
 

@@ -32,18 +32,18 @@ static double plastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3
 	const struct coated_diffuse *c = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
-	return (1 - coated_diffuse_specular_chance(c, fresnel_at(c, wo).reflectance)) * wi.z / WARP_PI;
+	return (1 - coated_diffuse_specular_probability(c, fresnel_at(c, wo).reflectance)) * wi.z / WARP_PI;
 }
 
 static spectrum plastic_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				   double *chance)
+				   double *probability)
 {
 	const struct coated_diffuse *c = b->data;
 	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
 		return spectrum_constant(0);
 	double reflected = fresnel_at(c, wo).reflectance;
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
-	*chance = coated_diffuse_specular_chance(c, reflected);
+	*probability = coated_diffuse_specular_probability(c, reflected);
 	return spectrum_scale(reflected, texture_eval(&c->specular, &p->texture_point, p->wavelengths));
 }
 
@@ -53,7 +53,7 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	const struct coated_diffuse *c = b->data;
 	if (!(wo.z > 0))
 		return false;
-	if (u[2] < coated_diffuse_specular_chance(c, fresnel_at(c, wo).reflectance))
+	if (u[2] < coated_diffuse_specular_probability(c, fresnel_at(c, wo).reflectance))
 		return bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out);
 	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
 }

@@ -36,9 +36,9 @@ static spectrum pplastic_eval(const struct bsdf *b, const struct bsdf_point *p, 
 		spectrum_scale(passes, texture_eval(&s->coating.diffuse, &p->texture_point, p->wavelengths)));
 }
 
-static double specular_chance(const struct pplastic *s, vec3 wo)
+static double specular_probability(const struct pplastic *s, vec3 wo)
 {
-	return coated_diffuse_specular_chance(&s->coating, fresnel_at(s, wo.z).reflectance);
+	return coated_diffuse_specular_probability(&s->coating, fresnel_at(s, wo.z).reflectance);
 }
 
 static double pplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -47,9 +47,9 @@ static double pplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
 	struct microfacet m = rough_map_at(&s->roughness, p);
-	double lobe, chance = specular_chance(s, wo);
+	double lobe, probability = specular_probability(s, wo);
 	microfacet_reflect(&m, s->coating.eta, wo, wi, &lobe);
-	return chance * lobe + (1 - chance) * wi.z / WARP_PI;
+	return probability * lobe + (1 - probability) * wi.z / WARP_PI;
 }
 
 static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -59,7 +59,7 @@ static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	if (!(wo.z > 0))
 		return false;
 	vec3 wi;
-	if (u[2] < specular_chance(s, wo)) {
+	if (u[2] < specular_probability(s, wo)) {
 		struct microfacet m = rough_map_at(&s->roughness, p);
 		wi = microfacet_sample_mirrored(&m, wo, u[0], u[1]);
 	} else {
@@ -76,10 +76,10 @@ static int pplastic_create(struct bsdf *b, const struct scene_node *n, const str
 		code = rough_map_read(&s->roughness, b, n, build, e);
 	if (code)
 		return code;
-	double chance = s->coating.specular_weight;
-	if (!(chance > 0))
+	double probability = s->coating.specular_weight;
+	if (!(probability > 0))
 		b->min_alpha = INFINITY;
-	b->mean_alpha = chance * b->mean_alpha + (1 - chance);
+	b->mean_alpha = probability * b->mean_alpha + (1 - probability);
 	return 0;
 }
 

@@ -14,7 +14,7 @@
  * reflection stays total. As in the papers, lobes are added, not layered: at grazing angles, above all with sheen, the
  * surface may reflect up to 1.5 times the light that arrives.
  *
- * With `lambertian` (an extension for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambertian,
+ * With `is_lambertian` (an extension for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambertian,
  * without the light that the boundary reflects at the half vector: c / pi (1 - F).
  *
  * `coat` (an extension for glTF) is a layer on a share k of the surface, with GGX facets of its own and Schlick's
@@ -97,9 +97,9 @@ void principled_precompute(struct principled *p, const struct bsdf_build *build)
 {
 	const struct bsdf_probes probes = bsdf_probes_make(build);
 	const struct bsdf_point probe = bsdf_probe_point(&probes, 0);
-	p->varies = !is_number(&p->roughness) || !is_number(&p->metallic);
+	p->is_textured = !is_number(&p->roughness) || !is_number(&p->metallic);
 	for (int i = 0; i < PRINCIPLED_SHARE_COUNT; i++)
-		p->varies |= p->share[i].ops != NULL;
+		p->is_textured |= p->share[i].ops != NULL;
 	p->precomputed = (struct principled_point){.principled = p, .eta = p->eta};
 	eval_numbers(p, &probe, &p->precomputed);
 }
@@ -108,7 +108,7 @@ struct principled_point principled_point_at(const struct principled *p, const st
 {
 	struct principled_point s = p->precomputed;
 	s.base = texture_eval(&p->base, &point->texture_point, point->wavelengths);
-	if (p->varies)
+	if (p->is_textured)
 		eval_numbers(p, point, &s);
 	bool tinted = (!p->has_specular && s.share[PRINCIPLED_SPEC_TINT] > 0) || s.share[PRINCIPLED_SHEEN_TINT] > 0;
 	s.tint = tinted ? compute_tint(p, point, s.base) : spectrum_constant(1);
@@ -157,7 +157,7 @@ spectrum principled_eval_diffuse(const struct principled_point *s, spectrum boun
 	double sheen = (1 - s->metallic) * s->share[PRINCIPLED_SHEEN] * schlick(cos_d);
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double diffuse = diffuse_scale * (s->principled->lambertian ? 1 - boundary.v[i] : burley);
+		double diffuse = diffuse_scale * (s->principled->is_lambertian ? 1 - boundary.v[i] : burley);
 		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[PRINCIPLED_SHEEN_TINT] * (s->tint.v[i] - 1));
 	}
 	return f;
@@ -204,7 +204,7 @@ static double total_reflection_share(const struct principled_point *s, vec3 wo)
 }
 
 /* Computes the probabilities of sampling each lobe for light from wo. */
-static void compute_lobe_chances(const struct principled_point *s, vec3 wo, double chance[LOBE_COUNT])
+static void compute_lobe_probabilities(const struct principled_point *s, vec3 wo, double probability[LOBE_COUNT])
 {
 	const struct principled *p = s->principled;
 	bool below = wo.z < 0;
@@ -216,20 +216,21 @@ static void compute_lobe_chances(const struct principled_point *s, vec3 wo, doub
 		reflected = total + (1 - total) * reflected * s->share[PRINCIPLED_SPECULAR_STRENGTH];
 	}
 	/* Never 0: where the plane reflects totally, some facets still transmit. */
-	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
-	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->max_base, 0.04);
-	chance[LOBE_DIFFUSE] = below ? 0
-				     : clear * max_of((1 - s->share[PRINCIPLED_TRANSMISSION]) * p->max_base,
-						      min_of(s->share[PRINCIPLED_SHEEN], 1) * 0.2);
-	chance[LOBE_CLEARCOAT] =
+	probability[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
+	probability[LOBE_SPECULAR] =
+		below ? glass * reflected : clear * reflected + s->metallic * max_of(p->max_base, 0.04);
+	probability[LOBE_DIFFUSE] = below ? 0
+					  : clear * max_of((1 - s->share[PRINCIPLED_TRANSMISSION]) * p->max_base,
+							   min_of(s->share[PRINCIPLED_SHEEN], 1) * 0.2);
+	probability[LOBE_CLEARCOAT] =
 		below ? 0 : s->share[PRINCIPLED_CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z)) * wo.z;
 	double coat = below ? 0 : coat_reflectance(s, wo.z);
 	for (int i = 0; i < LOBE_COUNT; i++) {
-		chance[i] = i == LOBE_COAT ? coat : chance[i] * (1 - coat);
-		sum += chance[i];
+		probability[i] = i == LOBE_COAT ? coat : probability[i] * (1 - coat);
+		sum += probability[i];
 	}
 	for (int i = 0; i < LOBE_COUNT; i++)
-		chance[i] = sum > 0 ? chance[i] / sum : 0;
+		probability[i] = sum > 0 ? probability[i] / sum : 0;
 }
 
 static vec3 mirror_if_below(vec3 v, bool below)
@@ -246,7 +247,7 @@ struct evaluation {
 
 /* Adds refracted light to *out: Walter et al. 2007, eq. 21, as in roughdielectric. wo is above; eta: index beyond
  * over index on wo's side. */
-static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double chance,
+static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double probability,
 			  enum transport transport, struct evaluation *out)
 {
 	vec3 h;
@@ -272,7 +273,7 @@ static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, do
 		f /= eta * eta;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		out->f.v[i] += f * sqrt(s->base.v[i]) * (1 - boundary.v[i]);
-	out->pdf += chance * facet_pdf;
+	out->pdf += probability * facet_pdf;
 }
 
 /* Returns the coat's reflection without its Fresnel factor and G1(wi), which is also the density of sampling it. */
@@ -284,16 +285,16 @@ static double coat_lobe(const struct principled_point *s, vec3 wo, vec3 h)
 /* Returns the density (solid angle) of reflected directions. facet_pdf: that of sampling the boundary's facets; cos_d:
  * cosine of either direction to the half vector h. */
 static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double facet_pdf,
-			    bool below, const double chance[LOBE_COUNT])
+			    bool below, const double probability[LOBE_COUNT])
 {
-	double pdf = chance[LOBE_SPECULAR] * facet_pdf;
+	double pdf = probability[LOBE_SPECULAR] * facet_pdf;
 	if (below)
 		return pdf;
-	pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
+	pdf += probability[LOBE_DIFFUSE] * wi.z / WARP_PI;
 	if (s->share[PRINCIPLED_CLEARCOAT] > 0)
-		pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
+		pdf += probability[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
 	if (s->share[PRINCIPLED_COAT] > 0)
-		pdf += chance[LOBE_COAT] * coat_lobe(s, wo, h);
+		pdf += probability[LOBE_COAT] * coat_lobe(s, wo, h);
 	return pdf;
 }
 
@@ -327,7 +328,7 @@ static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 
 
 /* Computes the value if `wants_value` is set, and the density if the probabilities of the lobes are given. */
 static struct evaluation evaluate(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport,
-				  bool wants_value, const double *chance)
+				  bool wants_value, const double *probability)
 {
 	struct evaluation out = {spectrum_constant(0), 0};
 	bool below = wo.z<0, glass = s->share[PRINCIPLED_TRANSMISSION]> 0 && s->metallic < 1;
@@ -338,7 +339,7 @@ static struct evaluation evaluate(const struct principled_point *s, vec3 wo, vec
 	if (wi.z < 0) {
 		if (glass)
 			add_refracted(s, wo, wi, below ? 1 / s->principled->eta : s->principled->eta,
-				      chance ? chance[LOBE_TRANSMIT] : 0, transport, &out);
+				      probability ? probability[LOBE_TRANSMIT] : 0, transport, &out);
 		return out;
 	}
 	vec3 h;
@@ -349,8 +350,8 @@ static struct evaluation evaluate(const struct principled_point *s, vec3 wo, vec
 	double facet_pdf = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
 	if (wants_value)
 		out.f = reflected_value(s, wo, wi, h, cos_d, facet_pdf, below);
-	if (chance)
-		out.pdf = reflected_pdf(s, wo, wi, h, cos_d, facet_pdf, below, chance);
+	if (probability)
+		out.pdf = reflected_pdf(s, wo, wi, h, cos_d, facet_pdf, below, probability);
 	return out;
 }
 
@@ -363,9 +364,9 @@ static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *p
 static double principled_pdf(const struct bsdf *b, const struct bsdf_point *point, vec3 wo, vec3 wi)
 {
 	struct principled_point s = principled_point_at(b->data, point);
-	double chance[LOBE_COUNT];
-	compute_lobe_chances(&s, wo, chance);
-	return evaluate(&s, wo, wi, point->transport, false, chance).pdf;
+	double probability[LOBE_COUNT];
+	compute_lobe_probabilities(&s, wo, probability);
+	return evaluate(&s, wo, wi, point->transport, false, probability).pdf;
 }
 
 /* Samples a half vector of GTR1 by inverting its cumulative distribution exactly. */
@@ -404,18 +405,18 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *poi
 {
 	struct principled_point s = principled_point_at(b->data, point);
 	bool below = wo.z < 0;
-	double chance[LOBE_COUNT], rest = u[2], eta = below ? 1 / s.principled->eta : s.principled->eta;
+	double probability[LOBE_COUNT], rest = u[2], eta = below ? 1 / s.principled->eta : s.principled->eta;
 	vec3 wi;
 	if (wo.z == 0)
 		return false;
-	compute_lobe_chances(&s, wo, chance);
+	compute_lobe_probabilities(&s, wo, probability);
 	int lobe = 0;
-	while (lobe < LOBE_COUNT - 1 && rest >= chance[lobe])
-		rest -= chance[lobe++];
-	if (!(chance[lobe] > 0) || !sample_lobe(&s, lobe, mirror_if_below(wo, below), eta, u, &wi))
+	while (lobe < LOBE_COUNT - 1 && rest >= probability[lobe])
+		rest -= probability[lobe++];
+	if (!(probability[lobe] > 0) || !sample_lobe(&s, lobe, mirror_if_below(wo, below), eta, u, &wi))
 		return false;
 	wi = mirror_if_below(wi, below);
-	struct evaluation evaluation = evaluate(&s, wo, wi, point->transport, true, chance);
+	struct evaluation evaluation = evaluate(&s, wo, wi, point->transport, true, probability);
 	if (!(evaluation.pdf > 0))
 		return false;
 	bool reflect = wo.z * wi.z > 0;
@@ -498,7 +499,7 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 		code = read_index(p, n, e);
 	if (code)
 		return code;
-	p->lambertian = node_bool(n, "lambertian", false);
+	p->is_lambertian = node_bool(n, "lambertian", false);
 	p->scales_boundary = p->has_specular || node_find_property(n, "specular_strength");
 	p->max_base = texture_max(&p->base);
 	principled_precompute(p, build);

@@ -36,11 +36,12 @@ struct principled {
 	double max_share[PRINCIPLED_SHARE_COUNT]; /* the largest value of each share; for textures, the largest found by
 						     bsdf_probe_point */
 	double eta, max_base;
-	bool varies; /* some parameter other than base and specular varies over the surface or with the wavelength */
+	bool is_textured; /* some parameter other than base and specular varies over the surface or with the wavelength
+			   */
 	bool has_specular;
 	bool scales_boundary;		     /* the boundary reflects and transmits other shares than Fresnel's */
-	bool lambertian;		     /* the diffuse lobe is Lambertian */
-	struct principled_point precomputed; /* without colours; if `varies`, its numbers do not hold everywhere */
+	bool is_lambertian;		     /* the diffuse lobe is Lambertian */
+	struct principled_point precomputed; /* without colours; if `is_textured`, its numbers do not hold everywhere */
 };
 
 struct principled_point principled_point_at(const struct principled *p, const struct bsdf_point *point);

@@ -53,25 +53,25 @@ struct thin_point {
 	struct principled_point s;
 	double spec_trans, diffuse_transmitted; /* t and d of the comment at the top */
 	struct microfacet transmit_facets;	/* D' */
-	double chance[THIN_LOBES];		/* probability of sampling each lobe */
+	double lobe_probability[THIN_LOBES];	/* probability of sampling each lobe */
 };
 
-static void compute_lobe_chances(struct thin_point *x, double cosine)
+static void compute_lobe_probabilities(struct thin_point *x, double cosine)
 {
 	const struct thin *t = x->t;
 	double base = t->p.max_base, diffuse = 1 - x->spec_trans, sum = 0;
 	double reflected = fresnel_dielectric(min_of(cosine, 1), x->s.eta).reflectance;
 	/* Facets reflect a different share than the plane of the surface, so neither lobe may have a probability of
 	 * 0. */
-	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
-	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
-	x->chance[THIN_DIFFUSE_REFLECT] =
+	x->lobe_probability[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
+	x->lobe_probability[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
+	x->lobe_probability[THIN_DIFFUSE_REFLECT] =
 		diffuse * (1 - x->diffuse_transmitted) * fmax(base, 0.2 * x->s.share[PRINCIPLED_SHEEN]);
-	x->chance[THIN_DIFFUSE_TRANSMIT] = diffuse * x->diffuse_transmitted * base;
+	x->lobe_probability[THIN_DIFFUSE_TRANSMIT] = diffuse * x->diffuse_transmitted * base;
 	for (int i = 0; i < THIN_LOBES; i++)
-		sum += x->chance[i];
+		sum += x->lobe_probability[i];
 	for (int i = 0; i < THIN_LOBES; i++)
-		x->chance[i] = sum > 0 ? x->chance[i] / sum : 0;
+		x->lobe_probability[i] = sum > 0 ? x->lobe_probability[i] / sum : 0;
 }
 
 static struct thin_point thin_point_at(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
@@ -86,7 +86,7 @@ static struct thin_point thin_point_at(const struct bsdf *b, const struct bsdf_p
 	x.s.share[PRINCIPLED_TRANSMISSION] = 0;
 	x.transmit_facets =
 		principled_facets(x.s.share[PRINCIPLED_ANISOTROPIC], transmit_roughness(x.s.eta, x.s.roughness));
-	compute_lobe_chances(&x, fabs(wo.z));
+	compute_lobe_probabilities(&x, fabs(wo.z));
 	return x;
 }
 
@@ -117,11 +117,13 @@ static struct evaluation evaluate(const struct thin_point *x, vec3 wo, vec3 wi)
 			 d = principled_eval_diffuse(&x->s, boundary, o, i, cosine);
 		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, boundary, cosine)),
 				     spectrum_scale(diffuse * (1 - x->diffuse_transmitted), d));
-		out.pdf = x->chance[THIN_REFLECT] * facet_pdf + x->chance[THIN_DIFFUSE_REFLECT] * i.z / WARP_PI;
+		out.pdf = x->lobe_probability[THIN_REFLECT] * facet_pdf +
+			  x->lobe_probability[THIN_DIFFUSE_REFLECT] * i.z / WARP_PI;
 	} else {
 		double passes = both * fresnel_dielectric(cosine, x->s.eta).transmittance;
 		out.f = spectrum_scale(passes + diffuse * x->diffuse_transmitted / WARP_PI, x->s.base);
-		out.pdf = x->chance[THIN_TRANSMIT] * facet_pdf + x->chance[THIN_DIFFUSE_TRANSMIT] * i.z / WARP_PI;
+		out.pdf = x->lobe_probability[THIN_TRANSMIT] * facet_pdf +
+			  x->lobe_probability[THIN_DIFFUSE_TRANSMIT] * i.z / WARP_PI;
 	}
 	return out;
 }
@@ -147,9 +149,9 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	int lobe = 0;
 	if (wo.z == 0)
 		return false;
-	while (lobe < THIN_LOBES - 1 && rest >= x.chance[lobe])
-		rest -= x.chance[lobe++];
-	if (!(x.chance[lobe] > 0))
+	while (lobe < THIN_LOBES - 1 && rest >= x.lobe_probability[lobe])
+		rest -= x.lobe_probability[lobe++];
+	if (!(x.lobe_probability[lobe] > 0))
 		return false;
 	if (lobe == THIN_DIFFUSE_REFLECT || lobe == THIN_DIFFUSE_TRANSMIT) {
 		wi = warp_cosine_hemisphere(u[0], u[1]);

@@ -70,7 +70,7 @@ static const struct boundary_table *get_table(const struct rough_map *roughness,
 					.min_alpha = roughness->narrowest_facets.alpha,
 					.row_count = 1,
 					.next = build->boundary_tables ? *build->boundary_tables : NULL};
-	if (roughness->varies && roughness->max_alpha > wanted.min_alpha) {
+	if (roughness->is_textured && roughness->max_alpha > wanted.min_alpha) {
 		wanted.row_count = BOUNDARY_ROWS;
 		wanted.log_step = log(roughness->max_alpha / wanted.min_alpha) / (BOUNDARY_ROWS - 1);
 	}
@@ -94,7 +94,7 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 {
 	int code = rough_map_read(&r->roughness, b, n, build, e);
 	bool has_alpha_uv = node_find_property(n, "alpha_u") || node_find_property(n, "alpha_v");
-	if (!code && (r->roughness.narrowest_facets.ratio != 1 || (r->roughness.varies && has_alpha_uv)))
+	if (!code && (r->roughness.narrowest_facets.ratio != 1 || (r->roughness.is_textured && has_alpha_uv)))
 		code = node_error(n, e, ENOTSUP, "alpha_u and alpha_v differ; only isotropic coatings are supported");
 	if (code)
 		return code;

@@ -45,14 +45,14 @@ int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node 
 		   struct error *e)
 {
 	int code = microfacet_read(&r->narrowest_facets, n, e);
-	r->varies = node_ref(n, "alpha") || node_ref(n, "alpha_u") || node_ref(n, "alpha_v");
-	if (!code && r->varies)
+	r->is_textured = node_ref(n, "alpha") || node_ref(n, "alpha_u") || node_ref(n, "alpha_v");
+	if (!code && r->is_textured)
 		code = read_alpha(&r->alpha_u, b, n, "alpha_u", build, e);
-	if (!code && r->varies)
+	if (!code && r->is_textured)
 		code = read_alpha(&r->alpha_v, b, n, "alpha_v", build, e);
 	if (code)
 		return code;
-	if (r->varies)
+	if (r->is_textured)
 		find_narrowest(r, build);
 	b->uses_tangents = r->narrowest_facets.ratio != 1 || node_ref(n, "alpha_u") || node_ref(n, "alpha_v");
 	b->min_alpha = microfacet_min_alpha(&r->narrowest_facets);

@@ -7,11 +7,11 @@
 #include "worker/render/bsdf/microfacet.h"
 
 struct rough_map {
-	struct microfacet narrowest_facets; /* if `varies`, those of the smallest roughness that bsdf_probe_point finds:
-					       step sizes depend on it */
-	double max_alpha;		    /* if `varies`: the largest alpha_u found */
-	bool varies;
-	struct texture alpha_u, alpha_v; /* if `varies`: the roughness along u and v */
+	struct microfacet narrowest_facets; /* if `is_textured`, those of the smallest roughness that bsdf_probe_point
+					       finds: step sizes depend on it */
+	double max_alpha;		    /* if `is_textured`: the largest alpha_u found */
+	bool is_textured;
+	struct texture alpha_u, alpha_v; /* if `is_textured`: the roughness along u and v */
 };
 
 /* Reads alpha, alpha_u, alpha_v and distribution. Sets b's texture flags and roughness. Returns 0 or a negative error
@@ -33,7 +33,7 @@ struct microfacet rough_map_eval(const struct rough_map *r, const struct bsdf_po
 
 static inline struct microfacet rough_map_at(const struct rough_map *r, const struct bsdf_point *p)
 {
-	return r->varies ? rough_map_eval(r, p) : r->narrowest_facets;
+	return r->is_textured ? rough_map_eval(r, p) : r->narrowest_facets;
 }
 
 #endif

@@ -82,7 +82,7 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 		return code;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	if (!r->roughness.varies && b->min_alpha < build->min_roughness) {
+	if (!r->roughness.is_textured && b->min_alpha < build->min_roughness) {
 		extern const struct bsdf_ops bsdf_ops_conductor;
 		bsdf_make_specular(b, &bsdf_ops_conductor);
 	}

@@ -179,7 +179,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
 	/* With equal indices no facet refracts: all light passes straight through. */
-	if ((b->eta == 1 && !b->is_dispersive) || (!r->roughness.varies && b->min_alpha < build->min_roughness)) {
+	if ((b->eta == 1 && !b->is_dispersive) || (!r->roughness.is_textured && b->min_alpha < build->min_roughness)) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
 		bsdf_make_specular(b, &bsdf_ops_dielectric);
 	}

@@ -26,9 +26,9 @@ static spectrum roughplastic_eval(const struct bsdf *b, const struct bsdf_point 
 		spectrum_scale(lobe, texture_eval(&r->coating.specular, &p->texture_point, p->wavelengths)));
 }
 
-static double specular_chance(const struct roughplastic *r, const struct boundary_point *point, vec3 wo)
+static double specular_probability(const struct roughplastic *r, const struct boundary_point *point, vec3 wo)
 {
-	return coated_diffuse_specular_chance(&r->coating, 1 - rough_boundary_transmittance(point, wo.z));
+	return coated_diffuse_specular_probability(&r->coating, 1 - rough_boundary_transmittance(point, wo.z));
 }
 
 static double roughplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -37,7 +37,7 @@ static double roughplastic_pdf(const struct bsdf *b, const struct bsdf_point *p,
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
 	struct boundary_point point = rough_boundary_at(&r->boundary, p);
-	double lobe, s = specular_chance(r, &point, wo);
+	double lobe, s = specular_probability(r, &point, wo);
 	rough_boundary_reflect(&point, wo, wi, &lobe);
 	return s * lobe + (1 - s) * wi.z / WARP_PI;
 }
@@ -49,8 +49,8 @@ static bool roughplastic_sample(const struct bsdf *b, const struct bsdf_point *p
 	if (!(wo.z > 0))
 		return false;
 	struct boundary_point point = rough_boundary_at(&r->boundary, p);
-	vec3 wi = u[2] < specular_chance(r, &point, wo) ? microfacet_sample_mirrored(&point.facets, wo, u[0], u[1])
-							: warp_cosine_hemisphere(u[0], u[1]);
+	vec3 wi = u[2] < specular_probability(r, &point, wo) ? microfacet_sample_mirrored(&point.facets, wo, u[0], u[1])
+							     : warp_cosine_hemisphere(u[0], u[1]);
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
@@ -64,10 +64,10 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 		code = rough_boundary_read(&r->boundary, r->coating.eta, b, n, build, e);
 	if (code)
 		return code;
-	double chance = r->coating.specular_weight;
-	if (!(chance > 0))
+	double probability = r->coating.specular_weight;
+	if (!(probability > 0))
 		b->min_alpha = INFINITY;
-	b->mean_alpha = chance * b->mean_alpha + (1 - chance);
+	b->mean_alpha = probability * b->mean_alpha + (1 - probability);
 	return 0;
 }
 

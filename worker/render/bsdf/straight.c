@@ -24,12 +24,12 @@ static bool pass_straight(vec3 wo, vec3 *wi)
 }
 
 static spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				    double *chance)
+				    double *probability)
 {
 	const struct filter *f = b->data;
 	if (!(mode & BSDF_TRANSMIT) || !pass_straight(wo, wi))
 		return spectrum_constant(0);
-	*chance = 1;
+	*probability = 1;
 	return spectrum_scale(f->transmitted_share, texture_eval(&f->transmittance, &p->texture_point, p->wavelengths));
 }
 
@@ -49,7 +49,7 @@ static int create_filter(struct bsdf *b, const struct scene_node *n, const struc
 		return code;
 	f->transmitted_share = share;
 	b->modes = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
-	b->transmits_only_straight = true;
+	b->is_straight_transmitter = true;
 	b->has_delta = true;
 	b->is_two_sided = true;
 	b->min_alpha = b->mean_alpha = 0;

@@ -97,7 +97,7 @@ int tensor_rgb_weights(const struct tensor_input *in, const double *nm, uint32_t
 		double wavelength = CIE_FIRST_NM + i, fraction = 0;
 		uint32_t k = 0;
 		if (count > 1 && wavelength > nm[0]) {
-			k = search_cell(nm, count - 1, wavelength);
+			k = search_find_cell(nm, count - 1, wavelength);
 			fraction = fmin((wavelength - nm[k]) / (nm[k + 1] - nm[k]), 1);
 		}
 		for (int c = 0; c < 3; c++) {

@@ -25,7 +25,7 @@ static struct fresnel sheet_fresnel(const struct thin *t, vec3 wo)
 }
 
 static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				double *chance)
+				double *probability)
 {
 	const struct thin *t = b->data;
 	struct fresnel f = sheet_fresnel(t, wo);
@@ -34,7 +34,7 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
 		return spectrum_constant(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
-	*chance = fresnel_chance(&f, reflect);
+	*probability = fresnel_reflection_probability(&f, reflect);
 	return spectrum_scale(
 		share, texture_eval(reflect ? &t->reflectance : &t->transmittance, &p->texture_point, p->wavelengths));
 }
@@ -43,7 +43,7 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 			struct bsdf_sample *out)
 {
 	struct fresnel f = sheet_fresnel(b->data, wo);
-	bool reflect = u[2] < fresnel_chance(&f, true);
+	bool reflect = u[2] < fresnel_reflection_probability(&f, true);
 	return bsdf_sample_delta(b, p, wo, reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
 
@@ -62,7 +62,7 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 		return code;
 	t->eta = inside / outside;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
-	b->transmits_only_straight = true;
+	b->is_straight_transmitter = true;
 	b->has_delta = true;
 	b->is_two_sided = true;
 	b->min_alpha = b->mean_alpha = 0;

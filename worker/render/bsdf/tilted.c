@@ -97,7 +97,7 @@ static const struct bsdf_ops tilted_ops = {
 static bool needs_normal(const struct bsdf *part)
 {
 	return part->has_smooth ||
-	       (part->has_delta && !(part->transmits_only_straight && !(part->modes & BSDF_REFLECT)));
+	       (part->has_delta && !(part->is_straight_transmitter && !(part->modes & BSDF_REFLECT)));
 }
 
 static const struct bsdf *narrowest_part(const struct bsdf *part, uint32_t count)

@@ -62,13 +62,13 @@ static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_po
 }
 
 static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				    double *chance)
+				    double *probability)
 {
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
-		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, chance);
+		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, probability);
 	struct bsdf_point q;
-	spectrum weight = bsdf_eval_delta(&t->side[1], back_point(b, p, &q), mirror(wo), mode, wi, chance);
+	spectrum weight = bsdf_eval_delta(&t->side[1], back_point(b, p, &q), mirror(wo), mode, wi, probability);
 	if (!spectrum_is_zero(weight))
 		*wi = mirror(*wi);
 	return weight;

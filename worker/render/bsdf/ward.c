@@ -23,8 +23,8 @@ struct ward {
 	struct texture diffuse, specular;
 	struct rough_map roughness;
 	enum ward_form form;
-	double scale;		/* factor of both reflectances */
-	double specular_chance; /* probability of sampling the specular lobe */
+	double scale;		     /* factor of both reflectances */
+	double specular_probability; /* probability of sampling the specular lobe */
 };
 
 /* The half vector of two directions above the surface. */
@@ -81,7 +81,7 @@ static double ward_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	if (!(wo.z > 0 && wi.z > 0))
 		return 0;
 	double x = find_half_vector(&m, wo, wi, &f) ? 0.25 * f.d * f.h.z / f.cosine : 0;
-	return w->specular_chance * (isfinite(x) ? x : 0) + (1 - w->specular_chance) * wi.z / WARP_PI;
+	return w->specular_probability * (isfinite(x) ? x : 0) + (1 - w->specular_probability) * wi.z / WARP_PI;
 }
 
 static vec3 sample_lobe(const struct microfacet *m, vec3 wo, double u0, double u1)
@@ -98,7 +98,7 @@ static bool ward_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	if (!(wo.z > 0))
 		return false;
 	struct microfacet m = rough_map_at(&w->roughness, p);
-	vec3 wi = u[2] < w->specular_chance ? sample_lobe(&m, wo, u[0], u[1]) : warp_cosine_hemisphere(u[0], u[1]);
+	vec3 wi = u[2] < w->specular_probability ? sample_lobe(&m, wo, u[0], u[1]) : warp_cosine_hemisphere(u[0], u[1]);
 	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
@@ -120,11 +120,11 @@ static int ward_create(struct bsdf *b, const struct scene_node *n, const struct 
 	double d = texture_max(&w->diffuse), s = texture_max(&w->specular);
 	w->form = parse_form(node_string(n, "variant", "balanced"));
 	w->scale = d + s > 1 ? 0.99 / (d + s) : 1;
-	w->specular_chance = d + s > 0 ? s / (d + s) : 0;
+	w->specular_probability = d + s > 0 ? s / (d + s) : 0;
 	b->is_black = d + s == 0;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->mean_alpha = w->specular_chance * b->mean_alpha + (1 - w->specular_chance);
+	b->mean_alpha = w->specular_probability * b->mean_alpha + (1 - w->specular_probability);
 	if (s == 0)
 		b->min_alpha = INFINITY;
 	return bsdf_check_energy(n, d + s, e);

@@ -21,7 +21,7 @@ static struct warp_cell bracket(uint32_t count, const double *value, double x)
 		return (struct warp_cell){0, 0};
 	if (!(x < value[count - 1]))
 		return (struct warp_cell){count - 2, 1};
-	uint32_t i = search_cell(value, count - 1, x);
+	uint32_t i = search_find_cell(value, count - 1, x);
 	return (struct warp_cell){i, (x - value[i]) / (value[i + 1] - value[i])};
 }
 

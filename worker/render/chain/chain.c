@@ -11,19 +11,19 @@ void chain_count_decision(struct chain *c, bool accepted)
 	uint64_t *counters = c->context->counters;
 	if (accepted) {
 		counters[COUNT_ACCEPTED]++;
-		c->rejected_run = 0;
+		c->rejected_in_a_row = 0;
 		return;
 	}
-	c->rejected_run++;
-	if (c->rejected_run > counters[COUNT_LONGEST_STUCK])
-		counters[COUNT_LONGEST_STUCK] = c->rejected_run;
+	c->rejected_in_a_row++;
+	if (c->rejected_in_a_row > counters[COUNT_LONGEST_STUCK])
+		counters[COUNT_LONGEST_STUCK] = c->rejected_in_a_row;
 }
 
 void chain_write_header(const struct chain *c, uint8_t *bytes)
 {
 	put64(bytes, c->id);
 	put64(bytes + 8, c->step);
-	put64(bytes + 16, c->rejected_run);
+	put64(bytes + 16, c->rejected_in_a_row);
 }
 
 bool chain_read_header(struct chain *c, const uint8_t *bytes, size_t size)
@@ -31,7 +31,7 @@ bool chain_read_header(struct chain *c, const uint8_t *bytes, size_t size)
 	if (size < CHAIN_STATE_HEADER_BYTES || get64(bytes) != c->id || get64(bytes + 8) != c->step ||
 	    get64(bytes + 16) > c->step)
 		return false;
-	c->rejected_run = get64(bytes + 16);
+	c->rejected_in_a_row = get64(bytes + 16);
 	return true;
 }
 

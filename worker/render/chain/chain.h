@@ -25,8 +25,8 @@ struct chain {
 	const char *mixture;
 	uint64_t (*strategy_counters)[STRATEGY_COUNTERS]; /* the batch's counters */
 	uint64_t seed, id;
-	uint64_t step;	       /* number of the last mutation; 0: none yet */
-	uint64_t rejected_run; /* rejections since the last acceptance */
+	uint64_t step;		    /* number of the last mutation; 0: none yet */
+	uint64_t rejected_in_a_row; /* rejections since the last acceptance */
 };
 
 struct chain_ops {

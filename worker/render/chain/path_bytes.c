@@ -63,7 +63,7 @@ static void write_vertex(const struct world *w, const struct path_vertex *v, uin
 	vec3 coordinates = on_surface ? surface_coordinates(w, v) : v->x.p;
 	at[0] = (uint8_t)v->kind;
 	at[1] = (uint8_t)v->mode;
-	at[2] = v->delta;
+	at[2] = v->is_delta;
 	at[3] = 0;
 	put32(at + 4, (uint32_t)v->emitter);
 	put32(at + 8, v->x.prim.shape);
@@ -105,7 +105,7 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 coord
 static bool read_emitter_point(const struct world *w, int32_t emitter, vec3 p, double time, struct path_vertex *v)
 {
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(w, emitter, time, &storage);
+	const struct emitter *em = world_emitter_at(w, emitter, time, &storage);
 	const double half[2] = {0.5, 0.5};
 	struct emitter_point point = {.is_infinite = em->is_infinite};
 	double pdf;
@@ -127,7 +127,7 @@ static struct path_vertex pinhole(const struct world *w, double time)
 	struct path_vertex v = {.kind = VERTEX_CAMERA, .emitter = -1};
 	v.x.prim = prim_none_at(time);
 	struct camera storage;
-	v.x.p = camera_sample_point(world_camera(w, &v.x, &storage), middle);
+	v.x.p = camera_sample_point(world_camera_at(w, &v.x, &storage), middle);
 	return v;
 }
 
@@ -144,7 +144,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	int32_t emitter = (int32_t)get32(at + 4);
 	struct prim_ref prim = {get32(at + 8), get32(at + 12), time};
 	vec3 coordinates = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
-	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
+	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .is_delta = at[2] != 0, .emitter = emitter};
 	if (is_out_of_range(w, coordinates, time) || at[0] > VERTEX_MEDIUM || at[2] > 1 || at[3] != 0 ||
 	    (v->kind == VERTEX_CAMERA) != (i == edges) ||
 	    (v->kind == VERTEX_SURFACE || v->kind == VERTEX_MEDIUM) != (i > 0 && i < edges) ||
@@ -152,20 +152,20 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 		return false;
 	if (v->kind == VERTEX_MEDIUM) {
 		v->x = (struct surface_point){.p = coordinates, .prim = prim_none_at(time)};
-		return EFFECT_IS_ON(w, scattering) && emitter == -1 && !v->delta;
+		return EFFECT_IS_ON(w, scattering) && emitter == -1 && !v->is_delta;
 	}
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];
 		struct camera storage;
 		v->x.prim = prim_none_at(time);
-		const struct camera *camera = world_camera(w, &v->x, &storage);
+		const struct camera *camera = world_camera_at(w, &v->x, &storage);
 		camera_point_inverse(camera, coordinates, u);
 		v->x.p = camera_sample_point(camera, u);
 		return is_within_tolerance(v->x.p, coordinates, fmax(w->radius, w->camera.aperture_radius));
 	}
 	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
 		return false;
-	if (i == 0 && w->emitter_shape[emitter] == UINT32_MAX)
+	if (i == 0 && w->emitter_shapes[emitter] == UINT32_MAX)
 		return read_emitter_point(w, emitter, coordinates, time, v) && v->kind == (enum vertex_kind)at[0];
 	if (!read_surface(w, prim, coordinates, &v->x))
 		return false;
@@ -203,7 +203,7 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 	if (!full_path_finish(c, x))
 		return false;
 	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].delta && !(full_path_specular_error(x, j) <= SPECULAR_TOLERANCE))
+		if (x->v[j].is_delta && !(full_path_specular_error(x, j) <= SPECULAR_TOLERANCE))
 			return false;
 	return true;
 }

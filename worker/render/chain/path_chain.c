@@ -125,27 +125,27 @@ static void flush(struct chain *base)
 }
 
 /* Returns the acceptance probability; 0 if there is no valid proposal, the reason for which is counted. */
-static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
+static double propose(struct path_chain *c, const struct mixture_entry *entry, struct proposal_move *move,
 		      struct chain_sums *sums)
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path *x = &c->current->path, *y = &c->proposal->path;
 	enum proposal_result result = entry->ops->propose(entry->ops, m, &entry->forced, x, y, move);
-	double to_y = result ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
-	if (!result && !(to_y > -INFINITY && path_state_weight_is_valid(m->path, to_y, entry->ops->independent)))
-		result = PROPOSAL_DARK;
+	double to_y = result ? -INFINITY : entry->ops->log_weight(m, y, move, MUTATION_FORWARD);
+	if (!result && !(to_y > -INFINITY && path_state_weight_is_valid(m->path, to_y, entry->ops->is_independent)))
+		result = PROPOSAL_BLACK;
 	if (result) {
 		m->counters[proposal_counter(result)]++;
 		return 0;
 	}
-	if (entry->ops->independent) {
+	if (entry->ops->is_independent) {
 		double f_over_p = exp(to_y);
 		sums->sum += f_over_p;
 		sums->square_sum += f_over_p * f_over_p;
 	}
 	if (x->edges == 0)
 		return 1;
-	double to_x = entry->ops->log_weight(m, x, move, Y_TO_X);
+	double to_x = entry->ops->log_weight(m, x, move, MUTATION_REVERSE);
 	return path_state_weight_is_valid(m->path, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
 }
 
@@ -156,15 +156,15 @@ static void step(struct chain *base, struct chain_sums *sums)
 	uint64_t *counters = base->context->counters;
 	double r[4];
 	m->step = ++base->step;
-	mutation_random(m, BLOCK_STRATEGY, r);
+	mutation_draw_uniforms(m, BLOCK_STRATEGY, r);
 	bool black = c->current->path.edges == 0;
 	unsigned strategy = black ? c->mixture.independent_index : mixture_choose(&c->mixture, r[0]);
 	const struct mixture_entry *entry = &c->mixture.entries[strategy];
 	m->counters = base->strategy_counters[strategy];
 	m->counters[STRATEGY_PROPOSED]++;
 	counters[COUNT_SAMPLES]++;
-	counters[COUNT_INDEPENDENT] += entry->ops->independent;
-	struct move move = {0};
+	counters[COUNT_INDEPENDENT] += entry->ops->is_independent;
+	struct proposal_move move = {0};
 	uint64_t rays_before = batch_ray_count(counters);
 	double acceptance = propose(c, entry, &move, sums);
 	m->counters[STRATEGY_RAYS] += batch_ray_count(counters) - rays_before;
@@ -182,7 +182,7 @@ static void step(struct chain *base, struct chain_sums *sums)
 	} else {
 		splat_state(c, c->proposal);
 	}
-	path_state_sync_proposal(&c->proposal->path, &c->current->path, &move, entry->ops->independent);
+	path_state_sync_proposal(&c->proposal->path, &c->current->path, &move, entry->ops->is_independent);
 }
 
 static const struct chain_ops chain_ops_path = {
@@ -195,7 +195,7 @@ static const struct chain_ops chain_ops_path = {
 };
 
 const struct integrator integrator_hslt = {
-	.properties = {"hslt", PLAN_CHAINS, FULL_PATH_EDGES_MAX, .has_mutations = true, .ends_on_emitters = true},
+	.properties = {"hslt", PLAN_CHAINS, FULL_PATH_EDGES_MAX, .has_mutations = true, .must_end_on_emitter = true},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_evaluate_bootstrap,
 	.chain = &chain_ops_path,

@@ -15,8 +15,8 @@ void path_state_copy(struct full_path *to, const struct full_path *from)
 	to->edges = from->edges;
 }
 
-void path_state_sync_proposal(struct full_path *proposal, const struct full_path *current, const struct move *move,
-			      bool any_may_differ)
+void path_state_sync_proposal(struct full_path *proposal, const struct full_path *current,
+			      const struct proposal_move *move, bool any_may_differ)
 {
 	if (any_may_differ || proposal->edges != current->edges)
 		path_state_copy(proposal, current);
@@ -39,9 +39,9 @@ void path_evaluate_bootstrap(struct path_context *c, struct sampler *s, struct p
 {
 	const double max_survival = c->max_survival;
 	c->max_survival = PATH_SURVIVAL_MAX;
-	c->connects_all = true;
+	c->makes_faint_connections = true;
 	path_trace_candidates(c, s, out);
-	c->connects_all = false;
+	c->makes_faint_connections = false;
 	c->max_survival = max_survival;
 }
 

@@ -17,8 +17,8 @@ struct path_state {
 
 void path_state_copy(struct full_path *to, const struct full_path *from);
 /* Makes the proposal's path equal to the current one again, after a step. any_may_differ: any vertex may differ. */
-void path_state_sync_proposal(struct full_path *proposal, const struct full_path *current, const struct move *move,
-			      bool any_may_differ);
+void path_state_sync_proposal(struct full_path *proposal, const struct full_path *current,
+			      const struct proposal_move *move, bool any_may_differ);
 /* Whether a weight with this logarithm may go to the film: it must not be NaN or infinite and, if bounded, must be
  * within the range of a float. Other weights are counted. */
 bool path_state_weight_is_valid(const struct path_context *c, double log_weight, bool bounded);

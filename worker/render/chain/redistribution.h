@@ -53,6 +53,6 @@ void redistribution_free(struct redistribution *r);
  * sample among all samples of the plan: the random numbers of its chains follow from them. */
 struct path_split *redistribution_begin(struct redistribution *r, uint64_t pixel, uint64_t sample);
 /* Returns I of the part of the sample that the film did not get directly. */
-double redistribution_spread_intensity(const struct redistribution *r);
+double redistribution_taken_intensity(const struct redistribution *r);
 
 #endif

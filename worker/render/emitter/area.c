@@ -13,7 +13,7 @@
 
 struct area_light {
 	struct surface_light light; /* first: surface_light.h */
-	double back_chance;	    /* probability that a sub-path leaves against the normal; 0: one-sided */
+	double back_probability;    /* probability that a sub-path leaves against the normal; 0: one-sided */
 };
 
 /* Returns whether the surface encloses a body: the normals of its triangles, weighted by area, then add up to 0. */
@@ -35,7 +35,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return rc;
 	bool is_two_sided = node_bool(n, "two_sided", node_bool(n, "twosided", false));
 	/* The scene's radius is 1; a sphere of half that radius has an area of pi. */
-	l->back_chance = !is_two_sided ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
+	l->back_probability = !is_two_sided ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
 	em->power = l->light.area * M_PI * em->brightness_bound * (is_two_sided ? 2 : 1);
 	return 0;
 }
@@ -44,7 +44,7 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 {
 	const struct area_light *l = em->data;
 	double cosine = vec3_dot(x->n, w);
-	if (!(cosine > 0 || (l->back_chance > 0 && cosine < 0)))
+	if (!(cosine > 0 || (l->back_probability > 0 && cosine < 0)))
 		return spectrum_constant(0);
 	return texture_eval(&l->light.radiance, &x->texture_point, wl);
 }
@@ -54,9 +54,9 @@ static bool sample_direction(const struct emitter *em, const struct emitter_poin
 {
 	const struct area_light *l = em->data;
 	struct frame f = frame_around(x->n);
-	bool behind = u[0] < l->back_chance;
-	double share = behind ? l->back_chance : 1 - l->back_chance,
-	       rest = behind ? u[0] / share : (u[0] - l->back_chance) / share;
+	bool behind = u[0] < l->back_probability;
+	double share = behind ? l->back_probability : 1 - l->back_probability,
+	       rest = behind ? u[0] / share : (u[0] - l->back_probability) / share;
 	double r = sqrt(rest), phi = 2 * M_PI * u[1], z = sqrt(1 - rest);
 	*w = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), behind ? -z : z});
 	*pdf = share * z / M_PI;
@@ -67,7 +67,7 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 {
 	const struct area_light *l = em->data;
 	double cosine = vec3_dot(x->n, w);
-	return (cosine > 0 ? (1 - l->back_chance) * cosine : -l->back_chance * cosine) / M_PI;
+	return (cosine > 0 ? (1 - l->back_probability) * cosine : -l->back_probability * cosine) / M_PI;
 }
 
 /* Computes the cone that the sphere subtends at ref: its axis, the distance of the centre, and the squared sine of its

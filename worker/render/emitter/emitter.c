@@ -68,7 +68,7 @@ int emitter_read_texture(struct texture *t, const struct scene_node *n, const ch
 {
 	const struct texture_build texture_build = {build->assets,
 						    build->arena,
-						    build->dialect_3,
+						    build->is_dialect_3,
 						    build->attributes,
 						    build->surface ? build->volumes : NULL,
 						    false};

@@ -40,7 +40,7 @@ struct emitter_surface {
 struct emitter_build {
 	const struct asset_source *assets;
 	struct arena *arena;
-	bool dialect_3;
+	bool is_dialect_3;
 	const struct emitter_surface *surface; /* NULL: the emitter has no shape */
 	struct attribute_table *attributes;    /* of the mesh; NULL: none */
 	vec3 world_center; /* a scene point p is at world_scale (p - world_center) in the rescaled world */

@@ -63,7 +63,7 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 	const struct envmap *m = em->data;
 	double u, v, rgb[3];
 	uv_from_direction(m, x->p, &u, &v);
-	if (m->rows_reach_poles)
+	if (m->has_rows_at_poles)
 		v = (v * m->rows + 0.5) / (m->rows + 1);
 	raster_eval(&m->raster, u, v, rgb);
 	return spectrum_scale(m->scale, color_eval_rgb_illuminant(rgb, wl));
@@ -72,7 +72,7 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 static double row_edge_angle(const struct envmap *m,
 			     uint32_t row) /* angle of the upper edge of the row from the pole */
 {
-	if (m->rows_reach_poles)
+	if (m->has_rows_at_poles)
 		return M_PI * row / m->rows;
 	return row == 0 ? 0 : row == m->rows ? M_PI : M_PI * (row - 0.5) / (m->rows - 1);
 }
@@ -94,7 +94,7 @@ static void find_cell(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *c
 	double u, v;
 	uv_from_direction(m, d, &u, &v);
 	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last cell. */
-	double c = u * m->columns - 0.5, r = m->rows_reach_poles ? v * m->rows : v * (m->rows - 1) + 0.5;
+	double c = u * m->columns - 0.5, r = m->has_rows_at_poles ? v * m->rows : v * (m->rows - 1) + 0.5;
 	*column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
 	*row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
 	*across = (c < 0 ? c + m->columns : c) - *column;
@@ -109,9 +109,9 @@ double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
 	const uint32_t *cells = row_cells(m, row);
 	if (cells[m->columns] == 0)
 		return 0;
-	double chance =
+	double probability =
 		(m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
-	return chance / (row_cosine_height(m, row) * 2 * M_PI / m->columns) * jac_local_from_world(m, x->p);
+	return probability / (row_cosine_height(m, row) * 2 * M_PI / m->columns) * jac_local_from_world(m, x->p);
 }
 
 void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
@@ -137,7 +137,7 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	const struct envmap *m = em->data;
 	if (!(em->power > 0))
 		return false;
-	uint32_t row = search_cell(m->row_cdf, m->rows, u[1]);
+	uint32_t row = search_find_cell(m->row_cdf, m->rows, u[1]);
 	const uint32_t *cells = row_cells(m, row);
 	double target = u[0] * cells[m->columns];
 	uint32_t column = search_count(cells, m->columns, target);
@@ -187,7 +187,7 @@ static void load_row(const struct envmap *m, uint32_t row, struct luminance_row 
  * counts up. */
 static void weigh_cells(const struct envmap *m, uint32_t row, struct luminance_row pixels[2], double *weight)
 {
-	uint32_t below = row + m->rows_reach_poles, above = below == 0 ? 0 : below - 1;
+	uint32_t below = row + m->has_rows_at_poles, above = below == 0 ? 0 : below - 1;
 	below = below < m->raster.image.height ? below : m->raster.image.height - 1;
 	if (pixels[1].row == above) {
 		struct luminance_row last = pixels[0];
@@ -288,14 +288,14 @@ int envmap_init(struct emitter *em, const struct raster *picture, bool rows_reac
 	m->raster.wrap_v = RASTER_CLAMP;
 	m->scale = scale;
 	m->columns = m->raster.image.width;
-	m->rows_reach_poles = rows_reach_poles && m->raster.image.height > 1;
-	m->rows = m->rows_reach_poles ? m->raster.image.height - 1 : m->raster.image.height + 1;
+	m->has_rows_at_poles = rows_reach_poles && m->raster.image.height > 1;
+	m->rows = m->has_rows_at_poles ? m->raster.image.height - 1 : m->raster.image.height + 1;
 	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
 	m->cell_cdf = arena_alloc(build->arena, (size_t)m->rows * ((size_t)m->columns + 1), sizeof *m->cell_cdf);
 	double integral = 0;
 	if (!m->row_cdf || !m->cell_cdf || build_density(m, &integral))
 		return node_error(n, e, ENOMEM, "out of memory for the density of %u x %u cells", m->columns, m->rows);
-	const struct color white = {.kind = COLOR_KIND_D65, .scale = m->scale, .times_d65 = true};
+	const struct color white = {.kind = COLOR_KIND_D65, .scale = m->scale, .is_times_d65 = true};
 	em->is_infinite = true;
 	em->is_textured = true;
 	em->color_kind = raster_is_grey(&m->raster) ? COLOR_KIND_D65 : COLOR_KIND_OTHER;
@@ -313,7 +313,8 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	if (!code)
 		code = raster_read(&picture, n, build->assets, &(struct raster_options){0, HUGE_VAL, false, IMAGE_ALL},
 				   build->arena, e);
-	return code ? code : envmap_init(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
+	return code ? code
+		    : envmap_init(em, &picture, build->is_dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 
 static void set_transform(struct emitter *em, const mat4 *to_world)

@@ -18,16 +18,16 @@ struct envmap {
 	struct raster raster;
 	double scale;
 	struct envmap_axes axes;
-	bool rows_reach_poles; /* the outer rows are the poles */
-	uint32_t rows;	       /* rows of cells: height - 1 if rows_reach_poles, otherwise height + 1 */
-	uint32_t columns;      /* columns of cells, and of pixels */
-	double *row_cdf;       /* [rows + 1]; the last one is 1, or all are 0 if the map is black */
-	uint32_t *cell_cdf;    /* running sums, [rows][columns + 1] */
+	bool has_rows_at_poles; /* the outer rows are the poles */
+	uint32_t rows;		/* rows of cells: height - 1 if has_rows_at_poles, otherwise height + 1 */
+	uint32_t columns;	/* columns of cells, and of pixels */
+	double *row_cdf;	/* [rows + 1]; the last one is 1, or all are 0 if the map is black */
+	uint32_t *cell_cdf;	/* running sums, [rows][columns + 1] */
 };
 
 /* Reads to_world. -EINVAL if it is flat, or nearly so. */
 int envmap_read_axes(const struct scene_node *n, struct envmap_axes *a, struct error *e);
-/* Makes em an environment map of the image, times scale. rows_reach_poles: the first and last rows are the poles. The
+/* Makes em an environment map of the image, times scale. has_rows_at_poles: the first and last rows are the poles. The
  * pixels must outlive em. -ENOMEM. */
 int envmap_init(struct emitter *em, const struct raster *picture, bool rows_reach_poles, double scale,
 		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,

@@ -63,7 +63,7 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 			const struct emitter_build *build, struct error *e)
 {
 	const struct property *property = node_find_property(n, "texture");
-	s->has_texture = property && (build->dialect_3 ||
+	s->has_texture = property && (build->is_dialect_3 ||
 				      property->value.type == VALUE_NODE); /* 0.6 ignores a colour or a number */
 	if (!s->has_texture)
 		return 0;

@@ -158,10 +158,11 @@ static int read_sun_direction(const struct scene_node *n, const vec3 axis[3], bo
 
 int sunsky_read_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e)
 {
-	const struct texture_build texture_build = {build->assets, build->arena, build->dialect_3, NULL, NULL, false};
+	const struct texture_build texture_build = {build->assets, build->arena, build->is_dialect_3,
+						    NULL,	   NULL,	 false};
 	struct texture t;
-	int code =
-		texture_from_node(&t, n, "albedo", build->dialect_3 ? 0.3 : 0.2, COLOR_REFLECTANCE, &texture_build, e);
+	int code = texture_from_node(&t, n, "albedo", build->is_dialect_3 ? 0.3 : 0.2, COLOR_REFLECTANCE,
+				     &texture_build, e);
 	if (code)
 		return code;
 	if (!texture_is_constant(&t))
@@ -212,7 +213,7 @@ int sunsky_read_axes(const struct scene_node *n, const struct emitter_build *bui
 	int code = envmap_read_axes(n, axes, e);
 	if (!code && axes->is_stretched)
 		code = node_error(n, e, ENOTSUP, "to_world of a sky can only rotate");
-	if (code || !build->dialect_3)
+	if (code || !build->is_dialect_3)
 		return code;
 	vec3 y = axes->axis[1];
 	axes->axis[1] = axes->axis[2];
@@ -231,7 +232,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	int code = sunsky_read_axes(n, build, &axes, e);
 	if (code)
 		return code;
-	if ((code = read_sun_direction(n, axis, build->dialect_3, &sun_direction, e)))
+	if ((code = read_sun_direction(n, axis, build->is_dialect_3, &sun_direction, e)))
 		return code;
 	b.sun_direction = (vec3){vec3_dot(axis[0], sun_direction), vec3_dot(axis[1], sun_direction),
 				 vec3_dot(axis[2], sun_direction)};
@@ -250,10 +251,10 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return node_error(n, e, ENOMEM, "out of memory");
 	double rgb[3];
 	if (has_sky)
-		bake_sky(&b, read_scale(n, "sky_scale", build->dialect_3), stretch, node_bool(n, "extend", false));
+		bake_sky(&b, read_scale(n, "sky_scale", build->is_dialect_3), stretch, node_bool(n, "extend", false));
 	daylight_sun_radiance(turbidity, sun_angle, rgb);
 	for (int k = 0; k < 3; k++)
-		rgb[k] *= read_scale(n, "sun_scale", build->dialect_3);
+		rgb[k] *= read_scale(n, "sun_scale", build->is_dialect_3);
 	if (has_sun)
 		bake_sun(&b, rgb);
 	return envmap_init(em, &(struct raster){.image = indexed_image_wrap(&b.image)}, false, 1, &axes, n, build, e);

@@ -163,16 +163,17 @@ void surface_light_set_sphere_point(const struct surface_light *l, vec3 w, struc
 	sphere_uv(&l->surface.sphere_axes, w, &x->texture_point.u, &x->texture_point.v);
 }
 
-void surface_light_set_triangle_point(const struct surface_light *l, uint32_t i, double b1, double b2,
+void surface_light_set_triangle_point(const struct surface_light *l, uint32_t triangle, double b1, double b2,
 				      struct emitter_point *x)
 {
 	const struct emitter_surface *s = &l->surface;
-	const struct triangle_edges t = triangle_edges_of(l, i);
+	const struct triangle_edges t = triangle_edges_of(l, triangle);
 	x->p = vec3_madd(vec3_madd(t.v0, b1, t.e1), b2, t.e2);
 	x->n = vec3_normalize(vec3_cross(t.e1, t.e2));
-	x->texture_point = (struct texture_point){b1, b2, b1, b2, i, .p = x->p};
+	x->texture_point = (struct texture_point){b1, b2, b1, b2, triangle, .p = x->p};
 	if (s->uv) {
-		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
+		const float *t0 = s->uv[s->index[triangle][0]], *t1 = s->uv[s->index[triangle][1]],
+			    *t2 = s->uv[s->index[triangle][2]];
 		double b0 = 1 - b1 - b2;
 		x->texture_point.u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
 		x->texture_point.v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
@@ -181,7 +182,7 @@ void surface_light_set_triangle_point(const struct surface_light *l, uint32_t i,
 
 static uint32_t find_triangle(const struct surface_light *l, double u, double *rest)
 {
-	uint32_t i = search_cell(l->cdf, l->surface.triangle_count, u);
+	uint32_t i = search_find_cell(l->cdf, l->surface.triangle_count, u);
 	double width = l->cdf[i + 1] - l->cdf[i];
 	*rest = width > 0 ? fmin(fmax((u - l->cdf[i]) / width, 0), 1 - 0x1p-53) : 0.5;
 	return i;

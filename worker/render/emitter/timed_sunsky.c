@@ -230,7 +230,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		.sun_scale = node_float(n, "sun_scale", 1),
 		.image = {.width = SKY_WIDTH * SKY_SCALE, .height = SKY_HEIGHT * SKY_SCALE, .channels = 3}};
 	t.sun_radius = node_float(n, "sun_aperture", 2 * DAYLIGHT_SUN_RADIUS * 180 / M_PI) * M_PI / 360;
-	int code = build->dialect_3 ? 0 : node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"timed_sunsky\"");
+	int code = build->is_dialect_3 ? 0 : node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"timed_sunsky\"");
 	if (!code)
 		code = sunsky_read_axes(n, build, &t.axes, e);
 	if (!code)

@@ -27,11 +27,11 @@ struct accel {
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
 	const struct coincidence *coincidence;
-	struct wide_prims *wide;    /* one entry per shape */
-	struct curve_prims *curves; /* one entry per shape */
+	struct wide_prims *wide_prims; /* one entry per shape */
+	struct curve_prims *curves;    /* one entry per shape */
 	struct instances instances;
 	atomic_size_t bytes, peak_bytes;
-	vec3 low, high;
+	vec3 box_min, box_max;
 	double side_sum;    /* of the bounding box */
 	double float_error; /* error bound of Embree's floats, see float_error_in_box */
 	/* The same bound before the size of the scene is known: ray_error + ray_error_slope |p| at p. */
@@ -51,7 +51,7 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 
 /* Whether both ends are so high over the triangle's plane that not even Embree's float normal of a tiny distant
  * triangle can be wrong about their sides. For most hits this avoids loading the vertices. */
-static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
+static bool clearly_crosses(const struct ray_query *q, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
 	double t = (double)ray->tfar - q->origin_lead, nearer = q->is_segment ? fmin(t, 1 - t) : t;
@@ -59,7 +59,7 @@ static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, con
 }
 
 /* Whether a triangle is intersected in double by a user geometry instead (user_geometry.c). */
-static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t prim)
+static bool is_wide(const struct ray_query *q, const struct accel_shape *s, uint32_t prim)
 {
 	return isfinite(q->min_wide_extent) &&
 	       (double)triangle_extent(s->position, s->index[prim]) >= q->min_wide_extent;
@@ -67,7 +67,7 @@ static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t
 
 static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 {
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	/* Single rays only (N = 1): accessors of packets exist only in C++. */
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
 	if (query_is_end(q, (struct prim_ref){hit->geomID, hit->primID, q->start_prim.time}))
@@ -137,7 +137,7 @@ static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t 
  * follows those of the shapes. */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double min_extent)
 {
-	struct wide_prims *w = &a->wide[id];
+	struct wide_prims *w = &a->wide_prims[id];
 	*w = (struct wide_prims){&a->shapes[id], id, 0, NULL};
 	if (a->shapes[id].is_sphere || a->shapes[id].placement || a->shapes[id].curves)
 		return 0;
@@ -311,9 +311,9 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	rc = embree_failure(a->device, e);
 	if (rc || count == 0)
 		return rc;
-	embree_bounds(a->scene, &a->low, &a->high);
-	a->side_sum = a->high.x - a->low.x + a->high.y - a->low.y + a->high.z - a->low.z;
-	a->float_error = float_error_in_box(a->low, a->high);
+	embree_bounds(a->scene, &a->box_min, &a->box_max);
+	a->side_sum = a->box_max.x - a->box_min.x + a->box_max.y - a->box_min.y + a->box_max.z - a->box_min.z;
+	a->float_error = float_error_in_box(a->box_min, a->box_max);
 	return 0;
 }
 
@@ -326,12 +326,12 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "out of memory");
 	a->spheres = mem_alloc(count, sizeof *a->spheres);
 	a->shapes = mem_alloc(count, sizeof *a->shapes);
-	a->wide = mem_alloc(count, sizeof *a->wide);
+	a->wide_prims = mem_alloc(count, sizeof *a->wide_prims);
 	a->curves = mem_alloc(count, sizeof *a->curves);
 	a->count = count;
 	a->coincidence = c;
 	unsigned flags = fptrap_enter_library();
-	bool is_allocated = a->spheres && a->shapes && a->wide && a->curves;
+	bool is_allocated = a->spheres && a->shapes && a->wide_prims && a->curves;
 	int rc = is_allocated ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_leave_library(flags);
 	if (rc)
@@ -352,9 +352,9 @@ void accel_free(struct accel *a)
 	if (a->device)
 		rtcReleaseDevice(a->device);
 	fptrap_leave_library(flags);
-	for (uint32_t i = 0; a->wide && i < a->count; i++)
-		mem_free(a->wide[i].prims);
-	mem_free(a->wide);
+	for (uint32_t i = 0; a->wide_prims && i < a->count; i++)
+		mem_free(a->wide_prims[i].prims);
+	mem_free(a->wide_prims);
 	mem_free(a->curves);
 	mem_free(a->spheres);
 	mem_free(a->shapes);
@@ -376,10 +376,11 @@ size_t accel_peak_bytes(const struct accel *a)
 static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 {
 	double size = a->side_sum;
-	if (o.x >= a->low.x - size && o.y >= a->low.y - size && o.z >= a->low.z - size && o.x <= a->high.x + size &&
-	    o.y <= a->high.y + size && o.z <= a->high.z + size)
+	if (o.x >= a->box_min.x - size && o.y >= a->box_min.y - size && o.z >= a->box_min.z - size &&
+	    o.x <= a->box_max.x + size && o.y <= a->box_max.y + size && o.z <= a->box_max.z + size)
 		return 0;
-	const double lo[3] = {a->low.x, a->low.y, a->low.z}, hi[3] = {a->high.x, a->high.y, a->high.z};
+	const double lo[3] = {a->box_min.x, a->box_min.y, a->box_min.z},
+		     hi[3] = {a->box_max.x, a->box_max.y, a->box_max.z};
 	const double p[3] = {o.x, o.y, o.z}, w[3] = {d.x, d.y, d.z};
 	double enter = 0;
 	for (int i = 0; i < 3; i++) {
@@ -430,19 +431,19 @@ static void check_ray(const struct RTCRay *r)
 		fptrap_fault();
 }
 
-static struct query make_query(const struct accel *a, vec3 o, vec3 d)
+static struct ray_query make_query(const struct accel *a, vec3 o, vec3 d)
 {
-	return (struct query){.o = o,
-			      .d = d,
-			      .start_prim = PRIM_NONE,
-			      .end_prim = PRIM_NONE,
-			      .start_grazing = 1,
-			      .end_grazing = 1,
-			      .min_wide_extent =
-				      a->smallest_extent == 0 ? INFINITY : MIXED_SCALES_RATIO * a->smallest_extent,
-			      .coincidence = a->coincidence,
-			      .shapes = a->shapes,
-			      .nearest_tfar = -1};
+	return (struct ray_query){.o = o,
+				  .d = d,
+				  .start_prim = PRIM_NONE,
+				  .end_prim = PRIM_NONE,
+				  .start_grazing = 1,
+				  .end_grazing = 1,
+				  .min_wide_extent =
+					  a->smallest_extent == 0 ? INFINITY : MIXED_SCALES_RATIO * a->smallest_extent,
+				  .coincidence = a->coincidence,
+				  .shapes = a->shapes,
+				  .nearest_tfar = -1};
 }
 
 /* Whether the end is on a surface at a point where another surface hides it. */
@@ -458,14 +459,14 @@ static bool end_is_hidden(const struct accel *a, const struct ray_end *end)
  * the error bound of floats: beside, so that a grazing ray does not slip past the edge of the triangle that it leaves,
  * which is filtered out; earlier and later, so that nothing near the ends is lost. The callbacks reject, in double,
  * everything that the true ray does not hit between its ends. */
-static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d,
+static void fill_ray(const struct accel *a, struct RTCRay *ray, struct ray_query *q, double t_min, vec3 o, vec3 d,
 		     double t0, double t1)
 {
 	q->float_error = float_error_at(a, vec3_madd(q->o, t0, q->d));
 	/* A shorter segment cannot be represented as a float ray. */
 	double unit = q->is_segment ? fmax(vec3_length(q->d), q->float_error * 0x1p-20) : 1;
-	q->lead = q->float_error * q->start_grazing / unit;
-	q->origin_lead = q->lead - t0;
+	q->part_lead = q->float_error * q->start_grazing / unit;
+	q->origin_lead = q->part_lead - t0;
 	q->t_min = t0 > 0 ? fmax(t_min, -q->origin_lead) : t_min;
 	o = vec3_madd(o, -q->origin_lead, d);
 	*ray = (struct RTCRay){
@@ -476,12 +477,12 @@ static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q,
 		.dir_x = (float)d.x,
 		.dir_y = (float)d.y,
 		.dir_z = (float)d.z,
-		.tfar = (float)fmin(t1 + q->lead + q->float_error * q->end_grazing / unit - t0, (double)FLT_MAX),
+		.tfar = (float)fmin(t1 + q->part_lead + q->float_error * q->end_grazing / unit - t0, (double)FLT_MAX),
 		.mask = 0xFFFFFFFFu};
 	check_ray(ray);
 }
 
-static bool trace_closest(const struct accel *a, struct query *q, struct RTCRayHit *rh, vec3 o, double t_min,
+static bool trace_closest(const struct accel *a, struct ray_query *q, struct RTCRayHit *rh, vec3 o, double t_min,
 			  double t_max)
 {
 	double t0 = 0, t1 = 0;
@@ -504,7 +505,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= t_max || end_is_hidden(a, from))
 		return false;
-	struct query q = make_query(a, vec3_madd(from->p, enter, d), d);
+	struct ray_query q = make_query(a, vec3_madd(from->p, enter, d), d);
 	q.start_prim = from->prim;
 	q.start_surface = enter > 0 ? NULL : from;
 	q.start_grazing = enter > 0 ? 1 : query_grazing_factor(from->ng, d);
@@ -518,7 +519,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	return true;
 }
 
-static bool trace_occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, double t_max)
+static bool trace_occluded(const struct accel *a, struct ray_query *q, vec3 o, vec3 d, double t_max)
 {
 	bool hit = false;
 	double t0 = 0, t1 = 0;
@@ -550,7 +551,7 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 		return true;
 	if (enter >= 1)
 		return false;
-	struct query q = make_query(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
+	struct ray_query q = make_query(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
 	q.start_prim = from->prim;
 	q.end_prim = to->prim;
 	q.start_surface = enter > 0 ? NULL : from;
@@ -569,7 +570,7 @@ bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *fro
 {
 	if (end_is_hidden(a, from))
 		return true;
-	struct query q = make_query(a, from->p, d);
+	struct ray_query q = make_query(a, from->p, d);
 	q.start_prim = from->prim;
 	q.start_surface = from;
 	q.start_grazing = query_grazing_factor(from->ng, d);

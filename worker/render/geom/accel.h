@@ -12,8 +12,8 @@
  *
  * In a scene whose smallest shape is less than 2^-11 of the scene's extent, that deviation would be too large. There a
  * ray deviates by the rounding errors at its position: floats are more precise near the origin
- * (worker/render/world/origin.h places small things there), a ray from far away is divided into parts that each start
- * closer to the origin, and triangles that are large relative to the smallest shape are intersected in double.
+ * (worker/render/world/world_origin.h places small things there), a ray from far away is divided into parts that each
+ * start closer to the origin, and triangles that are large relative to the smallest shape are intersected in double.
  *
  * Embree runs in robust mode with one build thread. It raises FE_INVALID on ordinary rays; the flag is cleared. An
  * accel is immutable after creation: any thread. Lengths are those of the rescaled world, whose radius is about 1.

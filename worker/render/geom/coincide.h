@@ -28,13 +28,13 @@ struct coincide_pair {
 	struct prim_ref hidden, covering;
 	enum surface_rank rank; /* rank of `covering` */
 	bool covers_all;
-	bool same_side; /* their normals point to the same side */
+	bool faces_same_side; /* their normals point to the same side */
 };
 
 /* Two shapes with coinciding primitives. */
 struct coincide_shape_pair {
 	uint32_t hidden, covering;
-	bool same_side; /* some of these primitives have normals that point to the same side */
+	bool faces_same_side; /* some of these primitives have normals that point to the same side */
 };
 
 struct coincidence {

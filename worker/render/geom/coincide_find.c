@@ -39,14 +39,14 @@ struct search {
 	size_t pair_count, pair_capacity, pair_limit;
 	uint64_t work, work_limit; /* number of primitives put into parts, plus pairs compared */
 	bool is_incomplete;
-	double low[3], high[3];	       /* the box that is currently searched */
+	double box_min[3], box_max[3]; /* the box that is currently searched */
 	struct spine *spines;	       /* of the small meshes, by shape; NULL: there are none */
 	struct flat_parts *flat_parts; /* of each mesh, at its first shape; NULL: there are no instances */
 };
 
 struct boxed_item {
 	struct prim_ref prim;
-	double low[3], high[3];
+	double box_min[3], box_max[3];
 	struct spine_part part;	       /* for a small mesh */
 	struct coincide_facing facing; /* only set in compare_part */
 };
@@ -81,8 +81,8 @@ static void small_mesh_extent(const struct search *f, uint32_t shape, struct spi
 			      double *low, double *high)
 {
 	spine_extent(&f->spines[shape], part, axis, low, high);
-	*low = fmax(*low, f->low[axis]);
-	*high = fmin(*high, f->high[axis]);
+	*low = fmax(*low, f->box_min[axis]);
+	*high = fmin(*high, f->box_max[axis]);
 }
 
 /* The extent of an item's box along an axis, slightly enlarged so that boxes with rounded coordinates meet. */
@@ -91,7 +91,7 @@ static void item_extent(const struct search *f, struct prim_ref p, unsigned axis
 	const struct accel_shape *s = &f->shapes[p.shape];
 	if (is_small_mesh(f, p)) {
 		struct spine_part part;
-		spine_clip(&f->spines[p.shape], f->low, f->high, &part);
+		spine_clip(&f->spines[p.shape], f->box_min, f->box_max, &part);
 		small_mesh_extent(f, p.shape, part, axis, low, high);
 		return;
 	}
@@ -117,12 +117,12 @@ static struct boxed_item make_boxed_item(const struct search *f, struct prim_ref
 {
 	struct boxed_item m = {.prim = p};
 	if (is_small_mesh(f, p))
-		spine_clip(&f->spines[p.shape], f->low, f->high, &m.part);
+		spine_clip(&f->spines[p.shape], f->box_min, f->box_max, &m.part);
 	for (unsigned k = 0; k < 3; k++)
 		if (is_small_mesh(f, p))
-			small_mesh_extent(f, p.shape, m.part, k, &m.low[k], &m.high[k]);
+			small_mesh_extent(f, p.shape, m.part, k, &m.box_min[k], &m.box_max[k]);
 		else
-			item_extent(f, p, k, &m.low[k], &m.high[k]);
+			item_extent(f, p, k, &m.box_min[k], &m.box_max[k]);
 	return m;
 }
 
@@ -139,12 +139,12 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 	for (unsigned k = 0; k < 3; k++) {
 		size_t below = 0, above = 0;
 		for (size_t i = 0; i < count; i++)
-			middle[i] = m[i].low[k] + (m[i].high[k] - m[i].low[k]) / 2;
+			middle[i] = m[i].box_min[k] + (m[i].box_max[k] - m[i].box_min[k]) / 2;
 		qsort(middle, count, sizeof *middle, compare_doubles);
 		double cut = middle[count / 2];
 		for (size_t i = 0; i < count; i++) {
-			below += m[i].low[k] <= cut;
-			above += m[i].high[k] >= cut;
+			below += m[i].box_min[k] <= cut;
+			above += m[i].box_max[k] >= cut;
 		}
 		/* A half equal to the whole would be cut in the same way forever. */
 		if (below + above < fewest && below < count && above < count) {
@@ -177,13 +177,13 @@ static bool nothing_to_find(const struct search *f, const struct prim_ref *items
 static bool test_pair(const struct search *f, struct coincide_pair *p)
 {
 	const struct accel_shape *a = &f->shapes[p->hidden.shape], *b = &f->shapes[p->covering.shape];
-	p->covers_all = p->same_side = true;
+	p->covers_all = p->faces_same_side = true;
 	if (a->is_sphere || b->is_sphere)
 		return a->is_sphere && b->is_sphere && coincide_spheres(a, b);
 	const struct triangle t = accel_triangle(a, p->hidden.prim, 0), u = accel_triangle(b, p->covering.prim, 0);
 	double vertex_error =
 		(a->placement ? a->placement->vertex_error : 0) + (b->placement ? b->placement->vertex_error : 0);
-	p->same_side = vec3_dot(t.n, u.n) > 0;
+	p->faces_same_side = vec3_dot(t.n, u.n) > 0;
 	return coincide_triangles(&t, &u, vertex_error, &p->covers_all);
 }
 
@@ -211,7 +211,7 @@ static bool items_may_meet(const struct search *f, const struct boxed_item *a, c
 	if (a->prim.shape == b->prim.shape && !is_emitter(f, a->prim))
 		return false;
 	for (int k = 0; k < 3; k++)
-		if (a->high[k] < b->low[k] || b->high[k] < a->low[k])
+		if (a->box_max[k] < b->box_min[k] || b->box_max[k] < a->box_min[k])
 			return false;
 	return true;
 }
@@ -302,9 +302,9 @@ static size_t drop_distant_items(const struct search *f, struct prim_ref *items,
 
 static int search_items(struct search *f, struct prim_ref *items, size_t n, unsigned cuts);
 
-/* A cut; `exists` is false if there is none. */
+/* A cut; `is_valid` is false if there is none. */
 struct cut {
-	bool exists;
+	bool is_valid;
 	unsigned axis;
 	double position;
 };
@@ -316,9 +316,9 @@ static bool is_divided(const struct search *f, struct prim_ref p, const struct c
 	if (p.prim != WHOLE_SHAPE)
 		return false;
 	if (is_small_mesh(f, p))
-		return !c->exists;
+		return !c->is_valid;
 	item_extent(f, p, c->axis, &low, &high);
-	return !c->exists || (low <= c->position && high >= c->position);
+	return !c->is_valid || (low <= c->position && high >= c->position);
 }
 
 static const struct flat_parts *instance_flat_parts(const struct search *f, uint32_t instance)
@@ -344,15 +344,16 @@ static size_t count_divided(const struct search *f, const struct prim_ref *items
 static struct boxed_item box_of_others(const struct search *f, const struct prim_ref *items, size_t n, size_t excluded)
 {
 	double bound = n > MANY_ITEMS ? INFINITY : -INFINITY;
-	struct boxed_item box = {.prim = PRIM_NONE, .low = {-bound, -bound, -bound}, .high = {bound, bound, bound}};
+	struct boxed_item box = {
+		.prim = PRIM_NONE, .box_min = {-bound, -bound, -bound}, .box_max = {bound, bound, bound}};
 	if (n > MANY_ITEMS)
 		return box;
 	for (size_t i = 0; i < n; i++)
 		for (unsigned k = 0; k < 3 && i != excluded; k++) {
 			double low, high;
 			item_extent(f, items[i], k, &low, &high);
-			box.low[k] = fmin(box.low[k], low);
-			box.high[k] = fmax(box.high[k], high);
+			box.box_min[k] = fmin(box.box_min[k], low);
+			box.box_max[k] = fmax(box.box_max[k], high);
 		}
 	return box;
 }
@@ -433,7 +434,7 @@ static bool is_in_box(const struct search *f, struct prim_ref p)
 {
 	const struct boxed_item m = make_boxed_item(f, p);
 	for (int k = 0; k < 3; k++)
-		if (m.high[k] < f->low[k] || m.low[k] > f->high[k])
+		if (m.box_max[k] < f->box_min[k] || m.box_min[k] > f->box_max[k])
 			return false;
 	return true;
 }
@@ -485,7 +486,7 @@ static bool is_in_half(const struct search *f, struct prim_ref p, bool upper, co
 	double low, high;
 	struct spine_part unused;
 	if (is_small_mesh(f, p))
-		return spine_clip(&f->spines[p.shape], f->low, f->high, &unused);
+		return spine_clip(&f->spines[p.shape], f->box_min, f->box_max, &unused);
 	item_extent(f, p, c->axis, &low, &high);
 	return upper ? high >= c->position : low <= c->position;
 }
@@ -495,7 +496,7 @@ static int search_halves(struct search *f, const struct prim_ref *items, size_t 
 	struct prim_ref *half = mem_alloc(n, sizeof *half);
 	int rc = half ? 0 : -ENOMEM;
 	for (int upper = 0; upper < 2 && !rc; upper++) {
-		double *side = upper ? &f->low[c->axis] : &f->high[c->axis], bound = *side;
+		double *side = upper ? &f->box_min[c->axis] : &f->box_max[c->axis], bound = *side;
 		size_t count = 0;
 		*side = c->position;
 		for (size_t i = 0; i < n; i++) {
@@ -514,17 +515,17 @@ static int search_halves(struct search *f, const struct prim_ref *items, size_t 
 /* Searches the items, which are sorted by rank and are overwritten. cuts: how many more cuts are allowed. */
 static int search_items(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
 {
-	struct cut c = {.exists = false};
+	struct cut c = {.is_valid = false};
 	f->work += n;
 	f->is_incomplete |= f->work > f->work_limit;
 	if (f->is_incomplete || nothing_to_find(f, items, n))
 		return 0;
 	if (n > MANY_ITEMS && f->shapes[most_common_shape(items, n)].rank != SURFACE_EMITS)
 		n = drop_distant_items(f, items, n);
-	c.exists = n > COMPARED_MAX && cuts > 0 && choose_cut(f, items, n, &c.axis, &c.position);
+	c.is_valid = n > COMPARED_MAX && cuts > 0 && choose_cut(f, items, n, &c.axis, &c.position);
 	size_t capacity = count_divided(f, items, n, &c);
 	if (capacity == 0)
-		return c.exists ? search_halves(f, items, n, cuts, &c) : compare_part(f, items, n);
+		return c.is_valid ? search_halves(f, items, n, cuts, &c) : compare_part(f, items, n);
 	f->is_incomplete |= f->work + capacity > f->work_limit;
 	if (f->is_incomplete)
 		return 0;
@@ -532,7 +533,7 @@ static int search_items(struct search *f, struct prim_ref *items, size_t n, unsi
 	if (!divided)
 		return -ENOMEM;
 	size_t count = divide_items(f, items, n, &c, divided);
-	int rc = c.exists ? search_halves(f, divided, count, cuts, &c) : search_items(f, divided, count, cuts);
+	int rc = c.is_valid ? search_halves(f, divided, count, cuts, &c) : search_items(f, divided, count, cuts);
 	mem_free(divided);
 	return rc;
 }
@@ -544,7 +545,7 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
 		for (uint32_t i = 0; i < count; i++) {
 			bool is_single = shapes[i].is_sphere || shapes[i].placement || is_small_shape(&shapes[i]);
-			uint32_t prims = is_single ? !accel_shape_moves(&shapes[i]) : shapes[i].triangle_count;
+			uint32_t prims = is_single ? !accel_shape_is_moving(&shapes[i]) : shapes[i].triangle_count;
 			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
 				if (items)
 					items[n] = (struct prim_ref){
@@ -611,8 +612,9 @@ static int search_all(struct search *f, uint32_t count, size_t n)
 int coincide_find(struct coincidence **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
 {
 	*out = NULL;
-	struct search f = {
-		.shapes = shapes, .low = {-INFINITY, -INFINITY, -INFINITY}, .high = {INFINITY, INFINITY, INFINITY}};
+	struct search f = {.shapes = shapes,
+			   .box_min = {-INFINITY, -INFINITY, -INFINITY},
+			   .box_max = {INFINITY, INFINITY, INFINITY}};
 	int rc = search_all(&f, count, list_primitives(shapes, count, NULL));
 	for (uint32_t i = 0; f.flat_parts && i < count; i++)
 		mem_free(f.flat_parts[i].prims);

@@ -43,14 +43,14 @@ static void list_shapes(struct coincidence *c)
 	struct coincide_shape_pair *s = c->shape_pairs;
 	for (size_t i = 0; i < c->pair_count; i++)
 		s[i] = (struct coincide_shape_pair){c->pairs[i].hidden.shape, c->pairs[i].covering.shape,
-						    c->pairs[i].same_side};
+						    c->pairs[i].faces_same_side};
 	if (c->pair_count > 1)
 		qsort(s, c->pair_count, sizeof *s, compare_shapes);
 	for (size_t i = 0; i < c->pair_count; i++) {
 		if (c->shape_pair_count == 0 || compare_shapes(&s[c->shape_pair_count - 1], &s[i]) != 0)
 			s[c->shape_pair_count++] = s[i];
 		else
-			s[c->shape_pair_count - 1].same_side |= s[i].same_side;
+			s[c->shape_pair_count - 1].faces_same_side |= s[i].faces_same_side;
 	}
 }
 

@@ -31,14 +31,15 @@ static vec3 main_direction(const struct accel_shape *s, vec3 center, vec3 start)
 static void add_to_box(struct spine *s, vec3 v)
 {
 	for (unsigned k = 0; k < 3; k++) {
-		s->low[k] = fmin(s->low[k], vec3_component(v, k));
-		s->high[k] = fmax(s->high[k], vec3_component(v, k));
+		s->box_min[k] = fmin(s->box_min[k], vec3_component(v, k));
+		s->box_max[k] = fmax(s->box_max[k], vec3_component(v, k));
 	}
 }
 
 static vec3 box_middle(const struct spine *s)
 {
-	return (vec3){s->low[0] / 2 + s->high[0] / 2, s->low[1] / 2 + s->high[1] / 2, s->low[2] / 2 + s->high[2] / 2};
+	return (vec3){s->box_min[0] / 2 + s->box_max[0] / 2, s->box_min[1] / 2 + s->box_max[1] / 2,
+		      s->box_min[2] / 2 + s->box_max[2] / 2};
 }
 
 /* Computes the segment along s->direction that covers all vertices, and its radius. */
@@ -60,7 +61,7 @@ static double max_coordinate(const struct spine *s)
 {
 	double max = 0;
 	for (int k = 0; k < 3; k++)
-		max = fmax(max, fmax(fabs(s->low[k]), fabs(s->high[k])));
+		max = fmax(max, fmax(fabs(s->box_min[k]), fabs(s->box_max[k])));
 	return max;
 }
 
@@ -76,12 +77,13 @@ static void measure_triangles(struct spine *s, const struct accel_shape *mesh)
 
 struct spine spine_make(const struct accel_shape *mesh)
 {
-	struct spine s = {.low = {INFINITY, INFINITY, INFINITY},
-			  .high = {-INFINITY, -INFINITY, -INFINITY},
+	struct spine s = {.box_min = {INFINITY, INFINITY, INFINITY},
+			  .box_max = {-INFINITY, -INFINITY, -INFINITY},
 			  .min_altitude = INFINITY};
 	for (uint32_t i = 0; i < mesh->vertex_count; i++)
 		add_to_box(&s, triangle_vertex(mesh->position, i));
-	vec3 center = box_middle(&s), start = {s.high[0] - s.low[0], s.high[1] - s.low[1], s.high[2] - s.low[2]};
+	vec3 center = box_middle(&s),
+	     start = {s.box_max[0] - s.box_min[0], s.box_max[1] - s.box_min[1], s.box_max[2] - s.box_min[2]};
 	/* The start is not exactly along a diagonal of the box, since that could be perpendicular to
 	 * the direction looked for. */
 	start = vec3_add(start, (vec3){0.37 * start.y, -0.41 * start.z, 0.43 * start.x});
@@ -94,8 +96,8 @@ struct spine spine_make(const struct accel_shape *mesh)
 	double margin = max * 0x1p-20;
 	s.radius += margin;
 	for (int k = 0; k < 3; k++) {
-		s.low[k] -= margin;
-		s.high[k] += margin;
+		s.box_min[k] -= margin;
+		s.box_max[k] += margin;
 	}
 	return s;
 }
@@ -106,7 +108,7 @@ bool spine_clip(const struct spine *s, const double low[3], const double high[3]
 	for (unsigned k = 0; k < 3; k++) {
 		double origin = vec3_component(s->start, k), d = vec3_component(s->span, k), min = low[k] - s->radius,
 		       max = high[k] + s->radius;
-		if (s->high[k] < low[k] || s->low[k] > high[k])
+		if (s->box_max[k] < low[k] || s->box_min[k] > high[k])
 			return false;
 		/* Along this axis the segment does not leave the box, or by no more than the margin in its radius. */
 		if (fmin(origin, origin + d) >= min && fmax(origin, origin + d) <= max)
@@ -127,8 +129,8 @@ void spine_extent(const struct spine *s, struct spine_part part, unsigned axis, 
 {
 	double origin = vec3_component(s->start, axis), d = vec3_component(s->span, axis), t = origin + part.first * d,
 	       u = origin + part.last * d;
-	*low = fmax(fmin(t, u) - s->radius, s->low[axis]);
-	*high = fmin(fmax(t, u) + s->radius, s->high[axis]);
+	*low = fmax(fmin(t, u) - s->radius, s->box_min[axis]);
+	*high = fmin(fmax(t, u) + s->radius, s->box_max[axis]);
 }
 
 static double clamp_unit(double t)

@@ -16,7 +16,7 @@ struct spine {
 	vec3 start, span; /* the segment is start + t span, for t in [0,1] */
 	/* The whole mesh is within this distance of the segment, including a margin for rounded coordinates. */
 	double radius;
-	double low[3], high[3];
+	double box_min[3], box_max[3];
 	vec3 direction;	 /* unit direction of the segment; 0 if the mesh is a single point */
 	double max_lean; /* the largest |n.direction| of the triangles' unit normals n */
 	/* The distance by which the rounding of vertices can move a triangle. */

@@ -15,7 +15,7 @@
 /* A query within one instance. */
 struct instance_query {
 	embree_context context;
-	const struct query *q;
+	const struct ray_query *q;
 	uint32_t shape;
 	const struct placement *placement; /* placement at the query's time */
 	struct placement storage;	   /* room for the placement of an instance that moves */
@@ -38,7 +38,7 @@ static void filter_hit(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct instance_query *w = (const struct instance_query *)(const void *)args->context;
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
-	const struct query *q = w->q;
+	const struct ray_query *q = w->q;
 	const struct prim_ref prim = {w->shape, hit->primID, q->start_prim.time};
 	if (query_is_end(q, prim))
 		args->valid[0] = 0;
@@ -61,8 +61,8 @@ static int build_tree(struct instance_tree *t, RTCDevice device, const struct ac
 	rtcSetGeometryOccludedFilterFunction(g, filter_hit);
 	embree_attach(t->scene, g, 0);
 	embree_build(t->scene);
-	embree_bounds(t->scene, &t->low, &t->high);
-	t->float_error = 0x1p-21 * fmax(triangle_norm_max(t->low), triangle_norm_max(t->high));
+	embree_bounds(t->scene, &t->box_min, &t->box_max);
+	t->float_error = 0x1p-21 * fmax(triangle_norm_max(t->box_min), triangle_norm_max(t->box_max));
 	return 0;
 }
 
@@ -152,7 +152,7 @@ static vec3 lift_off_surface(vec3 p, vec3 n, vec3 d, double distance, double *ex
 
 /* Computes the part of the query up to t_max that is inside the instance's box. Returns false if there is none. */
 static bool enter_instance(struct instance_query *w, const struct instances *s, const struct instance *it,
-			   const struct query *q, double t_max)
+			   const struct ray_query *q, double t_max)
 {
 	const struct placement *m = placement_at(s->shapes[it->shape].placement, q->start_prim.time, &w->storage);
 	const struct instance_tree *tree = &s->trees[it->tree];
@@ -164,9 +164,9 @@ static bool enter_instance(struct instance_query *w, const struct instances *s, 
 	w->t0 = q->t_min;
 	w->t1 = t_max;
 	double r = 2 * w->float_error;
-	if (!clip_range(o.x, d.x, tree->low.x - r, tree->high.x + r, &w->t0, &w->t1) ||
-	    !clip_range(o.y, d.y, tree->low.y - r, tree->high.y + r, &w->t0, &w->t1) ||
-	    !clip_range(o.z, d.z, tree->low.z - r, tree->high.z + r, &w->t0, &w->t1))
+	if (!clip_range(o.x, d.x, tree->box_min.x - r, tree->box_max.x + r, &w->t0, &w->t1) ||
+	    !clip_range(o.y, d.y, tree->box_min.y - r, tree->box_max.y + r, &w->t0, &w->t1) ||
+	    !clip_range(o.z, d.z, tree->box_min.z - r, tree->box_max.z + r, &w->t0, &w->t1))
 		return false;
 	w->start = vec3_madd(o, w->t0, d);
 	w->lead = w->trail = w->float_error;
@@ -216,7 +216,7 @@ static void instance_intersect(const struct RTCIntersectFunctionNArguments *args
 		return;
 	const struct instances *s = args->geometryUserPtr;
 	const struct instance *it = &s->items[args->primID];
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit, inner;
 	struct instance_query w;
 	double t_max = (double)rh->ray.tfar - q->origin_lead;
@@ -245,7 +245,7 @@ static void instance_occluded(const struct RTCOccludedFunctionNArguments *args)
 		return;
 	const struct instances *s = args->geometryUserPtr;
 	const struct instance *it = &s->items[args->primID];
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	struct instance_query w;
 	struct RTCRay inner;
 	if (!enter_instance(&w, s, it, q, q->is_segment ? 1 : INFINITY))

@@ -15,9 +15,9 @@
 
 struct instance_tree {
 	RTCScene scene;
-	vec3 low, high;	    /* bounding box of the mesh, in its frame */
-	double float_error; /* error bound of Embree's floats in the mesh's frame */
-	bool is_mirrored;   /* its triangles are wound as in mirrored instances */
+	vec3 box_min, box_max; /* bounding box of the mesh, in its frame */
+	double float_error;    /* error bound of Embree's floats in the mesh's frame */
+	bool is_mirrored;      /* its triangles are wound as in mirrored instances */
 };
 
 struct instance {

@@ -60,20 +60,20 @@ bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
 
 /* Checks the keyframes only: between keyframes the columns are no longer than at one of them, so what holds at the
  * keyframes holds everywhere. */
-bool placement_make_moving(struct placement *p, const struct movement *m)
+bool placement_make_moving(struct placement *p, const struct swept_motion *m)
 {
 	double max_vertex_error = 0;
 	for (uint32_t i = 0; i < m->motion.count; i++) {
 		mat4 matrix = motion_transform_at(&m->motion, m->motion.key[i].time);
-		if (!placement_make(p, &matrix, m->low, m->high))
+		if (!placement_make(p, &matrix, m->box_min, m->box_max))
 			return false;
 		max_vertex_error = fmax(max_vertex_error, p->vertex_error);
 	}
 	mat4 at_open = motion_transform_at(&m->motion, 0);
-	if (!placement_make(p, &at_open, m->low, m->high))
+	if (!placement_make(p, &at_open, m->box_min, m->box_max))
 		return false;
 	vec3 low, high;
-	motion_bounds(&m->motion, m->low, m->high, &low, &high);
+	motion_bounds(&m->motion, m->box_min, m->box_max, &low, &high);
 	p->half = vec3_scale(0.5, vec3_sub(high, low));
 	p->center = vec3_add(low, p->half);
 	p->vertex_error = max_vertex_error;
@@ -83,11 +83,11 @@ bool placement_make_moving(struct placement *p, const struct movement *m)
 
 void placement_compute_at(const struct placement *p, double time, struct placement *out)
 {
-	const struct movement *m = p->movement;
+	const struct swept_motion *m = p->movement;
 	mat4 matrix = motion_transform_at(&m->motion, time), inverse;
 	/* The inverse exists: S is definite at the keyframes, and so between them. */
 	if (!mat4_invert(matrix, &inverse))
 		inverse = matrix;
-	fill_placement(out, &matrix, &inverse, m->low, m->high);
+	fill_placement(out, &matrix, &inverse, m->box_min, m->box_max);
 	out->first_shape = p->first_shape;
 }

@@ -12,9 +12,9 @@
 #include "worker/render/math/motion.h"
 
 /* The movement of an instance from the mesh's frame, in which its bounding box is given, to the world. */
-struct movement {
+struct swept_motion {
 	struct motion motion;
-	vec3 low, high;
+	vec3 box_min, box_max;
 };
 
 struct placement {
@@ -29,7 +29,7 @@ struct placement {
 	bool is_mirrored;     /* its triangles are wound in the opposite sense to those in the mesh's frame */
 	/* NULL: the instance does not move. Otherwise this is its placement when the shutter opens, except that center,
 	 * half and vertex_error hold for all times. */
-	const struct movement *movement;
+	const struct swept_motion *movement;
 };
 
 /* Makes a placement from an affine map m from the mesh's frame, in which low and high bound it, to the world. Returns
@@ -39,7 +39,7 @@ bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
 
 /* placement_make_moving is like placement_make(), but for an instance that moves; m must outlive the placement.
  * placement_compute_at returns the placement at a time. */
-bool placement_make_moving(struct placement *p, const struct movement *m);
+bool placement_make_moving(struct placement *p, const struct swept_motion *m);
 void placement_compute_at(const struct placement *p, double time, struct placement *out);
 
 /* Returns the placement at a time; `storage` is used if the instance moves. */

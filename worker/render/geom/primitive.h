@@ -54,7 +54,7 @@ static inline bool accel_is_instance(const struct accel_shape *s)
 	return s->placement && !s->is_sphere;
 }
 
-static inline bool accel_shape_moves(const struct accel_shape *s)
+static inline bool accel_shape_is_moving(const struct accel_shape *s)
 {
 	return s->placement && s->placement->movement;
 }

@@ -20,7 +20,7 @@ static void lift_tangent(const struct relief_site *s, const struct relief_deriva
 	out->dm = vec3_madd(vec3_madd(dt, rise, d->dn), drise, s->n);
 }
 
-static void bend_height(const struct relief_site *s, const struct relief_derivatives *d, const struct relief_value *h,
+static void bend_height(const struct relief_site *s, const struct relief_derivatives *d, const struct relief_sample *h,
 			struct bent_normal *out)
 {
 	struct bent_normal a = {.dm = {0, 0, 0}}, b = {.dm = {0, 0, 0}};
@@ -43,7 +43,7 @@ static bool is_mirrored(const struct relief_site *s)
 
 /* Bends the normal by a normal map. The frame turns with n, and around n with the axis: see
  * worker/render/halfvec/constraint.c. */
-static void bend_normal(const struct relief_site *s, const struct relief_derivatives *d, struct relief_value *l,
+static void bend_normal(const struct relief_site *s, const struct relief_derivatives *d, struct relief_sample *l,
 			bool mirrored, struct bent_normal *out)
 {
 	struct frame f = frame_along(s->n, s->axis);
@@ -67,7 +67,7 @@ static void bend_normal(const struct relief_site *s, const struct relief_derivat
 static bool apply_relief(const struct relief *r, const struct relief_site *s, const struct relief_derivatives *d,
 			 struct bent_normal *out)
 {
-	struct relief_value x;
+	struct relief_sample x;
 	if (!(vec3_dot(s->tu, s->tu) > 0) || !(vec3_dot(s->tv, s->tv) > 0))
 		return false;
 	r->eval(r->data, s->u, s->v, &x);

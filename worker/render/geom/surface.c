@@ -115,7 +115,7 @@ __attribute__((noinline)) static const struct geom_shape *pose_moving(const stru
 
 static inline const struct geom_shape *shape_at(const struct geom_shape *s, double time, struct posed_shape *storage)
 {
-	return surface_moves(s) ? pose_moving(s, time, storage) : s;
+	return surface_is_moving(s) ? pose_moving(s, time, storage) : s;
 }
 
 /* A triangle's first vertex and its edges from there. */

@@ -11,7 +11,7 @@
 #include "worker/render/geom/surface_curve.h"
 
 /* D (surface_curve.h) at a point of a cone, and its difference between the two ends. */
-struct bend {
+struct joint_bend {
 	vec3 d, change;
 };
 
@@ -23,9 +23,9 @@ static vec3 bend_at_end(const struct cone *k, const float tangent[3])
 	return axis_component > 0.25 ? vec3_madd(vec3_scale(1 / axis_component, t), -1, k->axis) : (vec3){0, 0, 0};
 }
 
-static struct bend compute_bend(const struct curves *c, uint32_t prim, const struct curve_point *p)
+static struct joint_bend compute_bend(const struct curves *c, uint32_t prim, const struct curve_point *p)
 {
-	struct bend b = {{0, 0, 0}, {0, 0, 0}};
+	struct joint_bend b = {{0, 0, 0}, {0, 0, 0}};
 	if (!c->tangent)
 		return b;
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
@@ -36,13 +36,13 @@ static struct bend compute_bend(const struct curves *c, uint32_t prim, const str
 }
 
 /* Returns w - (w.D) axis (surface_curve.h), not normalised. */
-static vec3 bend_vector(const struct curve_point *p, const struct bend *b, vec3 w)
+static vec3 bend_vector(const struct curve_point *p, const struct joint_bend *b, vec3 w)
 {
 	return vec3_madd(w, -vec3_dot(w, b->d), p->cone.axis);
 }
 
 /* Returns the outward shading normal before relief, not normalised; *flat: it is the geometric normal. */
-static vec3 outward_normal(const struct curve_point *p, const struct bend *b, bool *flat)
+static vec3 outward_normal(const struct curve_point *p, const struct joint_bend *b, bool *flat)
 {
 	vec3 m = bend_vector(p, b, p->n);
 	*flat = !(vec3_dot(m, p->n) > 0.25);
@@ -60,7 +60,7 @@ vec3 curve_smooth_normal(const struct geom_shape *s, const struct surface_point 
 {
 	bool flat;
 	struct curve_point p = compute_curve_point(s, x);
-	struct bend b = compute_bend(s->curves, x->prim.prim, &p);
+	struct joint_bend b = compute_bend(s->curves, x->prim.prim, &p);
 	return vec3_scale(s->normal_sign, vec3_normalize(outward_normal(&p, &b, &flat)));
 }
 
@@ -96,7 +96,7 @@ void curve_fill_point(const struct geom_shape *s, struct prim_ref prim, struct c
 	struct curve_point p;
 	bool flat;
 	curves_compute_point(s->curves, prim.prim, coordinates, &p);
-	struct bend b = compute_bend(s->curves, prim.prim, &p);
+	struct joint_bend b = compute_bend(s->curves, prim.prim, &p);
 	x->prim = prim;
 	x->shape = s;
 	x->p = p.p;
@@ -182,8 +182,8 @@ static struct point_derivatives derivatives_along(const struct curve_point *p, v
 }
 
 /* Returns the derivative of bend_vector() if w changes by dw. */
-static vec3 bend_vector_derivative(const struct curve_point *p, const struct bend *b, const struct point_derivatives *m,
-				   vec3 w, vec3 dw)
+static vec3 bend_vector_derivative(const struct curve_point *p, const struct joint_bend *b,
+				   const struct point_derivatives *m, vec3 w, vec3 dw)
 {
 	return vec3_madd(dw, -vec3_dot(dw, b->d) - m->s * vec3_dot(w, b->change), p->cone.axis);
 }
@@ -213,7 +213,7 @@ static struct relief_derivatives make_relief_derivatives(const struct geom_shape
 void curve_derivatives(const struct geom_shape *s, const struct surface_point *x, struct surface_derivatives *c)
 {
 	struct curve_point p = compute_curve_point(s, x);
-	struct bend b = compute_bend(s->curves, x->prim.prim, &p);
+	struct joint_bend b = compute_bend(s->curves, x->prim.prim, &p);
 	bool flat;
 	vec3 m = outward_normal(&p, &b, &flat), axis = bend_vector(&p, &b, p.side);
 	struct relief_site site = make_relief_site(s, x, &p, vec3_scale(s->normal_sign, vec3_normalize(m)));

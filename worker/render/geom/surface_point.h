@@ -33,7 +33,7 @@ struct geom_shape {
 	double unit; /* the scene's unit of length in world units, for relief */
 };
 
-static inline bool surface_moves(const struct geom_shape *s)
+static inline bool surface_is_moving(const struct geom_shape *s)
 {
 	return s->placement && s->placement->movement;
 }

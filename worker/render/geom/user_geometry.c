@@ -9,7 +9,7 @@
  */
 #include "worker/render/geom/user_geometry.h"
 
-bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
+bool query_crosses(const struct ray_query *q, const struct accel_shape *s, uint32_t prim)
 {
 	const struct triangle t = accel_triangle(s, prim, q->start_prim.time);
 	double start = triangle_height(&t, q->o);
@@ -29,7 +29,7 @@ double query_grazing_factor(vec3 n, vec3 d)
 	return fmax(height * GRAZING_FACTOR_MAX > length ? length / height : GRAZING_FACTOR_MAX, 1);
 }
 
-struct prim_ref query_present_prim(const struct query *q, struct prim_ref prim)
+struct prim_ref query_present_prim(const struct ray_query *q, struct prim_ref prim)
 {
 	if (!query_may_be_hidden(q, prim.shape))
 		return prim;
@@ -41,7 +41,7 @@ struct prim_ref query_present_prim(const struct query *q, struct prim_ref prim)
 				     vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
 }
 
-bool query_crosses_present(const struct query *q, struct prim_ref prim)
+bool query_crosses_present(const struct ray_query *q, struct prim_ref prim)
 {
 	struct prim_ref present = query_present_prim(q, prim);
 	return !query_is_end(q, present) && query_crosses(q, &q->shapes[present.shape], present.prim);
@@ -89,7 +89,7 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
  * root is 0, if a segment ends on it one root is 1: the other root follows from Vieta's formulas without
  * cancellation. Otherwise the discriminant is computed from the distance of the line to the centre (Haines et al.
  * 2019, Ray Tracing Gems ch. 7). */
-static bool sphere_root(const struct sphere_prim *sphere, const struct query *q, double t_max, double *t)
+static bool sphere_root(const struct sphere_prim *sphere, const struct ray_query *q, double t_max, double *t)
 {
 	struct sphere_prim moved;
 	const struct sphere_prim *s = sphere;
@@ -122,7 +122,7 @@ static void sphere_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	const struct sphere_prim *s = args->geometryUserPtr;
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
 	double t;
@@ -138,7 +138,7 @@ static void sphere_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
 	double t;
 	if (sphere_root(args->geometryUserPtr, q, q->is_segment ? 1 : INFINITY, &t))
@@ -165,7 +165,7 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 }
 
 /* The same tests as in the filter for triangles that Embree intersects; these triangles are never PRIM_NONE. */
-static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
+static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct ray_query *q, double t_max, double *t)
 {
 	const struct prim_ref ref = {w->shape_id, prim, q->start_prim.time};
 	if (query_is_end(q, ref) ||
@@ -179,7 +179,7 @@ static void wide_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	const struct wide_prims *w = args->geometryUserPtr;
 	uint32_t prim = w->prims[args->primID];
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
@@ -196,7 +196,7 @@ static void wide_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	const struct wide_prims *w = args->geometryUserPtr;
 	double t;
 	if (wide_root(w, w->prims[args->primID], q, q->is_segment ? 1 : INFINITY, &t))
@@ -215,7 +215,7 @@ static void curve_bounds(const struct RTCBoundsFunctionArguments *args)
 		   args->bounds_o);
 }
 
-static struct curve_ray make_curve_ray(const struct curve_prims *c, const struct query *q, double t_max)
+static struct curve_ray make_curve_ray(const struct curve_prims *c, const struct ray_query *q, double t_max)
 {
 	return (struct curve_ray){.o = q->o,
 				  .d = q->d,
@@ -235,7 +235,7 @@ static void curve_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	struct query *q = (struct query *)(void *)args->context;
+	struct ray_query *q = (struct ray_query *)(void *)args->context;
 	const struct curve_prims *c = args->geometryUserPtr;
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
 	bool exact = rh->hit.geomID != RTC_INVALID_GEOMETRY_ID && rh->ray.tfar == q->nearest_tfar;
@@ -255,7 +255,7 @@ static void curve_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
 	if (!args->valid[0])
 		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct ray_query *q = (const struct ray_query *)(const void *)args->context;
 	const struct curve_prims *c = args->geometryUserPtr;
 	struct curve_ray r = make_curve_ray(c, q, q->is_segment ? 1 : INFINITY);
 	struct curve_crossing x;

@@ -11,7 +11,7 @@
 #include "worker/render/geom/embree.h"
 
 /* The state that a query passes to Embree's callbacks. */
-struct query {
+struct ray_query {
 	embree_context context;
 	/* The ray in double, which decides whether Embree's proposals are hits; end: o + d for a segment. */
 	vec3 o, d, end;
@@ -21,7 +21,7 @@ struct query {
 	/* Times float_error: the length of the ray within reach of the surface at its start, and at its end
 	 * (query_grazing_factor). */
 	double start_grazing, end_grazing;
-	double lead;	    /* distance by which Embree's ray starts earlier than this part of the ray, in units of d */
+	double part_lead;   /* distance by which Embree's ray starts earlier than this part of the ray, in units of d */
 	double origin_lead; /* Embree's ray starts this far before o, in units of d; negative: after it */
 	/* Triangles of at least this extent are intersected in double; INFINITY: none. */
 	double min_wide_extent;
@@ -59,7 +59,7 @@ struct curve_prims {
 
 /* Whether the ray crosses the plane of a triangle after its start and, for a segment, before its end. A ray that starts
  * in the plane, on a coplanar neighbour, does not cross it again. */
-bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
+bool query_crosses(const struct ray_query *q, const struct accel_shape *s, uint32_t prim);
 
 /* Returns, for a ray along d from a surface with normal n that is lifted off the surface by some distance, the length
  * along d by which it returns to the surface, divided by that distance. A lifted ray that starts this much earlier
@@ -68,7 +68,7 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 double query_grazing_factor(vec3 n, vec3 d);
 
 /* Whether the ray starts or ends on the primitive p. */
-static inline bool query_is_end(const struct query *q, struct prim_ref p)
+static inline bool query_is_end(const struct ray_query *q, struct prim_ref p)
 {
 	return (p.shape == q->start_prim.shape && p.prim == q->start_prim.prim) ||
 	       (p.shape == q->end_prim.shape && p.prim == q->end_prim.prim);
@@ -76,15 +76,15 @@ static inline bool query_is_end(const struct query *q, struct prim_ref p)
 
 /* Returns the triangle that is present where the ray crosses the plane of `prim`: `prim` itself, or the one
  * that hides it (coincide.h). */
-struct prim_ref query_present_prim(const struct query *q, struct prim_ref prim);
+struct prim_ref query_present_prim(const struct ray_query *q, struct prim_ref prim);
 /* Whether some primitive of this shape is hidden by another one. */
-static inline bool query_may_be_hidden(const struct query *q, uint32_t shape)
+static inline bool query_may_be_hidden(const struct ray_query *q, uint32_t shape)
 {
 	return q->coincidence && q->coincidence->first_pair[shape] < q->coincidence->first_pair[shape + 1];
 }
 /* Like query_crosses(), but for the primitive that is present there; false if an end of the ray is on that
  * primitive. */
-bool query_crosses_present(const struct query *q, struct prim_ref prim);
+bool query_crosses_present(const struct ray_query *q, struct prim_ref prim);
 
 /* Callbacks; their user data, which must outlive the geometry, is a struct sphere_prim, wide_prims or curve_prims. */
 extern const struct embree_ops user_sphere_ops, user_triangle_ops, user_curve_ops;

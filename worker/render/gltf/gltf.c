@@ -412,10 +412,10 @@ static int read_file(struct gltf *g)
 		return g->error_code;
 	g->buffers = alloc_per_entry(g, GLTF_BUFFERS, sizeof *g->buffers);
 	g->images = alloc_per_entry(g, GLTF_IMAGES, sizeof *g->images);
-	g->materials_made = alloc_per_entry(g, GLTF_MATERIALS, sizeof *g->materials_made);
+	g->is_material_made = alloc_per_entry(g, GLTF_MATERIALS, sizeof *g->is_material_made);
 	g->mesh_use_counts = alloc_per_entry(g, GLTF_MESHES, sizeof *g->mesh_use_counts);
-	g->meshes_made = alloc_per_entry(g, GLTF_MESHES, sizeof *g->meshes_made);
-	if (!g->buffers || !g->images || !g->materials_made || !g->mesh_use_counts || !g->meshes_made)
+	g->is_mesh_made = alloc_per_entry(g, GLTF_MESHES, sizeof *g->is_mesh_made);
+	if (!g->buffers || !g->images || !g->is_material_made || !g->mesh_use_counts || !g->is_mesh_made)
 		return gltf_fail(g, NULL, ENOMEM, "out of memory");
 	count_mesh_uses(g);
 	g->scene = gltf_add_element(g, NULL, NULL, "scene");
@@ -444,8 +444,8 @@ int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char 
 			 .assets = assets,
 			 .arena = arena,
 			 .error = e,
-			 .low = {INFINITY, INFINITY, INFINITY},
-			 .high = {-INFINITY, -INFINITY, -INFINITY}};
+			 .box_min = {INFINITY, INFINITY, INFINITY},
+			 .box_max = {-INFINITY, -INFINITY, -INFINITY}};
 	struct asset file;
 	g.file = arena_strdup(arena, name);
 	if (!g.file)

@@ -133,11 +133,11 @@ int gltf_locate_image(struct gltf *g, const struct gltf_entry *image, struct glt
 	return 0;
 }
 
-struct gltf_range gltf_range_slice(const struct gltf_range *r, uint64_t begin, uint64_t end)
+struct gltf_range gltf_range_slice(const struct gltf_range *buffer, uint64_t begin, uint64_t end)
 {
-	struct gltf_range part = *r;
+	struct gltf_range part = *buffer;
 	part.size = end - begin;
-	if (!r->is_base64) {
+	if (!buffer->is_base64) {
 		part.first_byte += begin;
 		part.byte_count = end - begin;
 		return part;

@@ -112,14 +112,14 @@ void gltf_add_light(struct gltf *g, const struct gltf_entry *light, const mat4 *
 void gltf_add_default_camera(struct gltf *g)
 {
 	static const double fov = 40 / (180 / M_PI);
-	vec3 center = vec3_scale(0.5, vec3_add(g->low, g->high));
-	double radius = 0.5 * vec3_length(vec3_sub(g->high, g->low));
-	if (!(g->low.x <= g->high.x)) {
+	vec3 center = vec3_scale(0.5, vec3_add(g->box_min, g->box_max));
+	double radius = 0.5 * vec3_length(vec3_sub(g->box_max, g->box_min));
+	if (!(g->box_min.x <= g->box_max.x)) {
 		gltf_fail(g, NULL, EINVAL, "there is no mesh of triangles in its scene");
 		return;
 	}
 	if (!vec3_is_finite(center) || !(radius > 0))
-		return; /* The accessors do not tell its size: scene_settings_place_default_sensor() places a sensor. */
+		return; /* The accessors do not tell its size: scene_settings_place_sensor() places a sensor. */
 	vec3 direction = vec3_normalize((vec3){0.5, 0.4, 1});
 	mat4 look = mat4_look_at(vec3_madd(center, radius / sin(fov / 2), direction), center, (vec3){0, 1, 0});
 	mat4 half_turn = mat4_scale((vec3){-1, 1, -1}), m = mat4_mul(look, half_turn);

@@ -381,13 +381,13 @@ void gltf_add_material(struct gltf *g, struct xml_element *shape, const struct g
 		       enum gltf_vertex_colours colours)
 {
 	double rgb[3];
-	if (!(g->materials_made[material->index] >> colours & 1))
+	if (!(g->is_material_made[material->index] >> colours & 1))
 		put_principled(g, material, colours);
-	if (!g->materials_made[material->index]) {
+	if (!g->is_material_made[material->index]) {
 		put_emitter(g, material);
 		put_medium(g, material);
 	}
-	g->materials_made[material->index] |= (unsigned char)(1u << colours);
+	g->is_material_made[material->index] |= (unsigned char)(1u << colours);
 	put_ref(g, shape, material, "bsdf", colours);
 	if (gltf_material_emits(g, material, rgb))
 		put_ref(g, shape, material, "emitter", GLTF_NO_COLOURS);

@@ -291,15 +291,15 @@ static void put_instance(struct gltf *g, const struct gltf_entry *mesh, const st
 	static const char id[] = "group of meshes[%zu]";
 	const json_t *primitives = json_object_get(mesh->json, "primitives");
 	struct gltf_entry a;
-	if (!g->meshes_made[mesh->index]) {
+	if (!g->is_mesh_made[mesh->index]) {
 		const mat4 identity = mat4_identity();
 		struct xml_element *group = gltf_add_plugin(g, g->scene, mesh, "shape", "shapegroup", NULL);
-		const vec3 low = g->low, high = g->high;
+		const vec3 low = g->box_min, high = g->box_max;
 		gltf_add_attribute(g, group, "id", id, mesh->index);
 		put_primitives(g, group, mesh, node, &identity);
-		g->low = low;
-		g->high = high;
-		g->meshes_made[mesh->index] = true;
+		g->box_min = low;
+		g->box_max = high;
+		g->is_mesh_made[mesh->index] = true;
 	}
 	for (size_t i = 0; i < json_array_size(primitives); i++)
 		if (gltf_resolve(g, mesh, json_object_get(json_array_get(primitives, i), "attributes"), "POSITION",

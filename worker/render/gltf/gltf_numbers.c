@@ -212,7 +212,7 @@ static unsigned type_component_count(const char *type)
 /* How an array of vectors is stored in a view. */
 struct vector_layout {
 	uint64_t component_type, stride, offset;
-	bool normalized;
+	bool is_normalized;
 };
 
 /* Stores the k-th vector of the view as vector target_indices[k], or as vector k if `target_indices` is NULL. */
@@ -238,7 +238,7 @@ static void read_vectors(struct gltf *g, const struct gltf_entry *a, const struc
 		}
 		for (unsigned k = 0; k < out->component_count; k++)
 			out->values[index * out->component_count + k] = read_number(
-				bytes + p->offset + i * p->stride + k * width, p->component_type, p->normalized);
+				bytes + p->offset + i * p->stride + k * width, p->component_type, p->is_normalized);
 		if (i % 65536 == 0)
 			liveness_tick();
 	}

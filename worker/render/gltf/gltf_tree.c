@@ -299,6 +299,6 @@ bool gltf_is_known_extension(const char *extension)
 
 void gltf_extend_bounds(struct gltf *g, vec3 p)
 {
-	g->low = (vec3){fmin(g->low.x, p.x), fmin(g->low.y, p.y), fmin(g->low.z, p.z)};
-	g->high = (vec3){fmax(g->high.x, p.x), fmax(g->high.y, p.y), fmax(g->high.z, p.z)};
+	g->box_min = (vec3){fmin(g->box_min.x, p.x), fmin(g->box_min.y, p.y), fmin(g->box_min.z, p.z)};
+	g->box_max = (vec3){fmax(g->box_max.x, p.x), fmax(g->box_max.y, p.y), fmax(g->box_max.z, p.z)};
 }

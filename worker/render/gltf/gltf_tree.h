@@ -83,7 +83,7 @@ struct gltf {
 	size_t line_count[GLTF_ARRAYS], line_capacity[GLTF_ARRAYS];
 	struct gltf_range *buffers, *images; /* embedded data located so far, by entry */
 	unsigned embedded_count, primitive_count;
-	unsigned char *materials_made; /* by material: made for these bits 1 << enum gltf_vertex_colours */
+	unsigned char *is_material_made; /* by material: made for these bits 1 << enum gltf_vertex_colours */
 	struct gltf_open_buffer *open_file,
 		*decoded_buffers;		   /* open buffers: the last one in a file; a list of those in base64 */
 	struct gltf_unpacked_view *unpacked_views; /* by view; NULL: no compressed view was needed so far */
@@ -92,7 +92,7 @@ struct gltf {
 	uint64_t embedded_bytes;		   /* total size of computed vertices */
 	uint64_t bytes_read;			   /* so far, from files with buffers */
 	double *mesh_use_counts;		   /* by mesh: number of nodes that use it */
-	bool *meshes_made;			   /* by mesh: a shapegroup was made of it */
+	bool *is_mesh_made;			   /* by mesh: a shapegroup was made of it */
 	struct xml_element *scene;
 	/* Nodes whose meshes a scale of 0 makes lines or points; index of the first. */
 	size_t scaled_away_count, first_scaled_away;
@@ -100,7 +100,7 @@ struct gltf {
 	bool is_from_blender;	  /* Blender's exporter wrote the file */
 	bool uses_burley_diffuse; /* the writer's diffuse surfaces follow Burley, not Lambert, as the format's do */
 	double lamp_scale;	  /* factor for the intensities of KHR_lights_punctual */
-	vec3 low, high;		  /* bounding box of all vertices */
+	vec3 box_min, box_max;	  /* bounding box of all vertices */
 };
 
 const char *gltf_array_name(enum gltf_array array);

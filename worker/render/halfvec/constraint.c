@@ -97,7 +97,7 @@ static void set_end_tangents(const struct world *w, const struct path_vertex *v,
 		return;
 	}
 	if (v->kind == VERTEX_CAMERA)
-		f = world_camera(w, &v->x, &storage)->axes;
+		f = world_camera_at(w, &v->x, &storage)->axes;
 	else if (v->kind == VERTEX_EMITTER && vec3_dot(v->x.ng, v->x.ng) > 0)
 		f = frame_around(v->x.ng);
 	else

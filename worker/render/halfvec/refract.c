@@ -5,10 +5,10 @@
  * fails and z lies in a denser medium, as under water beside a wall, a few other lines from z are tried: the one along
  * which light would arrive if the surface were a plane, and those to points of the surface (world/refracting.h).
  *
- * A guess fails if its line meets a surface that does not refract, or more than PATH_REFRACTED_MAX surfaces; if the
- * walk does not converge (walk.h); or if the path is at the edge of a caustic, where T is infinite. Paths that are not
- * found are left to the other techniques, as are paths between points that see each other, where the connection is
- * straight (path/connect.c).
+ * A guess fails if its line meets a surface that does not refract, or more than PATH_REFRACTED_VERTICES_MAX surfaces;
+ * if the walk does not converge (walk.h); or if the path is at the edge of a caustic, where T is infinite. Paths that
+ * are not found are left to the other techniques, as are paths between points that see each other, where the connection
+ * is straight (path/connect.c).
  */
 #include "worker/render/halfvec/refract.h"
 
@@ -44,12 +44,12 @@ static bool guess_vertices(struct path_context *c, const struct path_vertex *z, 
 {
 	const struct path_vertex *from = z;
 	out->count = 0;
-	while (out->count < PATH_REFRACTED_MAX) {
+	while (out->count < PATH_REFRACTED_VERTICES_MAX) {
 		struct path_vertex *v = &out->v[out->count];
 		if (!path_extend(c, from, d, 0, max_distance, v) || v->kind != VERTEX_SURFACE ||
 		    !bsdf_refracts_connections(v->bsdf) || (from_denser && from == z && !leaves_denser_medium(v, d)))
 			return false;
-		v->delta = true;
+		v->is_delta = true;
 		v->mode = BSDF_TRANSMIT | BSDF_DELTA;
 		out->count++;
 		if (path_is_visible(c, v, y))
@@ -66,7 +66,7 @@ static bool walk_to_refraction(struct path_context *c, const struct path_vertex 
 {
 	struct full_path x;
 	struct walk_scratch s;
-	struct walk_target target[PATH_REFRACTED_MAX + 2];
+	struct walk_target target[PATH_REFRACTED_VERTICES_MAX + 2];
 	const struct walk_limits limits = walk_limits_of(&c->w->accuracy);
 	const unsigned m = out->count, b = m + 1;
 	x.edges = b;

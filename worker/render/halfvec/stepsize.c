@@ -89,16 +89,16 @@ void halfvec_compute_steps(const struct path_context *c, const struct full_path 
 			   unsigned b, unsigned c_end, struct halfvec_step *step)
 {
 	struct camera storage;
-	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &storage);
+	const struct camera *camera = world_camera_at(c->w, &x->v[x->edges].x, &storage);
 	double sum = 0, pixels = halfvec_film_sigma(camera);
 	mat2 d[FULL_PATH_VERTICES_MAX], footprint = {0, 0, 0, 0};
 	for (unsigned j = c_end + 1; j < b; j++)
-		if (!x->v[j].delta)
+		if (!x->v[j].is_delta)
 			sum += sigma_limit(c, &x->v[j]);
 	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
 			     constraint_solver_of(&c->w->accuracy)->differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++) {
-		if (x->v[j].delta)
+		if (x->v[j].is_delta)
 			continue;
 		double limit = sigma_limit(c, &x->v[j]);
 		mat2 e;

@@ -65,7 +65,7 @@ static enum walk_result cast_ray(struct walk *m, unsigned j, vec3 d)
 	double t_min = 0, t_max = INFINITY;
 	struct camera storage;
 	if (from_camera)
-		camera_clip_range(world_camera(w, &from->x, &storage), d, &t_min, &t_max);
+		camera_clip_range(world_camera_at(w, &from->x, &storage), d, &t_min, &t_max);
 	struct ray_hit hit;
 	const struct shape_binding *binding;
 	for (unsigned faces = 0;; faces++) {
@@ -119,7 +119,7 @@ static enum walk_result try_step(struct walk *m, double step)
 			return WALK_SINGULAR;
 		if (j + 1 < m->b &&
 		    (!mode_is_unchanged(y, j + 1) || light_is_above(y, j + 1) != ((m->above_bits >> (j + 1)) & 1)))
-			return WALK_MODE;
+			return WALK_MODE_CHANGED;
 		if (j == m->c_end)
 			return WALK_OK;
 	}
@@ -127,9 +127,9 @@ static enum walk_result try_step(struct walk *m, double step)
 
 /* How near the half vectors scratch->k[].h are to the targets. */
 struct residual_summary {
-	double error;	     /* the largest residual, for step control */
-	bool within_forward; /* all are within the tolerances of a forward walk */
-	bool within;	     /* all are within the tolerances of this walk */
+	double error;		/* the largest residual, for step control */
+	bool is_within_forward; /* all are within the tolerances of a forward walk */
+	bool is_within;		/* all are within the tolerances of this walk */
 };
 
 static struct residual_summary compute_residuals(struct walk *m)
@@ -142,8 +142,8 @@ static struct residual_summary compute_residuals(struct walk *m)
 		m->scratch->residual[j] = r;
 		if (!isfinite(r2))
 			return (struct residual_summary){INFINITY, false, false};
-		n.within_forward = n.within_forward && r2 <= tolerance * tolerance;
-		n.within = n.within && r2 <= limit * limit;
+		n.is_within_forward = n.is_within_forward && r2 <= tolerance * tolerance;
+		n.is_within = n.is_within && r2 <= limit * limit;
 		n.error = fmax(n.error, r2 / (1 + vec2_dot(h, h)));
 	}
 	return n;
@@ -177,7 +177,7 @@ static enum walk_result begin_walk(struct walk *m)
 			return WALK_SINGULAR;
 	for (unsigned j = m->c_end + 1; j < m->b; j++) {
 		if (!mode_is_unchanged(y, j))
-			return WALK_MODE;
+			return WALK_MODE_CHANGED;
 		if (light_is_above(y, j))
 			m->above_bits |= vertex_bit(j);
 	}
@@ -235,11 +235,11 @@ static enum walk_result iterate(struct walk *m, const struct walk_limits *limits
 		result = try_step(m, step);
 		if (result == WALK_OK) {
 			struct residual_summary current = evaluate_trial(m);
-			if (current.within ? !m->is_reverse : current.error < error)
+			if (current.is_within ? !m->is_reverse : current.error < error)
 				compute_constraints(m, m->b, m->c_end);
-			if (current.within)
+			if (current.is_within)
 				return WALK_OK;
-			if (current.within_forward)
+			if (current.is_within_forward)
 				max_iterations = 2 * limits->max_iterations;
 			if (current.error < error) {
 				error = current.error;
@@ -255,7 +255,7 @@ static enum walk_result iterate(struct walk *m, const struct walk_limits *limits
 		if (step < limits->min_step)
 			return result;
 	}
-	return result == WALK_OK ? WALK_ITERATIONS : result;
+	return result == WALK_OK ? WALK_ITERATION_LIMIT : result;
 }
 
 enum walk_result halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,

@@ -16,12 +16,12 @@
 /* Why a walk failed: the reason for which its last trial was rejected. */
 enum walk_result {
 	WALK_OK,
-	WALK_MISSED,	 /* a ray hit nothing */
-	WALK_BLOCKED,	 /* another material was hit, or an edge is occluded */
-	WALK_MODE,	 /* a vertex would scatter in another mode, or the normals disagree about a side */
-	WALK_SINGULAR,	 /* the matrix is singular, or two vertices coincide */
-	WALK_DIVERGED,	 /* the residuals grew, however short the step */
-	WALK_ITERATIONS, /* the iterations ran out while the residuals still shrank */
+	WALK_MISSED,	      /* a ray hit nothing */
+	WALK_BLOCKED,	      /* another material was hit, or an edge is occluded */
+	WALK_MODE_CHANGED,    /* a vertex would scatter in another mode, or the normals disagree about a side */
+	WALK_SINGULAR,	      /* the matrix is singular, or two vertices coincide */
+	WALK_DIVERGED,	      /* the residuals grew, however short the step */
+	WALK_ITERATION_LIMIT, /* the iterations ran out while the residuals still shrank */
 };
 
 /* Tolerance of a half vector whose target is 0, at the end of a walk. */

@@ -69,10 +69,10 @@ static int decode(const struct image_input *in, struct image *out)
 		const struct image_format *f = formats[i];
 		if (!format_matches(f, in))
 			continue;
-		if (in->alpha_only && f->alpha_support == IMAGE_ALPHA_NOT_READ)
+		if (in->needs_only_alpha && f->alpha_support == IMAGE_ALPHA_NOT_READ)
 			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
 		int r = f->decode(in, out);
-		if (!r && in->alpha_only && f->alpha_support == IMAGE_ALPHA_NONE)
+		if (!r && in->needs_only_alpha && f->alpha_support == IMAGE_ALPHA_NONE)
 			make_opaque(out);
 		return r;
 	}

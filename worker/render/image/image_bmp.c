@@ -114,7 +114,7 @@ static int decode(const struct image_input *in, struct image *out)
 		return r;
 	if (b.pixel_offset > in->size || stride * b.height > in->size - b.pixel_offset)
 		return error_set(in->error, EBADMSG, "BMP: the file ends too early");
-	image_fill_sample_table(value, 255, in->raw);
+	image_fill_sample_table(value, 255, in->is_raw);
 	float *pixel = out->pixels;
 	for (uint64_t y = 0; y < b.height; y++) {
 		const unsigned char *row = in->bytes + b.pixel_offset + (b.is_top_down ? y : b.height - 1 - y) * stride;

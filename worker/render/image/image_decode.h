@@ -19,7 +19,7 @@ struct image_input {
 	const char *name;
 	const unsigned char *bytes;
 	size_t size;
-	bool raw, alpha_only; /* alpha_only: with the stored values */
+	bool is_raw, needs_only_alpha; /* needs_only_alpha: with the stored values */
 	struct arena *arena;
 	struct error *error;
 };

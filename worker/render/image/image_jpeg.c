@@ -120,7 +120,7 @@ static int decode(const struct image_input *in, struct image *out)
 	s->errors.emit_message = on_message;
 	s->progress.progress_monitor = on_progress;
 	s->jpeg.client_data = s;
-	image_fill_sample_table(s->sample_table, 255, in->raw);
+	image_fill_sample_table(s->sample_table, 255, in->is_raw);
 	read_guarded(s);
 	int r = s->error_code;
 	jpeg_destroy_decompress(&s->jpeg);

@@ -65,7 +65,7 @@ static int read_header(struct state *s)
 	png_read_info(s->png, s->info);
 	uint32_t width = png_get_image_width(s->png, s->info), height = png_get_image_height(s->png, s->info);
 	png_set_expand(s->png);
-	if (s->in->alpha_only)
+	if (s->in->needs_only_alpha)
 		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* where the file has no alpha */
 	else
 		png_set_strip_alpha(s->png);
@@ -73,11 +73,11 @@ static int read_header(struct state *s)
 	png_read_update_info(s->png, s->info);
 	s->channels = png_get_channels(s->png, s->info);
 	s->depth = png_get_bit_depth(s->png, s->info);
-	if ((s->in->alpha_only ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
+	if ((s->in->needs_only_alpha ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
 	    (s->depth != 8 && s->depth != 16))
 		return error_set(s->in->error, EINVAL, "PNG with %u channels of %u bits", s->channels, s->depth);
 	/* deflate expands a byte to at most 1032; a pixel takes at least one bit. */
-	return image_allocate(s->in, s->out, width, height, s->in->alpha_only ? 1 : s->channels,
+	return image_allocate(s->in, s->out, width, height, s->in->needs_only_alpha ? 1 : s->channels,
 			      (uint64_t)width * height / (8 * 1032));
 }
 
@@ -110,8 +110,9 @@ static int convert(struct state *s)
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
 		return error_set(s->in->error, ENOMEM, "out of memory");
-	image_fill_sample_table(value, max, s->in->raw || s->in->alpha_only);
-	uint32_t step = s->in->alpha_only ? s->channels : 1, first = step - 1; /* alpha is the last sample of a pixel */
+	image_fill_sample_table(value, max, s->in->is_raw || s->in->needs_only_alpha);
+	uint32_t step = s->in->needs_only_alpha ? s->channels : 1,
+		 first = step - 1; /* alpha is the last sample of a pixel */
 	size_t n = (size_t)s->out->width * s->out->channels;
 	for (uint32_t y = 0; y < s->out->height; y++) {
 		const png_byte *p = s->rows[y];

@@ -109,7 +109,7 @@ static int read_integers(struct pnm *m, struct image *out)
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
 		return error_set(m->in->error, ENOMEM, "out of memory");
-	image_fill_sample_table(value, max, m->in->raw);
+	image_fill_sample_table(value, max, m->in->is_raw);
 	int r = 0;
 	for (size_t i = 0; i < (size_t)out->width * out->height * out->channels && !r; i++) {
 		uint32_t x = next_sample(m);

@@ -124,12 +124,12 @@ static int decode(const struct image_input *in, struct image *out)
 	if (r)
 		return r;
 	bool is_grey = t.kind == KIND_GREY, has_alpha = (t.palette ? t.palette_entry_bytes : t.pixel_bytes) == 4;
-	uint32_t channels = is_grey || in->alpha_only ? 1 : 3;
+	uint32_t channels = is_grey || in->needs_only_alpha ? 1 : 3;
 	uint64_t count = (uint64_t)t.width * t.height, min_rle_bytes = (count + 127) / 128 * (1 + t.pixel_bytes);
 	r = image_allocate(in, out, t.width, t.height, channels, t.is_rle ? min_rle_bytes : count * t.pixel_bytes);
 	if (r)
 		return r;
-	image_fill_sample_table(value, 255, in->raw || in->alpha_only);
+	image_fill_sample_table(value, 255, in->is_raw || in->needs_only_alpha);
 	for (uint32_t j = 0; j < t.height; j++)
 		for (uint32_t i = 0; i < t.width; i++) {
 			uint32_t x = t.is_right_to_left ? t.width - 1 - i : i, y = t.is_top_down ? j : t.height - 1 - j;
@@ -138,7 +138,7 @@ static int decode(const struct image_input *in, struct image *out)
 			if (!c)
 				return error_set(in->error, EBADMSG,
 						 "TGA: the file ends too early, or a pixel is beyond the palette");
-			if (in->alpha_only)
+			if (in->needs_only_alpha)
 				*pixel = has_alpha ? value[c[3]] : 1;
 			else if (is_grey)
 				*pixel = value[c[0]];

@@ -9,10 +9,10 @@ static void store_pixels(const struct image_input *in, const uint8_t *rgba, stru
 {
 	float value[256];
 	size_t count = (size_t)out->width * out->height;
-	image_fill_sample_table(value, 255, in->raw || in->alpha_only);
+	image_fill_sample_table(value, 255, in->is_raw || in->needs_only_alpha);
 	for (size_t i = 0; i < count; i++)
 		for (uint32_t k = 0; k < out->channels; k++)
-			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->alpha_only ? 3 : k)]];
+			out->pixels[i * out->channels + k] = value[rgba[4 * i + (in->needs_only_alpha ? 3 : k)]];
 }
 
 static int decode(const struct image_input *in, struct image *out)
@@ -25,7 +25,8 @@ static int decode(const struct image_input *in, struct image *out)
 	if (features.has_animation)
 		return error_set(in->error, ENOTSUP, "WebP: an animation; supported: single images");
 	/* No lower limit on the file's size: a lossless image of a single colour takes next to nothing. */
-	int r = image_allocate(in, out, (uint64_t)features.width, (uint64_t)features.height, in->alpha_only ? 1 : 3, 0);
+	int r = image_allocate(in, out, (uint64_t)features.width, (uint64_t)features.height,
+			       in->needs_only_alpha ? 1 : 3, 0);
 	if (r)
 		return r;
 	int width, height;

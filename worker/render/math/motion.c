@@ -233,14 +233,15 @@ struct sweep {
 	const mat4 *pre_transform;
 	vec3 middle, half;   /* the box */
 	double max_distance; /* largest distance of its points from the origin, after `pre_transform` */
-	vec3 low, high;
+	vec3 box_min, box_max;
 };
 
 static void grow_sweep(struct sweep *w, const mat4 *m, double margin)
 {
 	vec3 c = mat4_point(m, w->middle);
 	const double center[3] = {c.x, c.y, c.z}, half[3] = {w->half.x, w->half.y, w->half.z};
-	double *low[3] = {&w->low.x, &w->low.y, &w->low.z}, *high[3] = {&w->high.x, &w->high.y, &w->high.z};
+	double *low[3] = {&w->box_min.x, &w->box_min.y, &w->box_min.z},
+	       *high[3] = {&w->box_max.x, &w->box_max.y, &w->box_max.z};
 	for (int i = 0; i < 3; i++) {
 		double r = margin;
 		for (int k = 0; k < 3; k++)
@@ -275,8 +276,8 @@ void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, v
 {
 	struct sweep w = {.pre_transform = &m->pre_transform,
 			  .half = vec3_scale(0.5, vec3_sub(high, low)),
-			  .low = {INFINITY, INFINITY, INFINITY},
-			  .high = {-INFINITY, -INFINITY, -INFINITY}};
+			  .box_min = {INFINITY, INFINITY, INFINITY},
+			  .box_max = {-INFINITY, -INFINITY, -INFINITY}};
 	w.middle = vec3_add(low, w.half);
 	for (int k = 0; k < 8; k++) {
 		vec3 corner = {k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z};
@@ -293,6 +294,6 @@ void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, v
 		}
 		sweep_between(&w, a, b, fmin(fmax(-a->time / length, 0), 1), fmin(fmax((1 - a->time) / length, 0), 1));
 	}
-	*all_low = w.low;
-	*all_high = w.high;
+	*all_low = w.box_min;
+	*all_high = w.box_max;
 }

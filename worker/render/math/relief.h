@@ -16,13 +16,13 @@ enum relief_kind {
 	RELIEF_NORMAL, /* x is the normal in the shading frame, with any length above 0 */
 };
 
-struct relief_value {
+struct relief_sample {
 	vec3 x, du, dv; /* the value, and its derivatives with respect to u and v */
 };
 
 struct relief {
 	enum relief_kind kind;
-	void (*eval)(const void *data, double u, double v, struct relief_value *out);
+	void (*eval)(const void *data, double u, double v, struct relief_sample *out);
 	const void *data;
 	/* For RELIEF_NORMAL: y points against dp/dv instead of along n x dp/du, where the two differ. */
 	bool uses_handedness;

@@ -18,7 +18,7 @@
 		}                                                           \
 		return low;                                                 \
 	}
-SEARCH(search_cell, double)
+SEARCH(search_find_cell, double)
 SEARCH(search_count, uint32_t)
 #undef SEARCH
 

@@ -4,7 +4,7 @@
 int emission_create(struct emission *g, const struct scene_node *n, const struct volume *extinction,
 		    const struct volume_build *build, struct error *e)
 {
-	if (!build->dialect_3)
+	if (!build->is_dialect_3)
 		return node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"volumelight\"");
 	g->per_length = 1 / build->world_scale;
 	int rc = volume_from_node(&g->radiance, n, "radiance", 0, COLOR_ILLUMINANT, false, build, e);

@@ -98,7 +98,7 @@ static int read_sigma_a_and_s(struct medium *m, const struct scene_node *n, cons
 	int rc = volume_from_node(&m->first, n, "sigma_a", 0, COLOR_UNBOUNDED, false, build, e);
 	if (!rc)
 		rc = volume_from_node(&m->second, n, "sigma_s", 0, COLOR_UNBOUNDED, false, build, e);
-	return rc || build->dialect_3 ? rc : fill_in_defaults(m, n);
+	return rc || build->is_dialect_3 ? rc : fill_in_defaults(m, n);
 }
 
 static int read_sigma_t_and_albedo(struct medium *m, const struct scene_node *n, const struct volume_build *build,
@@ -106,12 +106,12 @@ static int read_sigma_t_and_albedo(struct medium *m, const struct scene_node *n,
 {
 	bool is_heterogeneous = strcmp(n->type, "heterogeneous") == 0;
 	int rc = volume_from_node(&m->first, n, "sigma_t", default_sigma_t, COLOR_UNBOUNDED,
-				  is_heterogeneous && build->dialect_3, build, e);
+				  is_heterogeneous && build->is_dialect_3, build, e);
 	if (!rc && !is_heterogeneous && volume_varies(&m->first))
 		rc = node_error(n, e, EINVAL, "sigma_t must not vary in space in a homogeneous medium");
 	if (!rc)
 		rc = volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
-	return rc || is_heterogeneous || build->dialect_3 ? rc : fill_in_defaults(m, n);
+	return rc || is_heterogeneous || build->is_dialect_3 ? rc : fill_in_defaults(m, n);
 }
 
 /* Reads `g` of 0.6. Scattering by small angles is neglected: sigma_s is multiplied by 1 - g, with the mean cosine g. */
@@ -119,7 +119,7 @@ static int read_forward(struct medium *m, const struct scene_node *n, const stru
 {
 	if (!node_find_property(n, "g"))
 		return 0;
-	if (build->dialect_3)
+	if (build->is_dialect_3)
 		return node_error(n, e, EINVAL, "g is a parameter of the phase function in 3.x");
 	if (volume_varies(&m->second))
 		return node_error(n, e, ENOTSUP, "g is not supported with an albedo that varies in space");
@@ -135,10 +135,10 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 	if (has_sigma_a_or_s + has_sigma_t_or_albedo + (material != NULL) > 1)
 		return node_error(n, e, EINVAL,
 				  "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
-	if (!build->dialect_3 && strcmp(n->type, "heterogeneous") == 0 &&
+	if (!build->is_dialect_3 && strcmp(n->type, "heterogeneous") == 0 &&
 	    !(node_find_property(n, "sigma_t") && node_find_property(n, "albedo")))
 		return node_error(n, e, EINVAL, "needs a density and an albedo");
-	if (!material && !has_sigma_a_or_s && !has_sigma_t_or_albedo && !build->dialect_3)
+	if (!material && !has_sigma_a_or_s && !has_sigma_t_or_albedo && !build->is_dialect_3)
 		material = MEASURED_MEDIUM_DEFAULT;
 	*m = (struct medium){.uses_albedo = !has_sigma_a_or_s && !material,
 			     .per_length = node_float(n, "scale", 1) / build->world_scale};
@@ -157,10 +157,10 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 		return rc;
 	bool has_first = volume_max(&m->first) > 0, has_second = volume_max(&m->second) > 0,
 	     scatters_all = volume_min(&m->second) == 1;
-	m->absorbs = m->per_length > 0 && has_first && !(m->uses_albedo && scatters_all);
-	m->scatters = m->per_length > 0 && has_second && (has_first || !m->uses_albedo);
+	m->is_absorbing = m->per_length > 0 && has_first && !(m->uses_albedo && scatters_all);
+	m->is_scattering = m->per_length > 0 && has_second && (has_first || !m->uses_albedo);
 	if (volume_varies(&m->second))
-		m->absorbs = m->scatters = m->absorbs || m->scatters;
+		m->is_absorbing = m->is_scattering = m->is_absorbing || m->is_scattering;
 	return 0;
 }
 
@@ -184,8 +184,8 @@ static spectrum eval_coefficients(const struct medium *m, spectrum first, spectr
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double scattered = m->uses_albedo ? first.v[i] * second.v[i] : second.v[i];
 		double absorbed = m->uses_albedo ? first.v[i] - scattered : first.v[i];
-		sigma_s.v[i] = m->scatters ? scattered * (1 - m->forward_share) * m->per_length : 0;
-		sigma_t->v[i] = sigma_s.v[i] + (m->absorbs ? absorbed * m->per_length : 0);
+		sigma_s.v[i] = m->is_scattering ? scattered * (1 - m->forward_share) * m->per_length : 0;
+		sigma_t->v[i] = sigma_s.v[i] + (m->is_absorbing ? absorbed * m->per_length : 0);
 	}
 	return sigma_s;
 }

@@ -14,9 +14,9 @@
 #include "worker/render/volume/volume.h"
 
 struct medium {
-	struct volume first, second; /* sigma_a and sigma_s; if uses_albedo, sigma_t and albedo */
-	bool uses_albedo;	     /* if not, neither volume varies in space */
-	bool absorbs, scatters;	     /* false: sigma_a or sigma_s is 0; if `second` varies, both are equal */
+	struct volume first, second;	  /* sigma_a and sigma_s; if uses_albedo, sigma_t and albedo */
+	bool uses_albedo;		  /* if not, neither volume varies in space */
+	bool is_absorbing, is_scattering; /* false: sigma_a or sigma_s is 0; if `second` varies, both are equal */
 	double forward_share; /* `g` of 0.6: the share of sigma_s that is neglected, as light that goes straight on */
 	double per_length;    /* factor of the coefficients; 1 / length */
 	struct phase phase;

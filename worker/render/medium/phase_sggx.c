@@ -23,7 +23,7 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 	if (!f)
 		return node_error(n, e, ENOMEM, "out of memory");
 	p->flakes = f;
-	if (!build->dialect_3)
+	if (!build->is_dialect_3)
 		return node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"sggx\"");
 	return flakes_create(f, n, build, e);
 }

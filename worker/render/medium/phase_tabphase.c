@@ -90,7 +90,7 @@ static double sample(const struct phase *p, vec3 position, double u)
 {
 	(void)position;
 	const struct table *t = p->data;
-	uint32_t i = search_cell(t->cumulative, t->interval_count, u);
+	uint32_t i = search_find_cell(t->cumulative, t->interval_count, u);
 	double a = t->density[i], b = t->density[i + 1], rest = (u - t->cumulative[i]) / t->interval_width;
 	double root = sqrt(fmax(a * a + 2 * (b - a) * rest, 0));
 	return -1 + t->interval_width * (i + (a + root > 0 ? fmin(2 * rest / (a + root), 1) : 0));

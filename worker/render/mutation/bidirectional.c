@@ -16,34 +16,34 @@ enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
 static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				    const struct mutation_forced_choice *forced, struct full_path *x,
-				    struct full_path *y, struct move *move)
+				    struct full_path *y, struct proposal_move *move)
 {
 	(void)self, (void)forced;
 	struct path_context *c = m->path;
 	struct ensemble candidates;
 	struct sampler_random s;
 	double u[4], r[4];
-	mutation_random(m, BLOCK_BREAKUP, u);
-	mutation_random(m, BLOCK_LENGTHS, r);
-	*move = (struct move){.log_density = {INFINITY, INFINITY}};
+	mutation_draw_uniforms(m, BLOCK_BREAKUP, u);
+	mutation_draw_uniforms(m, BLOCK_LENGTHS, r);
+	*move = (struct proposal_move){.log_density = {INFINITY, INFINITY}};
 	if (x->edges > 0) {
 		double v[4];
-		mutation_random(m, BLOCK_AROUND, v);
+		mutation_draw_uniforms(m, BLOCK_AROUND, v);
 		sampler_random_init(&s, m->seed, RNG_BIDIRECTIONAL_MUTATION, m->chain, m->step);
 		ensemble_draw_containing(c, &s.base, x, v, &candidates);
-		move->log_density[Y_TO_X] = -log(candidates.total);
+		move->log_density[MUTATION_REVERSE] = -log(candidates.total);
 	}
 	const struct ensemble_lengths n = ensemble_draw_lengths(c, r, 1, 1);
 	sampler_random_init(&s, m->seed, RNG_CHAIN, m->chain, m->step);
 	ensemble_draw(c, &s.base, &n, &candidates);
 	if (!ensemble_choose(c, &candidates, u[0], y))
-		return PROPOSAL_DARK;
+		return PROPOSAL_BLACK;
 	move->last = y->edges;
-	move->log_density[X_TO_Y] = -log(candidates.total);
+	move->log_density[MUTATION_FORWARD] = -log(candidates.total);
 	return PROPOSAL_MADE;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
+static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct proposal_move *move,
 			 enum mutation_direction direction)
 {
 	(void)m, (void)into;
@@ -65,7 +65,7 @@ static double default_weight(const struct render_summary *scene)
 const struct mutation_ops mutation_bidirectional = {
 	.name = "bidirectional",
 	.summary = "a new path, one of those formed by a pair of sub-paths",
-	.independent = true,
+	.is_independent = true,
 	.default_weight = default_weight,
 	.propose = propose,
 	.log_weight = log_weight,

@@ -35,12 +35,12 @@
 bool breakup_is_allowed(const struct full_path *x, unsigned b, unsigned c)
 {
 	unsigned k = x->edges;
-	if (b > k || (b > 0 && b < k && x->v[b].delta))
+	if (b > k || (b > 0 && b < k && x->v[b].is_delta))
 		return false;
 	for (unsigned j = c + 1; j < b; j++)
 		if (x->v[j].kind == VERTEX_MEDIUM)
 			return false;
-	return b == 0 || (c < b && !(c > 0 && x->v[c].delta));
+	return b == 0 || (c < b && !(c > 0 && x->v[c].is_delta));
 }
 
 /* Returns the number for the new wavelength: a symmetric step, reflected at the ends of the range. */
@@ -59,29 +59,30 @@ static bool must_keep_wavelength(const struct path_context *c, const struct full
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
 		return false;
 	for (unsigned j = 1; j < c_end; j++)
-		if (x->v[j].delta && x->v[j].bsdf->is_dispersive)
+		if (x->v[j].is_delta && x->v[j].bsdf->is_dispersive)
 			return true;
 	return false;
 }
 
-static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, struct full_path *y, struct move *move)
+static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, struct full_path *y,
+			 struct proposal_move *move)
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &storage);
+	const struct emitter *em = world_emitter_at(c->w, v->emitter, v->x.prim.time, &storage);
 	struct emitter_point p = world_emitter_point(&v->x);
 	double u[2], r[4], pdf;
 	p.is_infinite = v->kind == VERTEX_INFINITE;
-	move->log_density[Y_TO_X] += log(em->ops->pdf_point(em, &p));
+	move->log_density[MUTATION_REVERSE] += log(em->ops->pdf_point(em, &p));
 	em->ops->point_inverse(em, &p, u);
-	mutation_random(m, BLOCK_VERTEX, r);
+	mutation_draw_uniforms(m, BLOCK_VERTEX, r);
 	if (!mutation_step_in_square(u, r, EMITTER_STEP))
 		return false;
 	if (!em->ops->sample_point(em, u, &p, &pdf) || !(pdf > 0))
 		return false;
 	y->v[0] = path_emitter_vertex(c->w, v->emitter, &p, v->x.prim.time);
-	move->log_density[X_TO_Y] += log(pdf);
+	move->log_density[MUTATION_FORWARD] += log(pdf);
 	return true;
 }
 
@@ -94,21 +95,21 @@ static enum proposal_result result_of_walk(enum walk_result result)
 		return PROPOSAL_MISSED;
 	case WALK_BLOCKED:
 		return PROPOSAL_BLOCKED;
-	case WALK_MODE:
-		return PROPOSAL_MODE;
+	case WALK_MODE_CHANGED:
+		return PROPOSAL_MODE_CHANGED;
 	case WALK_SINGULAR:
 		return PROPOSAL_SINGULAR;
 	case WALK_DIVERGED:
 		return PROPOSAL_DIVERGED;
-	case WALK_ITERATIONS:
+	case WALK_ITERATION_LIMIT:
 		break;
 	}
-	return PROPOSAL_ITERATIONS;
+	return PROPOSAL_ITERATION_LIMIT;
 }
 
 static double halfvec_tolerance(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
 {
-	if (v->delta)
+	if (v->is_delta)
 		return WALK_SPECULAR_TOLERANCE;
 	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
@@ -120,27 +121,28 @@ static void set_targets(struct mutation_ctx *m, const struct breakup *breakup, c
 	for (unsigned j = breakup->c + 1; j < breakup->b; j++) {
 		struct walk_target *t = &s->target[j];
 		s->dh[j] = (vec2){0, 0};
-		t->tolerance = halfvec_tolerance(m, &x->v[j], &s->step[X_TO_Y][j]);
-		t->h = x->v[j].delta ? (vec2){0, 0} : s->constraints[j].h;
-		if (x->v[j].delta || !breakup->moves_halfvecs)
+		t->tolerance = halfvec_tolerance(m, &x->v[j], &s->step[MUTATION_FORWARD][j]);
+		t->h = x->v[j].is_delta ? (vec2){0, 0} : s->constraints[j].h;
+		if (x->v[j].is_delta || !breakup->moves_halfvecs)
 			continue;
 		double r[4], g[2];
-		mutation_random(m, BLOCK_VERTEX + j, r);
+		mutation_draw_uniforms(m, BLOCK_VERTEX + j, r);
 		mutation_normals_from_uniform(r, g);
-		s->dh[j] = halfvec_step_sample(&s->step[X_TO_Y][j], g[0], g[1]);
+		s->dh[j] = halfvec_step_sample(&s->step[MUTATION_FORWARD][j], g[0], g[1]);
 		t->h = vec2_add(t->h, s->dh[j]);
 	}
 }
 
 static void add_step_densities(struct mutation_ctx *m, const struct breakup *breakup, const struct full_path *x,
-			       struct move *move)
+			       struct proposal_move *move)
 {
 	const struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = breakup->c + 1; breakup->moves_halfvecs && j < breakup->b; j++) {
-		if (x->v[j].delta)
+		if (x->v[j].is_delta)
 			continue;
-		move->log_density[X_TO_Y] += halfvec_step_log_pdf(&s->step[X_TO_Y][j], s->dh[j]);
-		move->log_density[Y_TO_X] += halfvec_step_log_pdf(&s->step[Y_TO_X][j], vec2_scale(-1, s->dh[j]));
+		move->log_density[MUTATION_FORWARD] += halfvec_step_log_pdf(&s->step[MUTATION_FORWARD][j], s->dh[j]);
+		move->log_density[MUTATION_REVERSE] +=
+			halfvec_step_log_pdf(&s->step[MUTATION_REVERSE][j], vec2_scale(-1, s->dh[j]));
 	}
 }
 
@@ -171,8 +173,8 @@ static bool is_reversible(struct mutation_ctx *m, const struct breakup *breakup,
 	for (unsigned j = c + 1; j < b; j++) {
 		vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
 		max_move2 = fmax(max_move2, vec3_dot(d, d));
-		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->constraints[j].h;
-		s->target[j].tolerance = halfvec_tolerance(m, &x->v[j], &s->step[X_TO_Y][j]);
+		s->target[j].h = x->v[j].is_delta ? (vec2){0, 0} : s->constraints[j].h;
+		s->target[j].tolerance = halfvec_tolerance(m, &x->v[j], &s->step[MUTATION_FORWARD][j]);
 	}
 	m->counters[STRATEGY_REVERSE_WALKS]++;
 	enum walk_result result = halfvec_walk(m->path, reverse, b, c, s->target, true, &m->limits,
@@ -193,15 +195,15 @@ static bool is_reversible(struct mutation_ctx *m, const struct breakup *breakup,
 
 /* Moves the vertices between x_b and x_c by half vectors. */
 static enum proposal_result walk_between(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
-					 struct full_path *y, struct move *move)
+					 struct full_path *y, struct proposal_move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
 	constraints_compute(c->w, x, breakup->b, breakup->c, s->constraints);
 	if (m->limits.solver->factor(s->constraints, breakup->b, breakup->c, &s->walk.system) != CONSTRAINT_OK)
 		return PROPOSAL_SINGULAR;
-	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
-	halfvec_compute_steps(c, x, s->constraints, breakup->b, breakup->c, s->step[X_TO_Y]);
+	move->log_transfer[MUTATION_REVERSE] = s->walk.system.log_transfer;
+	halfvec_compute_steps(c, x, s->constraints, breakup->b, breakup->c, s->step[MUTATION_FORWARD]);
 	set_targets(m, breakup, x);
 	memcpy(&s->walk.k[breakup->c + 1], &s->constraints[breakup->c + 1],
 	       (breakup->b - breakup->c - 1) * sizeof s->constraints[0]);
@@ -213,10 +215,10 @@ static enum proposal_result walk_between(struct mutation_ctx *m, const struct br
 		return result_of_walk(result);
 	if (m->limits.solver->factor(s->walk.k, breakup->b, breakup->c, &s->walk.system) != CONSTRAINT_OK)
 		return PROPOSAL_SINGULAR;
-	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
-	halfvec_compute_steps(c, y, s->walk.k, breakup->b, breakup->c, s->step[Y_TO_X]);
+	move->log_transfer[MUTATION_FORWARD] = s->walk.system.log_transfer;
+	halfvec_compute_steps(c, y, s->walk.k, breakup->b, breakup->c, s->step[MUTATION_REVERSE]);
 	add_step_densities(m, breakup, x, move);
-	return is_reversible(m, breakup, x, y) ? PROPOSAL_MADE : PROPOSAL_REVERSE;
+	return is_reversible(m, breakup, x, y) ? PROPOSAL_MADE : PROPOSAL_IRREVERSIBLE;
 }
 
 static enum proposal_result join_edge(struct mutation_ctx *m, unsigned e, struct full_path *y)
@@ -246,7 +248,8 @@ static bool media_are_unchanged(const struct path_context *c, const struct full_
 }
 
 /* Recomputes the transmittance of all edges if the wavelength changed. Returns false if an edge is occluded. */
-static bool retrace_media(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
+static bool retrace_media(struct path_context *c, const struct full_path *x, struct full_path *y,
+			  struct proposal_move *move)
 {
 	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength_u == x->wavelength_u)
 		return true;
@@ -265,20 +268,21 @@ static bool has_turned_normal(const struct full_path *x, unsigned b, unsigned c)
 }
 
 enum proposal_result breakup_propose(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
-				     struct full_path *y, struct move *move)
+				     struct full_path *y, struct proposal_move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges, b = breakup->b, c_end = b > 0 ? breakup->c : 0;
-	*move = (struct move){.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {breakup->log_choice, 0}};
+	*move = (struct proposal_move){
+		.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {breakup->log_choice, 0}};
 	if (breakup->moves_wavelength && EFFECT_IS_ON(c->w, colour) && !must_keep_wavelength(c, x, b, c_end)) {
 		double r[4];
-		mutation_random(m, BLOCK_ENDS, r);
+		mutation_draw_uniforms(m, BLOCK_ENDS, r);
 		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength_u, r[0]));
 	}
 	bool aperture = breakup->moves_aperture && EFFECT_IS_ON(c->w, aperture);
 	enum proposal_result result = PROPOSAL_MADE;
 	if (has_turned_normal(x, b, c_end))
-		return PROPOSAL_MODE;
+		return PROPOSAL_MODE_CHANGED;
 	if (b == c_end && b > 0)
 		return retrace_media(c, x, y, move) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
 	if (b < k)
@@ -294,11 +298,11 @@ enum proposal_result breakup_propose(struct mutation_ctx *m, const struct breaku
 		return result;
 	full_path_invalidate(y, c_end + 1, k);
 	if (!set_mode(y, b) || !set_mode(y, c_end) || !media_are_unchanged(c, y, c_end))
-		return PROPOSAL_MODE;
+		return PROPOSAL_MODE_CHANGED;
 	if (!retrace_media(c, x, y, move))
 		return PROPOSAL_BLOCKED;
 	if (EFFECT_IS_ON(c->w, scattering) && !full_path_can_be_made(c, y))
-		return PROPOSAL_DARK;
+		return PROPOSAL_BLACK;
 	return b < k || full_path_project(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
@@ -318,7 +322,7 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 	struct camera storage;
 	if (b == x->edges)
 		return log_g +
-		       log(camera_jac_film_from_solid(world_camera(c->w, &x->v[b].x, &storage), vec3_neg(e->w)));
+		       log(camera_jac_film_from_solid(world_camera_at(c->w, &x->v[b].x, &storage), vec3_neg(e->w)));
 	return log_g + log(full_path_cosine_to_light(x, b));
 }
 
@@ -333,15 +337,16 @@ static double log_distance_jacobian(const struct full_path *x, unsigned b)
 	return sum;
 }
 
-double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
+double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct proposal_move *move,
 			  enum mutation_direction direction)
 {
 	const struct path_context *c = m->path;
-	struct product p = PRODUCT_ONE;
+	struct scaled_product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < into->edges; j++)
-		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
+		scaled_product_mul(&p, j <= move->c || j == move->b ? full_path_eval_f(c, into, j)
+								    : full_path_eval_fh(c, into, j));
 	full_path_attenuate(c->w, into, &p);
-	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
+	return scaled_product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
 	       (EFFECT_IS_ON(c->w, scattering) ? log_distance_jacobian(into, move->b) : 0) +
 	       move->log_transfer[direction] - move->log_density[direction];
 }

@@ -20,11 +20,11 @@ struct breakup {
 	bool moves_wavelength, moves_aperture, moves_emitter;
 };
 
-/* See mutation_ops.propose. On success everything is set, except that move->log_density[Y_TO_X] does not yet include
- * the probability of choosing b and c. */
+/* See mutation_ops.propose. On success everything is set, except that move->log_density[MUTATION_REVERSE] does not yet
+ * include the probability of choosing b and c. */
 enum proposal_result breakup_propose(struct mutation_ctx *m, const struct breakup *breakup, struct full_path *x,
-				     struct full_path *y, struct move *move);
-double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
+				     struct full_path *y, struct proposal_move *move);
+double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct proposal_move *move,
 			  enum mutation_direction direction);
 
 /* Whether a path can be broken up like this: x_b and x_c must not be exactly specular, c < b (unless b = 0), and no

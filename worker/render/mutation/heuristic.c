@@ -8,7 +8,7 @@ static double roughness(const struct path_vertex *v)
 {
 	if (v->kind == VERTEX_MEDIUM)
 		return 1;
-	return v->delta ? 0 : fmin(v->bsdf->mean_alpha, 1);
+	return v->is_delta ? 0 : fmin(v->bsdf->mean_alpha, 1);
 }
 
 /* P(b = i) ~ a_i, with weight 0.1 for both ends. If all inner vertices are specular, or there are none, half vectors
@@ -36,7 +36,7 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 		double distance2 =
 			x->v[i].kind == VERTEX_INFINITE ? 4 * c->w->radius * c->w->radius : x->edge[i].distance2;
 		weight[i] = something_moves ? (i == 0 ? 1 : roughness(&x->v[i])) * distance2 : 0;
-		something_moves |= i > 0 && !x->v[i].delta;
+		something_moves |= i > 0 && !x->v[i].is_delta;
 	}
 }
 

@@ -34,34 +34,34 @@ static unsigned technique_count(unsigned edges)
 
 static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				    const struct mutation_forced_choice *forced, struct full_path *x,
-				    struct full_path *y, struct move *move)
+				    struct full_path *y, struct proposal_move *move)
 {
 	(void)self, (void)forced, (void)x;
 	struct path_context *c = m->path;
 	double r[4], film[2];
-	mutation_random(m, BLOCK_BREAKUP, r);
+	mutation_draw_uniforms(m, BLOCK_BREAKUP, r);
 	unsigned k = choose_edge_count(c, r[0]), n = technique_count(k);
 	unsigned s = (unsigned)fmin(floor(r[1] * n), n - 1), t = k + 1 - s;
-	*move = (struct move){.first = 0, .last = k};
+	*move = (struct proposal_move){.first = 0, .last = k};
 	struct sampler_random sampler;
 	sampler_random_init(&sampler, m->seed, RNG_CHAIN, m->chain, m->step);
-	c->unidirectional = true;
+	c->is_unidirectional = true;
 	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
 		return PROPOSAL_MISSED;
-	return full_path_from_subpaths(c, s, 0, k, y) ? PROPOSAL_MADE : PROPOSAL_DARK;
+	return full_path_from_subpaths(c, s, 0, k, y) ? PROPOSAL_MADE : PROPOSAL_BLACK;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
+static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct proposal_move *move,
 			 enum mutation_direction direction)
 {
 	(void)move, (void)direction;
 	unsigned k = into->edges;
 	double log_pdf[FULL_PATH_VERTICES_MAX];
-	const bool opaque = m->path->opaque_joints;
+	const bool opaque = m->path->joints_are_opaque;
 	/* propose() draws the length first; a joint that passes surfaces would change it. */
-	m->path->opaque_joints = true;
+	m->path->joints_are_opaque = true;
 	full_path_log_technique_pdfs(m->path, into, log_pdf);
-	m->path->opaque_joints = opaque;
+	m->path->joints_are_opaque = opaque;
 	double log_t = log_edge_count_probability(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
 	return full_path_log_f(m->path, into) - log_t;
 }
@@ -69,7 +69,7 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 const struct mutation_ops mutation_independent = {
 	.name = "independent",
 	.summary = "a new path by one bidirectional technique",
-	.independent = true,
+	.is_independent = true,
 	.propose = propose,
 	.log_weight = log_weight,
 };

@@ -8,7 +8,7 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 {
 	(void)c;
 	for (unsigned i = 0; i < b; i++)
-		weight[i] = i > 0 && x->v[i].delta ? 0 : 1;
+		weight[i] = i > 0 && x->v[i].is_delta ? 0 : 1;
 }
 
 static const struct heuristic uniform_c = {NULL, weigh_c};
@@ -16,7 +16,7 @@ static const struct strategy strategy = {&uniform_c, STRATEGY_CAMERA, STRATEGY_D
 
 static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				    const struct mutation_forced_choice *forced, struct full_path *x,
-				    struct full_path *y, struct move *move)
+				    struct full_path *y, struct proposal_move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return PROPOSAL_INAPPLICABLE;

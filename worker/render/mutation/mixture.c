@@ -35,7 +35,7 @@ static bool parse_forced(const char *text, size_t length, struct mutation_forced
 static int unknown_name_error(const char *text, size_t length, struct error *e)
 {
 	char name[64], hint[128], names[256] = "";
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	snprintf(name, sizeof name, "%.*s", (int)(length < sizeof name ? length : sizeof name - 1), text);
 	for (size_t i = 0; mutation_registry[i]; i++) {
 		spelling_offer(&s, mutation_registry[i]->name);
@@ -75,7 +75,7 @@ static void update_totals(struct mixture *m)
 	m->independent_index = m->count;
 	for (unsigned i = m->count; i-- > 0;) {
 		m->total_weight += m->entries[i].weight;
-		if (m->entries[i].ops->independent)
+		if (m->entries[i].ops->is_independent)
 			m->independent_index = i;
 	}
 }

@@ -24,17 +24,17 @@ struct mutation_forced_choice {
 	int b, c; /* -1: chosen at random */
 };
 
-enum mutation_direction { X_TO_Y, Y_TO_X };
+enum mutation_direction { MUTATION_FORWARD, MUTATION_REVERSE };
 
 /* What a proposal did, for the densities in both directions. */
-struct move {
+struct proposal_move {
 	/* The vertices of y that may differ from x; all of them if the numbers of edges differ. */
 	unsigned first, last;
 	/* The breakup: x_k .. x_b is traced, x_b .. x_c moved by half vectors, x_c .. x_0 unchanged. */
 	unsigned b, c;
 	/* Densities of the choices that depend on the state: P(b) P(c), steps, end points. */
 	double log_density[2];
-	/* Logarithms of |det d x_{b-1} / d x_c|, X_TO_Y at y and Y_TO_X at x; 0 if b - c < 2. */
+	/* Logarithms of |det d x_{b-1} / d x_c|, MUTATION_FORWARD at y and MUTATION_REVERSE at x; 0 if b - c < 2. */
 	double log_transfer[2];
 	/* Density of the choices that have the same density in both directions: film point and half vectors of the
 	 * traced part. Not part of the weights. */
@@ -65,13 +65,13 @@ enum proposal_result {
 	PROPOSAL_OUTSIDE,
 	PROPOSAL_MISSED,
 	PROPOSAL_BLOCKED,
-	PROPOSAL_MODE,
+	PROPOSAL_MODE_CHANGED,
 	PROPOSAL_SINGULAR,
 	PROPOSAL_DIVERGED,
-	PROPOSAL_ITERATIONS,
-	PROPOSAL_REVERSE,
+	PROPOSAL_ITERATION_LIMIT,
+	PROPOSAL_IRREVERSIBLE,
 	PROPOSAL_EMITTER,
-	PROPOSAL_DARK,
+	PROPOSAL_BLACK,
 	PROPOSAL_INAPPLICABLE,
 };
 /* Returns the counter of a reason. */
@@ -79,7 +79,7 @@ enum strategy_counter proposal_counter(enum proposal_result reason);
 
 struct mutation_ops {
 	const char *name, *summary;
-	bool independent;		 /* proposals are independent of x and also estimate b by f / T */
+	bool is_independent;		 /* proposals are independent of x and also estimate b by f / T */
 	const struct strategy *strategy; /* for breakups (strategy.h) */
 	/* Returns the weight in the default mixture of a scene with these effects; 0: not part of it.
 	 * NULL: in no default mixture. */
@@ -88,9 +88,10 @@ struct mutation_ops {
 	 * and y's vertices first..last are undefined. */
 	enum proposal_result (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
 					const struct mutation_forced_choice *forced, struct full_path *x,
-					struct full_path *y, struct move *move);
-	/* Returns the logarithm of the weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
-	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
+					struct full_path *y, struct proposal_move *move);
+	/* Returns the logarithm of the weight of y for MUTATION_FORWARD, of x for MUTATION_REVERSE. -INFINITY: black.
+	 */
+	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct proposal_move *move,
 			     enum mutation_direction direction);
 };
 
@@ -105,7 +106,7 @@ enum mutation_block {
 	BLOCK_ENDS,   /* wavelength, aperture, emitter */
 	BLOCK_VERTEX, /* BLOCK_VERTEX + j: the step of vertex j */
 };
-void mutation_random(const struct mutation_ctx *m, unsigned block, double out[4]);
+void mutation_draw_uniforms(const struct mutation_ctx *m, unsigned block, double out[4]);
 /* Makes a symmetric step of two numbers in [0,1), from the random numbers r in [0,1). Returns false if
  * it leaves the unit square. */
 bool mutation_step_in_square(double u[2], const double r[2], double size);

@@ -15,7 +15,7 @@ static void weigh_b(const struct path_context *c, const struct full_path *x, dou
 	unsigned k = x->edges;
 	weight[0] = path_can_be_hit(c, &x->v[0]) ? TRACE_ONLY_WEIGHT : 0;
 	for (unsigned i = 1; i < k; i++)
-		weight[i] = x->v[i].delta || (i > 1 && x->v[i - 1].delta) ? 0 : 1;
+		weight[i] = x->v[i].is_delta || (i > 1 && x->v[i - 1].is_delta) ? 0 : 1;
 	weight[k] = 0;
 }
 

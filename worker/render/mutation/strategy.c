@@ -54,7 +54,7 @@ static bool choose_breakup(const struct strategy *s, const struct choice *choice
 {
 	double *weight = m->scratch.weight, r[4];
 	unsigned k = x->edges;
-	mutation_random(m, BLOCK_BREAKUP, r);
+	mutation_draw_uniforms(m, BLOCK_BREAKUP, r);
 	if (choice->b == STRATEGY_DRAWN) {
 		weigh_b(s, choice, m, x, weight);
 		out->b = heuristic_choose(weight, k + 1, r[0]);
@@ -80,7 +80,7 @@ static bool choose_breakup(const struct strategy *s, const struct choice *choice
 
 enum proposal_result strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				      const struct mutation_forced_choice *forced, struct full_path *x,
-				      struct full_path *y, struct move *move)
+				      struct full_path *y, struct proposal_move *move)
 {
 	const struct strategy *s = self->strategy;
 	struct choice choice = {forced->b >= 0 ? forced->b : s->b, forced->c >= 0 ? forced->c : s->c};
@@ -98,6 +98,6 @@ enum proposal_result strategy_propose(const struct mutation_ops *self, struct mu
 	if (result)
 		return result;
 	double log_reverse_choice = log_choice(s, &choice, m, y, breakup.b, breakup.c);
-	move->log_density[Y_TO_X] += log_reverse_choice;
-	return log_reverse_choice > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE;
+	move->log_density[MUTATION_REVERSE] += log_reverse_choice;
+	return log_reverse_choice > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE_CHANGED;
 }

@@ -18,6 +18,6 @@ struct strategy {
 /* Proposes a breakup by self's strategy; `forced` takes precedence. */
 enum proposal_result strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				      const struct mutation_forced_choice *forced, struct full_path *x,
-				      struct full_path *y, struct move *move);
+				      struct full_path *y, struct proposal_move *move);
 
 #endif

@@ -6,7 +6,7 @@
  *
  * Failures: the proposal is rejected with its reason if the new point is outside the film or the aperture
  * (PROPOSAL_OUTSIDE), a ray meets nothing or a vertex of another kind (PROPOSAL_MISSED), a vertex cannot scatter like
- * the old one (PROPOSAL_MODE), or the last one emits no light (PROPOSAL_EMITTER).
+ * the old one (PROPOSAL_MODE_CHANGED), or the last one emits no light (PROPOSAL_EMITTER).
  */
 #include "worker/render/mutation/trace.h"
 
@@ -25,9 +25,9 @@
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y)
 {
 	struct camera storage;
-	const struct camera *camera = world_camera(m->path->w, &x->v[x->edges].x, &storage);
+	const struct camera *camera = world_camera_at(m->path->w, &x->v[x->edges].x, &storage);
 	double u[2], r[4];
-	mutation_random(m, BLOCK_ENDS, r);
+	mutation_draw_uniforms(m, BLOCK_ENDS, r);
 	camera_point_inverse(camera, x->v[x->edges].x.p, u);
 	if (!mutation_step_in_square(u, r + 1, APERTURE_STEP))
 		return false;
@@ -35,10 +35,11 @@ bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, stru
 	return true;
 }
 
-static bool move_film_point(struct mutation_ctx *m, const struct full_path *x, struct full_path *y, struct move *move)
+static bool move_film_point(struct mutation_ctx *m, const struct full_path *x, struct full_path *y,
+			    struct proposal_move *move)
 {
 	double r[4], g[2], sigma = halfvec_film_sigma(&m->path->w->camera);
-	mutation_random(m, BLOCK_FILM, r);
+	mutation_draw_uniforms(m, BLOCK_FILM, r);
 	mutation_normals_from_uniform(r, g);
 	for (int i = 0; i < 2; i++)
 		y->film[i] = x->film[i] + sigma * g[i];
@@ -89,10 +90,10 @@ static bool direction_of_halfvec(vec3 o, vec2 h, bool transmit, double eta, vec3
 /* Returns the direction in which the path leaves an event: the old direction, turned with the one from which the path
  * comes, plus a symmetric step. */
 static vec3 perturb_direction_in_medium(struct mutation_ctx *m, unsigned j, const struct full_path *x,
-					const struct full_path *y, struct move *move)
+					const struct full_path *y, struct proposal_move *move)
 {
 	double r[4], g[2];
-	mutation_random(m, BLOCK_VERTEX + j, r);
+	mutation_draw_uniforms(m, BLOCK_VERTEX + j, r);
 	mutation_normals_from_uniform(r, g);
 	struct frame from = frame_around(x->edge[j].w), to = frame_around(y->edge[j].w);
 	vec3 i = frame_to_world(&to, frame_to_local(&from, vec3_neg(x->edge[j - 1].w)));
@@ -105,7 +106,7 @@ static vec3 perturb_direction_in_medium(struct mutation_ctx *m, unsigned j, cons
 
 /* Computes the direction *d in which the path continues from y_j. Returns false if it cannot scatter like x_j. */
 static bool perturb_direction(struct mutation_ctx *m, unsigned j, const struct full_path *x, struct full_path *y,
-			      struct move *move, vec3 *d)
+			      struct proposal_move *move, vec3 *d)
 {
 	const struct path_vertex *from = &x->v[j];
 	struct path_vertex *v = &y->v[j];
@@ -115,16 +116,16 @@ static bool perturb_direction(struct mutation_ctx *m, unsigned j, const struct f
 	}
 	vec3 o = frame_to_local(&v->x.sh, y->edge[j].w), i;
 	v->mode = from->mode;
-	v->delta = from->delta;
-	if (from->delta) {
-		double chance;
-		if (!v->bsdf->has_delta || spectrum_is_zero(full_path_specular_weight(y, j, &i, &chance)))
+	v->is_delta = from->is_delta;
+	if (from->is_delta) {
+		double probability;
+		if (!v->bsdf->has_delta || spectrum_is_zero(full_path_specular_weight(y, j, &i, &probability)))
 			return false;
 	} else {
 		if (!v->bsdf->has_smooth || !(v->bsdf->modes & v->mode))
 			return false;
 		double r[4], g[2], sigma = HALFVEC_STEP * 0.5 * (halfvec_lobe_width(from) + halfvec_lobe_width(v));
-		mutation_random(m, BLOCK_VERTEX + j, r);
+		mutation_draw_uniforms(m, BLOCK_VERTEX + j, r);
 		mutation_normals_from_uniform(r, g);
 		vec2 h = halfvec_of(x, j);
 		rotate_half_vector(from, v, &h);
@@ -140,10 +141,10 @@ static bool perturb_direction(struct mutation_ctx *m, unsigned j, const struct f
 /* Makes y_b the end of the traced part. */
 static enum proposal_result finish_trace(struct path_context *c, unsigned b, struct path_vertex *v)
 {
-	v->delta = false;
+	v->is_delta = false;
 	v->mode = 0;
 	if (b > 0)
-		return v->kind != VERTEX_INFINITE && path_scatters_smoothly(v) ? PROPOSAL_MADE : PROPOSAL_MODE;
+		return v->kind != VERTEX_INFINITE && path_scatters_smoothly(v) ? PROPOSAL_MADE : PROPOSAL_MODE_CHANGED;
 	if (v->emitter < 0)
 		return PROPOSAL_EMITTER;
 	if (v->kind == VERTEX_SURFACE)
@@ -153,10 +154,10 @@ static enum proposal_result finish_trace(struct path_context *c, unsigned b, str
 
 /* Goes to an event in a medium at about the distance of x's event. */
 static bool move_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_min, double t_max,
-			  const struct full_path *x, struct full_path *y, struct move *move)
+			  const struct full_path *x, struct full_path *y, struct proposal_move *move)
 {
 	double r[4], g[2];
-	mutation_random(m, BLOCK_VERTEX + j, r);
+	mutation_draw_uniforms(m, BLOCK_VERTEX + j, r);
 	mutation_normals_from_uniform(r + 2, g);
 	move->log_symmetric -= 0.5 * g[0] * g[0] + 0.5 * log(2 * M_PI * DISTANCE_STEP * DISTANCE_STEP);
 	double distance = sqrt(x->edge[j - 1].distance2) * exp(DISTANCE_STEP * g[0]);
@@ -169,14 +170,14 @@ static bool move_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_m
 
 /* Goes from y_j along d to y_{j-1}, which is of the same kind as x_{j-1}, except at the end of the traced part. */
 static bool trace_edge(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_path *x, struct full_path *y,
-		       struct move *move)
+		       struct proposal_move *move)
 {
 	struct path_context *c = m->path;
 	struct path_vertex *to = &y->v[j - 1];
 	double t_min = 0, t_max = INFINITY;
 	struct camera storage;
 	if (j == x->edges)
-		camera_clip_range(world_camera(c->w, &y->v[j].x, &storage), d, &t_min, &t_max);
+		camera_clip_range(world_camera_at(c->w, &y->v[j].x, &storage), d, &t_min, &t_max);
 	if (!EFFECT_IS_ON(c->w, scattering))
 		return path_extend(c, &y->v[j], d, t_min, t_max, to) && full_path_compute_edge(y, j - 1);
 	if (x->v[j - 1].kind == VERTEX_MEDIUM)
@@ -187,7 +188,7 @@ static bool trace_edge(struct mutation_ctx *m, unsigned j, vec3 d, const struct 
 }
 
 enum proposal_result trace_multichain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
-				      struct full_path *y, struct move *move)
+				      struct full_path *y, struct proposal_move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges;
@@ -196,15 +197,15 @@ enum proposal_result trace_multichain(struct mutation_ctx *m, unsigned b, bool a
 	if (!move_film_point(m, x, y, move))
 		return PROPOSAL_OUTSIDE;
 	struct camera storage;
-	vec3 d = camera_direction(world_camera(c->w, &y->v[k].x, &storage), y->v[k].x.p, y->film[0], y->film[1]);
+	vec3 d = camera_direction(world_camera_at(c->w, &y->v[k].x, &storage), y->v[k].x.p, y->film[0], y->film[1]);
 	for (unsigned j = k; j > b; j--) {
 		if (j < k && !perturb_direction(m, j, x, y, move, &d))
-			return PROPOSAL_MODE;
+			return PROPOSAL_MODE_CHANGED;
 		move->first = j - 1;
 		if (!trace_edge(m, j, d, x, y, move) || (j - 1 > b && y->v[j - 1].kind != x->v[j - 1].kind))
 			return PROPOSAL_MISSED;
 		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
-			return PROPOSAL_MODE;
+			return PROPOSAL_MODE_CHANGED;
 	}
 	return finish_trace(c, b, &y->v[b]);
 }

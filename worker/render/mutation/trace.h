@@ -13,7 +13,7 @@
  * of the vertices k-1 .. b+1 are x's; x_b (b > 0) can scatter in many directions, x_0 (b = 0) is an emitter. Sets
  * move->first and move->log_symmetric. */
 enum proposal_result trace_multichain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
-				      struct full_path *y, struct move *move);
+				      struct full_path *y, struct proposal_move *move);
 
 /* Makes a symmetric step of x_k on the aperture. Returns false if it leaves the aperture. */
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y);

@@ -12,14 +12,14 @@ static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 
 static bool must_move_vertices(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].delta && x->v[j].bsdf->is_dispersive)
+		if (x->v[j].is_delta && x->v[j].bsdf->is_dispersive)
 			return true;
 	return false;
 }
 
 static enum proposal_result propose(const struct mutation_ops *self, struct mutation_ctx *m,
 				    const struct mutation_forced_choice *forced, struct full_path *x,
-				    struct full_path *y, struct move *move)
+				    struct full_path *y, struct proposal_move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, colour))
 		return PROPOSAL_INAPPLICABLE;

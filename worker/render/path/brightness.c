@@ -100,7 +100,7 @@ void brightness_add_sample(struct brightness *b, const struct path_sample *sampl
 	brightness_end_sample(b);
 }
 
-double brightness_scale(const struct brightness *b, double x, double y)
+double brightness_inverse_at(const struct brightness *b, double x, double y)
 {
 	return b->scale[cell_at(b, x, y)];
 }
@@ -194,7 +194,7 @@ static struct block block_around(const struct brightness *b, uint32_t x, uint32_
 			      y + radius < b->resolution ? y + radius + 1 : b->resolution};
 }
 
-void brightness_compute_neighbourhood_scales(struct brightness *b, uint64_t samples)
+void brightness_compute_nearby_scales(struct brightness *b, uint64_t samples)
 {
 	const double total = block_sums(b, (struct block){0, 0, b->resolution, b->resolution}).sum;
 	for (uint32_t y = 0; y < b->resolution && total > 0; y++)

@@ -41,13 +41,13 @@ void brightness_add(struct brightness *b, const struct splat *s, double weight);
 void brightness_end_sample(struct brightness *b);
 /* Adds all splats of a sample and ends it. */
 void brightness_add_sample(struct brightness *b, const struct path_sample *sample);
-/* Computes the scales; call either this or brightness_compute_neighbourhood_scales when all samples have been added. */
+/* Computes the scales; call either this or brightness_compute_nearby_scales when all samples have been added. */
 void brightness_compute_scales(struct brightness *b, uint64_t samples);
 /* For samples whose fireflies are spread by chains: a cell gets the mean of its neighbourhood, which is wider where
  * less is known. Unlike squares of the whole film, this keeps dark places next to bright ones apart. */
-void brightness_compute_neighbourhood_scales(struct brightness *b, uint64_t samples);
+void brightness_compute_nearby_scales(struct brightness *b, uint64_t samples);
 /* Returns 1 / (pixels of the window x X+Y+Z of a pixel at this place), which makes a contribution relative to the
  * brightness of its place. 0 if everything is black. */
-double brightness_scale(const struct brightness *b, double x, double y);
+double brightness_inverse_at(const struct brightness *b, double x, double y);
 
 #endif

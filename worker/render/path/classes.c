@@ -12,7 +12,7 @@ unsigned full_path_class(const struct full_path *x)
 {
 	enum path_class_kind kind = PATH_NO_VERTEX;
 	for (unsigned j = x->edges - 1; j > 0; j--)
-		kind = path_class_kind_next(kind, x->v[j].delta || is_smooth(&x->v[j]));
+		kind = path_class_kind_next(kind, x->v[j].is_delta || is_smooth(&x->v[j]));
 	return path_class(x->edges, kind);
 }
 
@@ -34,7 +34,7 @@ void path_classes_begin(struct path_classes *k, const struct path_context *c, un
 			break;
 		bool smooth = is_smooth(v);
 		k->camera_kind[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);
-		kind = path_class_kind_next(kind, v->delta || smooth);
+		kind = path_class_kind_next(kind, v->is_delta || smooth);
 	}
 	k->emitter_kind[camera + 1] = (unsigned char)kind;
 	kind = PATH_NO_VERTEX;
@@ -42,6 +42,6 @@ void path_classes_begin(struct path_classes *k, const struct path_context *c, un
 		const struct path_vertex *v = &c->light[i];
 		bool smooth = is_smooth(v);
 		k->light_kind[i + 1] = (unsigned char)path_class_kind_join(smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
-		kind = path_class_kind_join(v->delta || smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
+		kind = path_class_kind_join(v->is_delta || smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
 	}
 }

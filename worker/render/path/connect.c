@@ -31,15 +31,15 @@
  * of their sub-path does not apply there. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
-	if (i + 1 == p->s || i == p->s + p->passed_count || i == 0 || i == p->edges)
+	if (i + 1 == p->light_count || i == p->light_count + p->passed_count || i == 0 || i == p->edges)
 		return false;
-	return p->v[i]->delta;
+	return p->v[i]->is_delta;
 }
 
 /* Whether the joint that made the path is refracted. */
 static bool is_refracted(const struct joined_path *p)
 {
-	return p->passed_count > 0 && path_vertex_is_refracting(p->v[p->s]);
+	return p->passed_count > 0 && path_vertex_is_refracting(p->v[p->light_count]);
 }
 
 /* Whether points of emitters are joined straight to the lens for this pair. Where they are hardly denser than the
@@ -49,7 +49,8 @@ static bool can_join_lens(const struct path_context *c, const struct path_vertex
 {
 	if (!c->joins_emitters_to_lens || emitter->kind == VERTEX_INFINITE)
 		return false;
-	double film = path_pdf(c, NULL, eye, emitter, TRANSPORT_RADIANCE) * (c->light_every > 1 ? c->light_every : 1);
+	double film = path_pdf(c, NULL, eye, emitter, TRANSPORT_RADIANCE) *
+		      (c->light_subpath_interval > 1 ? c->light_subpath_interval : 1);
 	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSITY_RATIO * film;
 }
 
@@ -67,7 +68,7 @@ FORCE_INLINE unsigned first_not_passed(const struct path_context *c, const struc
 static bool can_join_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
 	unsigned end = first_not_passed(c, p, j, false);
-	if (end - j > PATH_PASSED_MAX)
+	if (end - j > PATH_PASSED_VERTICES_MAX)
 		return false;
 	return j == 1 && end == p->edges ? can_join_lens(c, p->v[end], p->v[0]) : !is_delta(p, end);
 }
@@ -94,8 +95,10 @@ struct joined_edge {
 
 static struct joined_edge joined_edge_at(const struct joined_path *p, unsigned i)
 {
-	const struct path_edge *e = i == p->s ? p->joint : i < p->s ? &p->v[i]->edge : &p->v[i - 1]->edge;
-	bool from_light = i < p->s;
+	const struct path_edge *e = i == p->light_count	 ? p->joint_vertices
+				    : i < p->light_count ? &p->v[i]->edge
+							 : &p->v[i - 1]->edge;
+	bool from_light = i < p->light_count;
 	return (struct joined_edge){e, from_light ? e->previous_medium : e->medium,
 				    from_light ? e->medium : e->previous_medium};
 }
@@ -115,7 +118,7 @@ FORCE_INLINE double edge_pdf(const struct path_context *c, const struct joined_p
 FORCE_INLINE double pdf_from_light(const struct path_context *c, const struct joined_path *p, unsigned i,
 				   const bool without_effects)
 {
-	unsigned s = p->s, passed = without_effects ? 0 : p->passed_count;
+	unsigned s = p->light_count, passed = without_effects ? 0 : p->passed_count;
 	if (i == 0)
 		return path_pdf_emitter(c, p->v[0]);
 	if (i >= s + passed + 2)
@@ -132,7 +135,7 @@ FORCE_INLINE double pdf_from_light(const struct path_context *c, const struct jo
 FORCE_INLINE double pdf_from_camera(const struct path_context *c, const struct joined_path *p, unsigned i,
 				    const bool without_effects)
 {
-	unsigned s = p->s, k = p->edges;
+	unsigned s = p->light_count, k = p->edges;
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
 	if (!without_effects && i + 1 == s && p->passed_count)
@@ -148,7 +151,7 @@ FORCE_INLINE double pdf_from_camera(const struct path_context *c, const struct j
 FORCE_INLINE double joint_over_drawn_ratio(const struct path_context *c, const struct joined_path *p, unsigned first,
 					   unsigned end, const bool without_effects)
 {
-	double pdf[PATH_PASSED_MAX];
+	double pdf[PATH_PASSED_VERTICES_MAX];
 	if (without_effects || !path_allows_see_through(c) || first == end)
 		return 1;
 	for (unsigned i = first; i < end; i++)
@@ -161,13 +164,14 @@ FORCE_INLINE double joint_over_drawn_ratio(const struct path_context *c, const s
 FORCE_INLINE double drawn_over_joint_ratio(const struct path_context *c, const struct joined_path *p, bool from_light,
 					   const bool without_effects)
 {
-	double pdf[PATH_PASSED_MAX];
+	double pdf[PATH_PASSED_VERTICES_MAX];
 	if (without_effects || !p->passed_count)
 		return 1;
 	for (unsigned i = 0; i < p->passed_count; i++)
-		pdf[i] = from_light ? pdf_from_light(c, p, p->s + i, false) : p->v[p->s + i]->pdf;
-	return 1 / (is_refracted(p) ? path_refracted_ratio(p->v, p->passed_count, p->log_transfer, pdf)
-				    : path_passed_ratio(p->v, p->s, p->s + p->passed_count - 1, pdf));
+		pdf[i] = from_light ? pdf_from_light(c, p, p->light_count + i, false) : p->v[p->light_count + i]->pdf;
+	return 1 / (is_refracted(p)
+			    ? path_refracted_ratio(p->v, p->passed_count, p->log_transfer, pdf)
+			    : path_passed_ratio(p->v, p->light_count, p->light_count + p->passed_count - 1, pdf));
 }
 
 /* How technique 1 makes the path if its joint is refracted. */
@@ -201,7 +205,7 @@ FORCE_INLINE void technique_ratios(struct path_context *c, const struct joined_p
 				   const bool without_effects)
 {
 	const bool sees_through = !without_effects && path_allows_see_through(c);
-	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k,
+	unsigned s = p->light_count, k = p->edges, last = max_s < k ? max_s : k,
 		 joint_end = without_effects ? s : s + p->passed_count;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
@@ -270,7 +274,7 @@ static __attribute__((noinline)) void ratios_with_effects(struct path_context *c
 
 void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
-	if (EFFECT_IS_ON(c->w, joints))
+	if (EFFECT_IS_ON(c->w, has_joint_effects))
 		ratios_with_effects(c, p, max_s, ratio);
 	else
 		ratios_without_effects(c, p, max_s, ratio);
@@ -287,19 +291,20 @@ FORCE_INLINE double balance_weight(struct path_context *c, const struct joined_p
 	else
 		ratios_with_effects(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
-		sum += j >= first_with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
+		sum += j >= first_with_light && c->light_subpath_interval > 1 ? ratio[j] / c->light_subpath_interval
+									      : ratio[j];
 	return 1 / sum;
 }
 
 double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s)
 {
-	return balance_weight(c, p, max_s, !EFFECT_IS_ON(c->w, joints));
+	return balance_weight(c, p, max_s, !EFFECT_IS_ON(c->w, has_joint_effects));
 }
 
 static void assemble_path(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
 			  struct joined_path *p)
 {
-	p->s = s;
+	p->light_count = s;
 	p->passed_count = c->passed_count;
 	p->log_transfer = c->log_transfer;
 	p->edges = s + t - 1 + p->passed_count;
@@ -322,7 +327,7 @@ static bool is_dispersed(const struct path_context *c, const struct joined_path 
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
-	bool dispersed = c->dispersed;
+	bool dispersed = c->is_dispersed;
 	for (unsigned i = 1; i < p->edges && !dispersed; i++)
 		dispersed = path_vertex_disperses(p->v[i]);
 	return dispersed;
@@ -331,14 +336,14 @@ static bool is_dispersed(const struct path_context *c, const struct joined_path 
 /* Whether the edge lies in the medium that a sub-path from the light (or the camera) expects at its start. */
 static bool edge_is_in(const struct joined_edge *e, uint32_t medium, bool from_light)
 {
-	return e->edge->media_match && medium == (from_light ? e->light_medium : e->camera_medium);
+	return e->edge->has_matching_media && medium == (from_light ? e->light_medium : e->camera_medium);
 }
 
 /* Whether a sub-path from the camera would be in the same media along the edges that the light's sub-path made. */
 static bool camera_media_agree(const struct path_context *c, const struct joined_path *p)
 {
 	double unused;
-	for (unsigned i = p->s; i-- > 1;) {
+	for (unsigned i = p->light_count; i-- > 1;) {
 		struct joined_edge e = joined_edge_at(p, i), before = joined_edge_at(p, i + 1);
 		vec3 d = path_direction(p->v[i], p->v[i - 1], &unused);
 		if (!edge_is_in(&e, path_medium_after(c->w, p->v[i], before.light_medium, d), false))
@@ -368,7 +373,7 @@ static __attribute__((noinline)) spectrum weight_with_effects(struct path_contex
 {
 	if (EFFECT_IS_ON(c->w, scattering)) {
 		p->mismatched_edge = path_find_mismatched_edge(c, p);
-		if (!technique_exists(c, p, p->s, false) || !camera_media_agree(c, p))
+		if (!technique_exists(c, p, p->light_count, false) || !camera_media_agree(c, p))
 			return spectrum_constant(0);
 	}
 	return path_collapse_to_hero(spectrum_scale(balance_weight(c, p, max_s, false), l), is_dispersed(c, p));
@@ -380,9 +385,9 @@ static spectrum weight_contribution(struct path_context *c, const struct path_ve
 {
 	struct joined_path p;
 	assemble_path(c, light, s, t, &p);
-	p.joint = joint;
+	p.joint_vertices = joint;
 	p.mismatched_edge = 0;
-	if (EFFECT_IS_ON(c->w, joints))
+	if (EFFECT_IS_ON(c->w, has_joint_effects))
 		return weight_with_effects(c, &p, max_s, l);
 	return spectrum_scale(balance_weight(c, &p, max_s, true), l);
 }
@@ -470,7 +475,7 @@ static __attribute__((noinline)) spectrum visible_part_with_effects(struct path_
 static inline spectrum visible_part(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t,
 				    vec3 to_light, spectrum l, spectrum direct, struct path_edge *joint)
 {
-	if (EFFECT_IS_ON(c->w, joints))
+	if (EFFECT_IS_ON(c->w, has_joint_effects))
 		return visible_part_with_effects(c, y, s, t, to_light, l, direct, joint);
 	bool is_open = s + t > c->min_depth && !spectrum_is_zero(l) && path_is_visible(c, &c->camera[t - 1], y);
 	return is_open ? l : spectrum_constant(0);
@@ -501,7 +506,7 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex y;
 	double pdf, distance2;
-	if (!path_scatters_smoothly(z) || !path_draw_next_event(c, z, &y, &pdf))
+	if (!path_scatters_smoothly(z) || !path_sample_next_event(c, z, &y, &pdf))
 		return spectrum_constant(0);
 	vec3 to_light = path_direction(z, &y, &distance2);
 	if (!(distance2 > 0))
@@ -524,7 +529,7 @@ static bool project_on_film(const struct path_context *c, const struct path_vert
 	const struct path_vertex *eye = &c->camera[0];
 	double distance2;
 	struct camera storage;
-	const struct camera *camera = world_camera(c->w, &eye->x, &storage);
+	const struct camera *camera = world_camera_at(c->w, &eye->x, &storage);
 	*d = path_direction(eye, y, &distance2);
 	if (!(distance2 > 0) || !camera_project(camera, eye->x.p, *d, sqrt(distance2), &film[0], &film[1]))
 		return false;
@@ -561,7 +566,7 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	struct path_vertex y;
 	double pdf, jac;
 	vec3 d;
-	if (!path_draw_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) ||
+	if (!path_sample_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) ||
 	    !can_join_lens(c, &c->camera[0], &y))
 		return spectrum_constant(0);
 	if (!project_on_film(c, &y, film, &d, &jac))
@@ -572,11 +577,12 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 
 /* Returns the factor by which a connection with contribution l counts: 1, or, if it is faint, 1 / q with probability q
  * and otherwise 0, which saves its rays. q should depend on the weight of the connection, but that is not known yet;
- * light_every / edges stands for it, as if all techniques had the same weight. So the contribution of a faint
- * connection that is made is at most `edges` times `faint_threshold`, whatever its weight turns out to be. */
+ * light_subpath_interval / edges stands for it, as if all techniques had the same weight. So the contribution of a
+ * faint connection that is made is at most `edges` times `faint_threshold`, whatever its weight turns out to be. */
 static double faint_connection_factor(struct path_context *c, unsigned edges, spectrum l)
 {
-	double estimate = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
+	double estimate =
+		spectrum_mean(l) * ((c->light_subpath_interval > 1 ? c->light_subpath_interval : 1) / (double)edges);
 	if (!isgreater(estimate, 0) || !isless(estimate, c->faint_threshold))
 		return 1;
 	double q = estimate / c->faint_threshold, start = c->faint_position;

@@ -17,14 +17,14 @@
 
 /* A path assembled from two sub-paths, ordered from the light to the camera. */
 struct joined_path {
-	unsigned edges, s;
+	unsigned edges, light_count;
 	/* x_s .. x_{s+passed-1} belong to neither sub-path: the joint passes them (transparent.h) or is refracted at
 	 * them (refracted.h), which needs s = 1. */
 	unsigned passed_count;
 	double log_transfer; /* log T of refracted.h, if the joint is refracted */
 	const struct path_vertex *v[PATH_EDGES_MAX + 2];
 	/* Set where media scatter; otherwise unused and 0. Edge i joins x_{i-1} and x_i. */
-	const struct path_edge *joint; /* edge s; its `before` is the medium at x_s */
+	const struct path_edge *joint_vertices; /* edge s; its `before` is the medium at x_s */
 	/* The first edge whose media a light sub-path would see differently; 0: none. */
 	unsigned mismatched_edge;
 };
@@ -67,7 +67,7 @@ static inline bool path_may_connect(const struct path_context *c, unsigned s, un
  * because the path scatters there. */
 static inline bool path_joint_passes(const struct joined_path *p, unsigned i)
 {
-	return i > 0 && i < p->edges && i + 1 != p->s && i != p->s + p->passed_count &&
+	return i > 0 && i < p->edges && i + 1 != p->light_count && i != p->light_count + p->passed_count &&
 	       path_vertex_is_see_through(p->v[i]);
 }
 

@@ -59,7 +59,7 @@ static double candidate_intensity(struct path_context *c, unsigned s, unsigned t
 	sample.intensity = 0;
 	spectrum l = path_connect(c, s, t, PATH_EDGES_MAX, film);
 	if (!spectrum_is_zero(l))
-		path_add_splat(c, &sample, 0, 0, l);
+		path_sample_add_splat(c, &sample, 0, 0, l);
 	return sample.intensity;
 }
 
@@ -92,9 +92,9 @@ static void gather_candidates(struct path_context *c, unsigned camera, unsigned 
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out)
 {
 	double film[2];
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	unsigned camera = path_walk_camera(c, s, n->max_camera, film), light = path_walk_light(c, s, n->max_light);
-	gather_candidates(c, camera, light, n->randomized, NULL, out);
+	gather_candidates(c, camera, light, n->is_randomized, NULL, out);
 }
 
 bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x)
@@ -116,7 +116,7 @@ static spectrum extend_throughput(const struct path_context *c, const struct ful
 	const struct path_vertex *v = &x->v[start];
 	const struct full_path_edge *g = &x->edge[e];
 	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
-	if (start > 0 && !v->delta && v->kind != VERTEX_MEDIUM)
+	if (start > 0 && !v->is_delta && v->kind != VERTEX_MEDIUM)
 		geometry *= full_path_cosine_to_light(x, start) / fabs(vec3_dot(v->x.ng, x->edge[start - 1].w));
 	spectrum throughput = spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
 	return EFFECT_IS_ON(c->w, scattering) ? spectrum_mul(throughput, g->transmittance) : throughput;
@@ -149,12 +149,12 @@ static void set_camera_subpath(struct path_context *c, struct sampler *s, struct
 	else if (EFFECT_IS_ON(c->w, absorption))
 		path_absorb(c, &v[0], vec3_neg(x->edge[k - 1].w), &v[1]);
 	for (unsigned i = 2; i < t; i++) {
-		v[i].beta = extend_throughput(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i,
+		v[i].beta = extend_throughput(c, x, v[i - 1].beta, full_path_eval_f(c, x, k - i + 1), k - i + 1, k - i,
 					      v[i].pdf);
 		if (EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering))
 			path_absorb(c, &v[i - 1], vec3_neg(x->edge[k - i].w), &v[i]);
 	}
-	v[t - 1].delta = false;
+	v[t - 1].is_delta = false;
 }
 
 /* Turns the edge of x_i, which refers to x_{i+1} in a whole path, into the one that comes from x_{i-1}. */
@@ -180,8 +180,9 @@ static void set_light_subpath(struct path_context *c, struct sampler *sampler, s
 	}
 	v[0].beta = spectrum_constant(1 / v[0].pdf);
 	for (unsigned i = 1; i < s; i++)
-		v[i].beta = extend_throughput(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
-	v[s - 1].delta = false;
+		v[i].beta =
+			extend_throughput(c, x, v[i - 1].beta, full_path_eval_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+	v[s - 1].is_delta = false;
 }
 
 /* A sampler whose first blocks are those of path x: the camera's has x's wavelength and point of the aperture, the
@@ -217,7 +218,7 @@ static unsigned walk_pinned_camera(struct path_context *c, struct sampler *s, co
 		.base = {pinned_block}, .inner = s, .wavelength_u = x->wavelength_u, .time = full_path_time(x)};
 	double film[2];
 	struct camera storage;
-	camera_point_inverse(world_camera(c->w, &x->v[x->edges].x, &storage), x->v[x->edges].x.p, pinned.aperture);
+	camera_point_inverse(world_camera_at(c->w, &x->v[x->edges].x, &storage), x->v[x->edges].x.p, pinned.aperture);
 	return path_walk_camera(c, &pinned.base, max_vertices, film);
 }
 
@@ -260,7 +261,7 @@ void ensemble_draw_containing(struct path_context *c, struct sampler *sampler, s
 		 passed = s > 0 ? full_path_joint_vertex_count(c, x, s) : 0, t = k + 1 - s - passed;
 	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, passed, k};
 	struct ensemble_lengths n = ensemble_draw_lengths(c, u + 1, t, s);
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	c->wl = x->wl;
 	c->time = full_path_time(x);
 	unsigned camera = t, light = s;

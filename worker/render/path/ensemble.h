@@ -29,7 +29,7 @@ struct ensemble {
 
 struct ensemble_lengths {
 	unsigned max_camera, max_light; /* maximum numbers of vertices of the sub-paths */
-	bool randomized;		/* the maxima were drawn at random; otherwise they are the depth limits */
+	bool is_randomized;		/* the maxima were drawn at random; otherwise they are the depth limits */
 };
 
 /* Draws maximum lengths from two numbers in [0,1); they are at least `camera` and `light`. */

@@ -36,7 +36,7 @@ static int take_out_exponent(spectrum *s)
 	return e;
 }
 
-void product_mul(struct product *p, spectrum f)
+void scaled_product_mul(struct scaled_product *p, spectrum f)
 {
 	p->exponent += take_out_exponent(&f);
 	p->v = spectrum_mul(p->v, f);
@@ -63,7 +63,8 @@ static void to_xyz(const struct path_context *c, const struct full_path *x, spec
 		spectrum_to_xyz(l, &x->wl, xyz);
 }
 
-double product_log_intensity(const struct path_context *c, const struct full_path *x, const struct product *p)
+double scaled_product_log_intensity(const struct path_context *c, const struct full_path *x,
+				    const struct scaled_product *p)
 {
 	double xyz[3];
 	to_xyz(c, x, p->v, xyz);
@@ -104,7 +105,7 @@ unsigned full_path_mode(const struct full_path *x, unsigned j)
 		return BSDF_REFLECT;
 	const struct surface_point *s = surface_facing(x, j, &turned);
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
-	if (x->v[j].delta && (x->v[j].mode & BSDF_STRAIGHT)) /* whatever the shading normal is */
+	if (x->v[j].is_delta && (x->v[j].mode & BSDF_STRAIGHT)) /* whatever the shading normal is */
 		return vec3_dot(s->ng, o) * vec3_dot(s->ng, i) < 0 ? BSDF_TRANSMIT : 0;
 	double no = vec3_dot(s->sh.n, o), ni = vec3_dot(s->sh.n, i);
 	if (!(no * vec3_dot(s->ng, o) > 0 && ni * vec3_dot(s->ng, i) > 0))
@@ -117,11 +118,11 @@ double full_path_eta(const struct full_path *x, unsigned j)
 	return path_eta(&x->v[j], &x->wl, x->edge[j].w);
 }
 
-spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *chance)
+spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *probability)
 {
 	const struct path_vertex *v = &x->v[j];
 	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
-	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
+	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, probability);
 }
 
 static spectrum eval_scattering(const struct path_context *c, const struct full_path *x, unsigned j, bool halfvec)
@@ -132,9 +133,9 @@ static spectrum eval_scattering(const struct path_context *c, const struct full_
 	if (!full_path_mode(x, j))
 		return spectrum_constant(0);
 	vec3 wi;
-	if (v->delta) {
-		double chance;
-		return full_path_specular_weight(x, j, &wi, &chance);
+	if (v->is_delta) {
+		double probability;
+		return full_path_specular_weight(x, j, &wi, &probability);
 	}
 	struct surface_point turned;
 	const struct surface_point *s = surface_facing(x, j, &turned);
@@ -146,7 +147,7 @@ static spectrum eval_scattering(const struct path_context *c, const struct full_
 	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
 }
 
-spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j)
+spectrum full_path_eval_f(const struct path_context *c, struct full_path *x, unsigned j)
 {
 	if (!vertex_set_has(&x->cached_f, j)) {
 		x->f[j] = j > 0 ? eval_scattering(c, x, j, false)
@@ -156,7 +157,7 @@ spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned
 	return x->f[j];
 }
 
-spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j)
+spectrum full_path_eval_fh(const struct path_context *c, struct full_path *x, unsigned j)
 {
 	if (!vertex_set_has(&x->cached_fh, j)) {
 		x->fh[j] = eval_scattering(c, x, j, true);
@@ -168,8 +169,8 @@ spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigne
 double full_path_specular_error(const struct full_path *x, unsigned j)
 {
 	vec3 wi;
-	double chance;
-	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &chance)))
+	double probability;
+	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &probability)))
 		return INFINITY;
 	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
@@ -205,7 +206,7 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path *x,
 {
 	x->wavelength_u = u;
 	x->cached_f = x->cached_fh = empty_vertex_set;
-	x->wl = world_wavelengths(c->w, u);
+	x->wl = world_sample_wavelengths(c->w, u);
 }
 
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last)
@@ -243,7 +244,7 @@ bool full_path_edge_is_visible(struct path_context *c, struct full_path *x, unsi
 	if (!path_is_visible_in_media(c, v + 1, v, &v->edge, &x->edge[e].transmittance))
 		return false;
 	uint32_t medium = v->edge.medium;
-	return v->kind != VERTEX_MEDIUM || (medium && path_medium(c->w, medium)->scatters);
+	return v->kind != VERTEX_MEDIUM || (medium && path_medium(c->w, medium)->is_scattering);
 }
 
 bool full_path_edges_are_visible(struct path_context *c, struct full_path *x)
@@ -259,7 +260,7 @@ bool full_path_project(const struct path_context *c, struct full_path *x)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	struct camera storage;
-	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &storage);
+	const struct camera *camera = world_camera_at(c->w, &x->v[x->edges].x, &storage);
 	vec3 d = vec3_neg(e->w);
 	double distance = sqrt(e->distance2);
 	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
@@ -273,13 +274,13 @@ bool full_path_project(const struct path_context *c, struct full_path *x)
 	return film_window_contains(&c->window, x->film);
 }
 
-/* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `delta` only if `keeps_mode`: the path leaves
+/* Copies a sub-path's vertex to vertex i of the path. Keeps `mode` and `is_delta` only if `keeps_mode`: the path leaves
  * the vertex in the way its sub-path did. */
 static void copy_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool keeps_mode)
 {
 	x->v[i] = *from;
 	if (!keeps_mode) {
-		x->v[i].delta = false;
+		x->v[i].is_delta = false;
 		x->v[i].mode = 0;
 	}
 }
@@ -324,7 +325,8 @@ bool full_path_can_join(const struct path_context *c, const struct full_path *x,
 	unsigned passed = full_path_passed_count(c, x, s), end = s + passed;
 	if (s == 1 && end == x->edges) /* only samples join emitters to the lens */
 		return false;
-	return passed <= PATH_PASSED_MAX && !(s > 1 && x->v[s - 1].delta) && !(end < x->edges && x->v[end].delta);
+	return passed <= PATH_PASSED_VERTICES_MAX && !(s > 1 && x->v[s - 1].is_delta) &&
+	       !(end < x->edges && x->v[end].is_delta);
 }
 
 bool full_path_can_be_made(const struct path_context *c, const struct full_path *x)
@@ -345,7 +347,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 			return false;
 	for (unsigned j = 1; j < x->edges; j++) {
 		unsigned mode = full_path_mode(x, j);
-		if (!x->v[j].delta)
+		if (!x->v[j].is_delta)
 			x->v[j].mode = mode;
 		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return false;
@@ -355,7 +357,7 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 	if (EFFECT_IS_ON(c->w, scattering) && !(full_path_edges_are_visible(c, x) && full_path_can_be_made(c, x)))
 		return false;
 	for (unsigned j = 0; j < x->edges; j++)
-		if (spectrum_is_zero(full_path_f(c, x, j)))
+		if (spectrum_is_zero(full_path_eval_f(c, x, j)))
 			return false;
 	return true;
 }
@@ -403,7 +405,7 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed
 			return false;
 		copy_emitter(x, z);
 	} else if (s == 1) {
-		if (!path_draw_next_event(c, z, &drawn, &pdf))
+		if (!path_sample_next_event(c, z, &drawn, &pdf))
 			return false;
 		copy_emitter(x, &drawn);
 	} else {
@@ -421,26 +423,26 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed
 	       (s == 0 || EFFECT_IS_ON(c->w, scattering) || joint_is_visible(c, x, s, passed));
 }
 
-void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p)
+void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct scaled_product *p)
 {
 	if (EFFECT_IS_ON(w, scattering)) {
 		for (unsigned e = 0; e < x->edges; e++)
-			product_mul(p, x->edge[e].transmittance);
+			scaled_product_mul(p, x->edge[e].transmittance);
 		return;
 	}
 	uint32_t medium = w->camera_medium;
 	for (unsigned e = x->edges; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
 		if (medium)
-			product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));
+			scaled_product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));
 	}
 }
 
 void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3])
 {
-	struct product p = PRODUCT_ONE;
+	struct scaled_product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
-		product_mul(&p, vertex_set_has(&x->cached_fh, j) ? x->fh[j] : full_path_f(c, x, j));
+		scaled_product_mul(&p, vertex_set_has(&x->cached_fh, j) ? x->fh[j] : full_path_eval_f(c, x, j));
 	full_path_attenuate(c->w, x, &p);
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];

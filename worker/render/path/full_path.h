@@ -49,20 +49,21 @@ struct full_path {
 	double film[2];
 	struct path_vertex v[FULL_PATH_VERTICES_MAX];
 	struct full_path_edge edge[FULL_PATH_EDGES_MAX];
-	/* Caches for each vertex: read them through full_path_f and full_path_fh. */
+	/* Caches for each vertex: read them through full_path_eval_f and full_path_eval_fh. */
 	struct vertex_set cached_f, cached_fh;
 	spectrum f[FULL_PATH_VERTICES_MAX], fh[FULL_PATH_VERTICES_MAX];
 };
 
 /* A product that neither over- nor underflows: its value is v 2^exponent. */
-struct product {
+struct scaled_product {
 	spectrum v;
 	int exponent;
 };
-#define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
-void product_mul(struct product *p, spectrum f);
+#define PRODUCT_ONE ((struct scaled_product){{{1, 1, 1, 1}}, 0})
+void scaled_product_mul(struct scaled_product *p, spectrum f);
 /* Returns log(X + Y + Z) of the film's response to the product; -INFINITY for black. */
-double product_log_intensity(const struct path_context *c, const struct full_path *x, const struct product *p);
+double scaled_product_log_intensity(const struct path_context *c, const struct full_path *x,
+				    const struct scaled_product *p);
 
 /* The time of the whole path: see struct prim_ref. */
 static inline double full_path_time(const struct full_path *x)
@@ -89,10 +90,10 @@ double full_path_eta(const struct full_path *x, unsigned j);
 
 /* Returns the scattering factor of v[j]. For v[0] this is L_e towards v[1]; for inner vertices f_radiance(o, i) without
  * cosine, or the weight of the lobe if specular. Computed on first use. */
-spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j);
-/* Like full_path_f for inner vertices, but in half vector space: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the
- * weight of the lobe if specular; 0 where full_path_is_turned. */
-spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j);
+spectrum full_path_eval_f(const struct path_context *c, struct full_path *x, unsigned j);
+/* Like full_path_eval_f for inner vertices, but in half vector space: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or
+ * the weight of the lobe if specular; 0 where full_path_is_turned. */
+spectrum full_path_eval_fh(const struct path_context *c, struct full_path *x, unsigned j);
 /* Invalidates the caches of the vertices first..last, which are about to change, and of their neighbours. */
 void full_path_invalidate(struct full_path *x, unsigned first, unsigned last);
 /* Returns the weight of the exactly specular lobe of v[j]'s mode as seen along o_j (see bsdf_eval_delta). Sets its
@@ -140,8 +141,8 @@ bool full_path_finish(struct path_context *c, struct full_path *x);
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x);
 
 /* Multiplies p by the transmittance of the media along the path. */
-void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct product *p);
-static inline void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
+void full_path_attenuate_by_media(const struct world *w, const struct full_path *x, struct scaled_product *p);
+static inline void full_path_attenuate(const struct world *w, const struct full_path *x, struct scaled_product *p)
 {
 	if (EFFECT_IS_ON(w, media))
 		full_path_attenuate_by_media(w, x, p);

@@ -9,14 +9,14 @@
 double full_path_log_f(const struct path_context *c, struct full_path *x)
 {
 	unsigned k = x->edges;
-	struct product p = PRODUCT_ONE;
+	struct scaled_product p = PRODUCT_ONE;
 	double log_geometry = 0;
-	product_mul(&p, full_path_f(c, x, 0));
+	scaled_product_mul(&p, full_path_eval_f(c, x, 0));
 	for (unsigned j = 1; j < k; j++) {
-		product_mul(&p, full_path_f(c, x, j));
+		scaled_product_mul(&p, full_path_eval_f(c, x, j));
 		const struct path_vertex *v = &x->v[j];
 		/* The measure is that of the direction towards the light, projected on the geometric normal. */
-		if (!v->delta && v->kind != VERTEX_MEDIUM)
+		if (!v->is_delta && v->kind != VERTEX_MEDIUM)
 			log_geometry +=
 				log(full_path_cosine_to_light(x, j) / fabs(vec3_dot(v->x.ng, x->edge[j - 1].w)));
 	}
@@ -26,9 +26,9 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);
 	}
 	struct camera storage;
-	log_geometry +=
-		log(camera_jac_film_from_solid(world_camera(c->w, &x->v[k].x, &storage), vec3_neg(x->edge[k - 1].w)));
-	return product_log_intensity(c, x, &p) + log_geometry;
+	log_geometry += log(
+		camera_jac_film_from_solid(world_camera_at(c->w, &x->v[k].x, &storage), vec3_neg(x->edge[k - 1].w)));
+	return scaled_product_log_intensity(c, x, &p) + log_geometry;
 }
 
 /* Sets the densities generated at the specular vertex v[j]: *to_light of v[j - 1] from the camera's side and *to_camera
@@ -37,17 +37,17 @@ static void specular_densities(const struct full_path *x, unsigned j, double *to
 {
 	const struct path_vertex *v = &x->v[j];
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w), wi;
-	double chance = 0, light, camera;
-	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &chance)))
-		chance = 0;
-	double chance_from_light = chance;
+	double probability = 0, light, camera;
+	if (spectrum_is_zero(full_path_specular_weight(x, j, &wi, &probability)))
+		probability = 0;
+	double chance_from_light = probability;
 	if (v->bsdf->is_nonreciprocal) {
 		struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_IMPORTANCE);
-		chance_from_light = path_delta_chance(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
+		chance_from_light = path_delta_probability(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
 	}
 	path_delta_densities(&v->x, i, o, full_path_eta(x, j), &light, &camera);
 	*to_light = path_ray_can_meet(i, &x->v[j - 1])
-			    ? chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2
+			    ? probability * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2
 			    : 0;
 	*to_camera = path_ray_can_meet(o, &x->v[j + 1])
 			     ? chance_from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2
@@ -79,7 +79,7 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 		v[1].pdf_rev = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_IMPORTANCE);
 	for (unsigned j = 1; j < k; j++) {
 		double to_light, to_camera;
-		if (v[j].delta) {
+		if (v[j].is_delta) {
 			specular_densities(x, j, &to_light, &to_camera);
 		} else {
 			to_light = path_pdf(c, &v[j + 1], &v[j], &v[j - 1], TRANSPORT_RADIANCE);
@@ -100,13 +100,13 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 static double log_pdf_refracted(struct path_context *c, const struct full_path *x, const double *from_camera)
 {
 	const struct path_vertex *v[FULL_PATH_VERTICES_MAX];
-	double pdf[PATH_REFRACTED_MAX], log_transfer;
+	double pdf[PATH_REFRACTED_VERTICES_MAX], log_transfer;
 	if (!path_allows_refraction(c) || !path_vertex_is_refracting(&x->v[1]))
 		return -INFINITY;
 	for (unsigned i = 0; i <= x->edges; i++)
 		v[i] = &x->v[i];
 	unsigned end = path_refracted_end(v, x->edges);
-	if (!end || v[end]->delta || !path_is_made_by_refraction(c, v, end, &log_transfer))
+	if (!end || v[end]->is_delta || !path_is_made_by_refraction(c, v, end, &log_transfer))
 		return -INFINITY;
 	for (unsigned i = 1; i < end; i++)
 		pdf[i - 1] = 1;

@@ -18,11 +18,12 @@
  * elsewhere neither changes anything (tests/bench/choices.md, "Faint connections"). */
 static const double faint_fraction = 0.1;
 
-/* Whether this sample has a light sub-path. With a low-discrepancy sampler this is exactly one of light_every
- * consecutive samples of a pixel. */
+/* Whether this sample has a light sub-path. With a low-discrepancy sampler this is exactly one of
+ * light_subpath_interval consecutive samples of a pixel. */
 static bool has_light_subpath(const struct path_context *c, struct sampler *s)
 {
-	return c->light_every <= 1 || s->block(s, SIDE_CAMERA, 0)[DIM_HAS_LIGHT] * c->light_every < 1;
+	return c->light_subpath_interval <= 1 ||
+	       s->block(s, SIDE_CAMERA, 0)[DIM_LIGHT_SUBPATH] * c->light_subpath_interval < 1;
 }
 
 /* Returns the part of l that the film gets. */
@@ -61,17 +62,17 @@ static void join_light_to_lens(struct path_context *c, struct sampler *s, unsign
 		spectrum l = path_connect(c, j, 1, PATH_EDGES_MAX, film);
 		if (path_accept(c, l) && j > 1)
 			l = film_part(c, j, 1, film, l);
-		if (!spectrum_is_zero(l) && path_add_splat(c, out, film[0], film[1], l) && !c->skips_classes)
+		if (!spectrum_is_zero(l) && path_sample_add_splat(c, out, film[0], film[1], l) && !c->skips_classes)
 			path_classes_add(classes, c, j, 1, l);
 	}
 }
 
 /* Returns the contribution below which connections are faint, relative to `found_by_camera`, the light that the camera
  * sub-path finds alone, which does not depend on which connections are made. 0, so that all are made, where it finds
- * none, and for the samples that seed chains (connects_all). */
+ * none, and for the samples that seed chains (makes_faint_connections). */
 static double faint_threshold(const struct path_context *c, spectrum found_by_camera)
 {
-	return c->max_survival > 0 && !c->connects_all ? faint_fraction * spectrum_mean(found_by_camera) : 0;
+	return c->max_survival > 0 && !c->makes_faint_connections ? faint_fraction * spectrum_mean(found_by_camera) : 0;
 }
 
 void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -81,7 +82,7 @@ void path_trace_candidates(struct path_context *c, struct sampler *s, struct pat
 	out->splat_count = 0;
 	out->class_mask = 0;
 	out->intensity = 0;
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
 	bool has_light = has_light_subpath(c, s);
 	unsigned light = has_light ? path_walk_light(c, s, c->max_depth) : 0;
@@ -99,12 +100,12 @@ void path_trace_candidates(struct path_context *c, struct sampler *s, struct pat
 		}
 	c->faint_threshold = faint_threshold(c, found_by_camera);
 	if (c->faint_threshold > 0)
-		c->faint_position = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT];
+		c->faint_position = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT_CONNECTION];
 	for (unsigned t = 2; t <= camera; t++)
 		for (unsigned j = 2; j <= light; j++)
 			sum = spectrum_add(sum, film_part(c, j, t, film, connect_technique(c, j, t, &classes)));
 	c->faint_threshold = 0;
-	if (!path_add_splat(c, out, film[0], film[1], sum) && out->class_mask)
+	if (!path_sample_add_splat(c, out, film[0], film[1], sum) && out->class_mask)
 		path_classes_clear(out);
 	if (has_light)
 		join_light_to_lens(c, s, light, &classes, out);
@@ -121,7 +122,7 @@ const struct integrator integrator_bdpt8 = {
 	.properties = {.name = "bdpt8", .kind = PLAN_SAMPLES, .max_depth = PATH_EDGES_MAX},
 	.stream = RNG_BDPT8,
 	.evaluate = path_trace_bidirectional,
-	.light_every = 8,
+	.light_subpath_interval = 8,
 };
 
 const struct integrator integrator_bdpt = {
@@ -141,6 +142,6 @@ const struct integrator integrator_erpt4 = {
 	.properties = {.name = "erpt4", .kind = PLAN_SAMPLES, .max_depth = PATH_EDGES_MAX},
 	.stream = RNG_ERPT4,
 	.evaluate = path_trace_bidirectional,
-	.light_every = 4,
+	.light_subpath_interval = 4,
 	.redistributes = true,
 };

@@ -18,7 +18,7 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 	out->splat_count = 0;
 	out->class_mask = 0;
 	out->intensity = 0;
-	c->unidirectional = true;
+	c->is_unidirectional = true;
 	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
 	spectrum sum = spectrum_constant(0);
 	if (!c->skips_classes)
@@ -37,12 +37,12 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 				path_classes_add(&classes, c, j, t, l);
 		}
 	}
-	if (!path_add_splat(c, out, film[0], film[1], sum) && out->class_mask)
+	if (!path_sample_add_splat(c, out, film[0], film[1], sum) && out->class_mask)
 		path_classes_clear(out);
 }
 
 const struct integrator integrator_path = {
-	.properties = {.name = "path", .kind = PLAN_SAMPLES, .max_depth = PATH_EDGES_MAX, .only_from_camera = true},
+	.properties = {.name = "path", .kind = PLAN_SAMPLES, .max_depth = PATH_EDGES_MAX, .is_camera_only = true},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };

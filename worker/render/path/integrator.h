@@ -14,7 +14,7 @@ struct integrator {
 	struct integrator_properties properties; /* properties that all programs know */
 	enum rng_stream stream;			 /* random number stream of its samples */
 	path_tracer *evaluate;
-	uint32_t light_every; /* path_context.light_every for its samples */
+	uint32_t light_subpath_interval; /* path_context.light_subpath_interval for its samples */
 	/* Contributions that are too bright for one sample are spread by chains: chain/redistribution.h. */
 	bool redistributes;
 	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent samples */

@@ -27,7 +27,7 @@ uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, u
 
 uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex *v, vec3 away)
 {
-	uint32_t medium = v->kind == VERTEX_INFINITE ? 0 : w->emitter_medium[v->emitter];
+	uint32_t medium = v->kind == VERTEX_INFINITE ? 0 : w->emitter_media[v->emitter];
 	if (v->x.prim.shape < w->shape_count)
 		find_side_medium(w, &v->x, away, &medium);
 	return medium;
@@ -66,7 +66,7 @@ spectrum path_absorb_weight(const struct path_context *c, const struct path_vert
 
 /* The state of a ray on its way through media. */
 struct media_walk {
-	/* `medium` is the medium where the ray is; `free_flight` is set at the end. */
+	/* `medium` is the medium where the ray is; `scattering_transmittance` is set at the end. */
 	struct path_edge *edge;
 	vec3 d; /* direction of the ray */
 	/* Optical depths so far: of all media, and of those that scatter. */
@@ -82,7 +82,7 @@ struct media_walk {
 static void walk_enter_medium(const struct path_context *c, struct media_walk *k, uint32_t medium)
 {
 	k->edge->medium = medium;
-	k->scatters = medium && path_medium(c->w, medium)->scatters;
+	k->scatters = medium && path_medium(c->w, medium)->is_scattering;
 	k->emitting_medium = NULL;
 	if (!medium)
 		return;
@@ -103,7 +103,7 @@ static struct media_walk walk_begin(const struct path_context *c, const struct p
 			       .event_depth = spectrum_constant(0),
 			       .emission = emission,
 			       .wl = &c->wl};
-	*edge = (struct path_edge){.previous_medium = medium, .media_match = true, .d = d};
+	*edge = (struct path_edge){.previous_medium = medium, .has_matching_media = true, .d = d};
 	walk_enter_medium(c, &k, medium);
 	return k;
 }
@@ -179,13 +179,13 @@ static void walk_cross_face(const struct path_context *c, struct media_walk *k, 
 	uint32_t near_medium, far_medium;
 	if (!find_side_medium(c->w, x, vec3_neg(k->d), &near_medium) || !find_side_medium(c->w, x, k->d, &far_medium))
 		return;
-	k->edge->media_match = k->edge->media_match && near_medium == k->edge->medium;
+	k->edge->has_matching_media = k->edge->has_matching_media && near_medium == k->edge->medium;
 	walk_enter_medium(c, k, far_medium);
 }
 
 static spectrum walk_end(struct media_walk *k)
 {
-	k->edge->free_flight = spectrum_transmittance(k->event_depth);
+	k->edge->scattering_transmittance = spectrum_transmittance(k->event_depth);
 	return spectrum_transmittance(k->depth);
 }
 
@@ -276,9 +276,10 @@ double path_edge_pdf(const struct path_context *c, const struct path_edge *edge,
 		     const struct path_vertex *to)
 {
 	if (to->kind != VERTEX_MEDIUM)
-		return spectrum_mean(edge->free_flight);
+		return spectrum_mean(edge->scattering_transmittance);
 	const struct medium *m = path_medium(c->w, medium);
-	return spectrum_mean(spectrum_mul(medium_extinction(m, to->x.p, edge->d, &c->wl), edge->free_flight));
+	return spectrum_mean(
+		spectrum_mul(medium_extinction(m, to->x.p, edge->d, &c->wl), edge->scattering_transmittance));
 }
 
 void path_apply_edge(const struct path_context *c, struct path_vertex *to, spectrum transmittance)

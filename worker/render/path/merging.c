@@ -77,7 +77,7 @@ static double intensity_of(struct path_context *c, spectrum l)
 	struct path_sample sample; /* its large array of splats stays uninitialised */
 	sample.splat_count = 0;
 	sample.intensity = 0;
-	path_add_splat(c, &sample, 0, 0, l);
+	path_sample_add_splat(c, &sample, 0, 0, l);
 	return sample.intensity;
 }
 
@@ -116,7 +116,7 @@ static double refracted_over_drawn_ratio(struct path_context *c, unsigned s, uns
 	v[s + 1] = &stand_in;
 	stand_in.x.p = vec3_madd(y[s].x.p, vec3_dot(y[s].x.ng, y[s].to_prev) > 0 ? 1 : -1, y[s].x.ng);
 	*end = path_refracted_end(v, s + 1);
-	return *end && (*end == s || !y[*end].delta) ? path_refracted_over_drawn_ratio(c, v, *end) : 0;
+	return *end && (*end == s || !y[*end].is_delta) ? path_refracted_over_drawn_ratio(c, v, *end) : 0;
 }
 
 /* Fills in the sums of struct photon. The techniques by whose densities they are divided need not exist. */
@@ -139,8 +139,8 @@ static void sum_fewer_light_vertices(struct path_context *c, unsigned s, struct 
 				   refracted;
 			*(refracted_end == s ? &out->fewer_passing_sum : &out->fewer_sum) += q;
 			*(refracted_end == s ? &out->path_passing_sum : &out->path_sum) += q;
-		} else if (!(j > 1 && y[j - 1].delta) && (joins_photon || !y[end].delta) &&
-			   end - j <= PATH_PASSED_MAX) {
+		} else if (!(j > 1 && y[j - 1].is_delta) && (joins_photon || !y[end].is_delta) &&
+			   end - j <= PATH_PASSED_VERTICES_MAX) {
 			double toward = j == 1 ? path_pdf_toward(c, &y[0], y[end].x.p) / y[0].pdf : 1,
 			       q = (joins_photon ? 1 : ratio_end) * toward * joint_over_drawn_ratio(y, j, end);
 			*(joins_photon ? &out->fewer_passing_sum : &out->fewer_sum) += q;
@@ -164,7 +164,7 @@ struct photon photon_from_vertex(struct path_context *c, unsigned s)
 	p.prev.p = prev->x.p;
 	p.prev.ng = prev->x.ng;
 	p.prev.pdf = prev->pdf;
-	p.prev.delta = prev->delta;
+	p.prev.is_delta = prev->is_delta;
 	sum_fewer_light_vertices(c, s, &p);
 	return p;
 }
@@ -187,7 +187,7 @@ int merging_trace_photons(struct merging *m, struct path_context *c, uint64_t se
 	rng_uniform4(seed, RNG_CHOICE, paths, step, 0, u);
 	m->wavelength_u = u[0];
 	m->time = u[1];
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	for (; m->path_count < paths && m->photon_count + c->max_depth <= m->photon_capacity; m->path_count++) {
 		struct pinned_random s;
 		double film[2];
@@ -221,7 +221,7 @@ bool merging_walk_camera(const struct merging *m, struct path_context *c, uint64
 	double distance = 0, unused;
 	if (index % TICK_INTERVAL == 0)
 		liveness_tick();
-	c->unidirectional = false;
+	c->is_unidirectional = false;
 	pinned_random_init(&s, m, seed, step, index);
 	unsigned n = path_walk_camera(c, &s.random.base, c->max_depth + 1, out->film);
 	for (out->vertex = 1;; out->vertex++) {
@@ -234,9 +234,9 @@ bool merging_walk_camera(const struct merging *m, struct path_context *c, uint64
 	}
 	struct camera storage;
 	vec3 d = path_direction(&c->camera[0], &c->camera[1], &unused);
-	double solid =
-		disk_samples * c->window.width * c->window.height /
-		(camera_jac_film_from_solid(world_camera(c->w, &c->camera[0].x, &storage), d) * (double)m->path_count);
+	double solid = disk_samples * c->window.width * c->window.height /
+		       (camera_jac_film_from_solid(world_camera_at(c->w, &c->camera[0].x, &storage), d) *
+			(double)m->path_count);
 	out->radius = distance * sqrt(solid / M_PI);
 	return true;
 }
@@ -251,7 +251,8 @@ static double sum_more_light_vertices(const struct path_context *c, const struct
 		unsigned end = i - 1;
 		while (end > 0 && is_see_through(c, &v[end]))
 			end--;
-		if (!(i < t && v[i].delta) && !(end > 0 && v[end].delta) && i - 1 - end <= PATH_PASSED_MAX)
+		if (!(i < t && v[i].is_delta) && !(end > 0 && v[end].is_delta) &&
+		    i - 1 - end <= PATH_PASSED_VERTICES_MAX)
 			sum += q * joint_over_drawn_ratio(v, end + 1, i);
 		q *= (i == t ? path_pdf(c, y, z, next, TRANSPORT_IMPORTANCE) * edge_pdf_rev(c, &z->edge, next)
 			     : next->pdf_rev) /
@@ -260,7 +261,7 @@ static double sum_more_light_vertices(const struct path_context *c, const struct
 	return sum;
 }
 
-bool merging_merge_photon(struct path_context *c, const struct photon *p, unsigned t, struct merged *out)
+bool merging_merge_photon(struct path_context *c, const struct photon *p, unsigned t, struct merged_path *out)
 {
 	const struct path_vertex *z = &c->camera[t];
 	struct path_vertex y = {.kind = p->prev.kind, .emitter = p->prev.emitter};
@@ -274,7 +275,7 @@ bool merging_merge_photon(struct path_context *c, const struct photon *p, unsign
 	out->contribution = intensity_of(c, l);
 	/* q_{s-1}, whether or not such a technique exists */
 	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) * p->edge_pdf_rev / (p->pdf * p->prev.pdf),
-	       joined = (p->prev.delta ? 0 : 1) + p->fewer_passing_sum;
+	       joined = (p->prev.is_delta ? 0 : 1) + p->fewer_passing_sum;
 	out->bdpt_contribution =
 		out->contribution / (q * p->fewer_sum + joined / p->pdf + sum_more_light_vertices(c, &y, t));
 	out->path_contribution = out->contribution / (q * p->path_sum + p->path_passing_sum / p->pdf);
@@ -285,7 +286,7 @@ struct gathering {
 	const struct merging *m;
 	struct path_context *c;
 	const struct merging_point *point;
-	void (*visit)(void *user, const struct merged *found);
+	void (*visit)(void *user, const struct merged_path *found);
 	void *user;
 };
 
@@ -295,7 +296,7 @@ static void merge_near_photon(void *user, uint32_t id)
 	const struct photon *p = &g->m->photons[id];
 	const struct surface_point *z = &g->c->camera[g->point->vertex].x;
 	double r = g->point->radius;
-	struct merged merged;
+	struct merged_path merged;
 	if (vec3_dot(p->ng, z->ng) < min_normal_cosine ||
 	    fabs(vec3_dot(vec3_sub(p->p, z->p), z->ng)) > max_plane_distance * r ||
 	    !merging_merge_photon(g->c, p, g->point->vertex, &merged))
@@ -304,23 +305,23 @@ static void merge_near_photon(void *user, uint32_t id)
 	g->visit(g->user, &merged);
 }
 
-void merging_for_each(const struct merging *m, struct path_context *c, const struct merging_point *point,
-		      void (*visit)(void *user, const struct merged *found), void *user)
+void merging_visit_paths(const struct merging *m, struct path_context *c, const struct merging_point *point,
+			 void (*visit)(void *user, const struct merged_path *found), void *user)
 {
 	struct gathering g = {m, c, point, visit, user};
 	point_tree_visit_within(&m->tree, c->camera[point->vertex].x.p, point->radius, merge_near_photon, &g);
 }
 
-static void add_contribution(void *user, const struct merged *m)
+static void add_contribution(void *user, const struct merged_path *m)
 {
 	*(double *)user += m->contribution;
 }
 
-double merging_scale(const struct merging *m, struct path_context *c, const struct merging_point *point,
-		     const struct brightness *map, double *photons)
+double merging_inverse_brightness(const struct merging *m, struct path_context *c, const struct merging_point *point,
+				  const struct brightness *map, double *photons)
 {
-	double scale = brightness_scale(map, point->film[0], point->film[1]);
+	double scale = brightness_inverse_at(map, point->film[0], point->film[1]);
 	*photons = 0;
-	merging_for_each(m, c, point, add_contribution, photons);
+	merging_visit_paths(m, c, point, add_contribution, photons);
 	return scale / fmax(1, scale * *photons);
 }

@@ -25,7 +25,7 @@ struct photon {
 		int32_t emitter;
 		vec3 p, ng;
 		double pdf;
-		bool delta;
+		bool is_delta;
 	} prev;
 	/* Sums of the densities of techniques with fewer than s light vertices, divided by the density of technique s -
 	 * 1: `fewer_sum` sums all of them; `path_sum` sums those with at most one light vertex, the only ones that the
@@ -52,7 +52,7 @@ struct merging_point {
 };
 
 /* A path that merging makes. */
-struct merged {
+struct merged_path {
 	/* Its contribution to the mean of the camera's samples: X + Y + Z over the whole window. */
 	double contribution;
 	/* The contribution of a sample of bdpt and of path that finds this path; INFINITY if none ever does. */
@@ -68,19 +68,19 @@ void merging_fini(struct merging *m);
 bool merging_walk_camera(const struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t index,
 			 struct merging_point *out);
 /* Calls `visit` for each path that this sample makes with the photons around its position. */
-void merging_for_each(const struct merging *m, struct path_context *c, const struct merging_point *point,
-		      void (*visit)(void *user, const struct merged *found), void *user);
+void merging_visit_paths(const struct merging *m, struct path_context *c, const struct merging_point *point,
+			 void (*visit)(void *user, const struct merged_path *found), void *user);
 
-/* Returns 1 / the brightness at the place, as brightness_scale does. A map of few samples is too dark where they missed
- * light, so the brightness is taken from the photons if they say that the place is brighter. Sets *photons to the
- * contribution of these photons, X + Y + Z. */
-double merging_scale(const struct merging *m, struct path_context *c, const struct merging_point *point,
-		     const struct brightness *map, double *photons);
+/* Returns 1 / the brightness at the place, as brightness_inverse_at does. A map of few samples is too dark where they
+ * missed light, so the brightness is taken from the photons if they say that the place is brighter. Sets *photons to
+ * the contribution of these photons, X + Y + Z. */
+double merging_inverse_brightness(const struct merging *m, struct path_context *c, const struct merging_point *point,
+				  const struct brightness *map, double *photons);
 
 /* The steps of merging: photon_from_vertex makes a photon of c->light's vertex s; merging_merge_photon computes the
  * path that a photon makes with c->camera's vertex t, as if it were the only photon and its disk had area 1.
  * merging_merge_photon returns false if that path is black or too long. */
 struct photon photon_from_vertex(struct path_context *c, unsigned s);
-bool merging_merge_photon(struct path_context *c, const struct photon *p, unsigned t, struct merged *out);
+bool merging_merge_photon(struct path_context *c, const struct photon *p, unsigned t, struct merged_path *out);
 
 #endif

@@ -11,7 +11,7 @@ double path_pdf_emitter(const struct path_context *c, const struct path_vertex *
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
 /* Draws a point y on an emitter as seen from z, with z's own random numbers. *pdf: its density, including the choice of
  * the emitter. Returns false if no point could be drawn. */
-bool path_draw_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y,
-			  double *pdf);
+bool path_sample_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y,
+			    double *pdf);
 
 #endif

@@ -103,12 +103,12 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 		return disk_pdf(c->w) * (next->kind == VERTEX_MEDIUM ? 1 : jac_disk_from_area(next->x.ng, omega));
 	if (vertex->kind == VERTEX_CAMERA) {
 		struct camera storage;
-		solid = camera_jac_film_from_solid(world_camera(c->w, &vertex->x, &storage), omega) /
+		solid = camera_jac_film_from_solid(world_camera_at(c->w, &vertex->x, &storage), omega) /
 			(c->window.width * c->window.height);
 	} else if (vertex->kind == VERTEX_EMITTER || !prev) {
 		struct emitter_point p = world_emitter_point(&vertex->x);
 		struct emitter_storage storage;
-		const struct emitter *em = world_emitter(c->w, vertex->emitter, vertex->x.prim.time, &storage);
+		const struct emitter *em = world_emitter_at(c->w, vertex->emitter, vertex->x.prim.time, &storage);
 		solid = em->ops->pdf_direction(em, &p, omega);
 	} else {
 		double unused;
@@ -151,7 +151,7 @@ struct departure {
 	double pdf, pdf_rev;
 	double eta; /* refractive index on wi's side divided by that on the side of to_prev */
 	unsigned mode;
-	bool delta;
+	bool is_delta;
 };
 
 static bool sample_departure_in_medium(const struct path_context *c, const struct path_vertex *v, const double u[2],
@@ -165,20 +165,21 @@ static bool sample_departure_in_medium(const struct path_context *c, const struc
 	return out->pdf > 0;
 }
 
-double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode)
+double path_delta_probability(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode)
 {
 	vec3 wi;
-	double chance;
-	return spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &chance)) ? 0 : chance;
+	double probability;
+	return spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &probability)) ? 0 : probability;
 }
 
 spectrum path_delta_weight(const struct path_context *c, const struct path_vertex *v)
 {
-	double chance;
+	double probability;
 	vec3 wi;
 	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
-	spectrum weight = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
-	return spectrum_is_zero(weight) || !(chance > 0) ? spectrum_constant(0) : weight;
+	spectrum weight =
+		bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &probability);
+	return spectrum_is_zero(weight) || !(probability > 0) ? spectrum_constant(0) : weight;
 }
 
 static bool sample_departure(const struct path_context *c, const struct path_vertex *v, const double u[3],
@@ -199,7 +200,7 @@ static bool sample_departure(const struct path_context *c, const struct path_ver
 	if (!(s.mode & BSDF_STRAIGHT) && !(sides_agree && path_sides_agree(x, out->wi)))
 		return false;
 	out->mode = s.mode;
-	out->delta = (s.mode & BSDF_DELTA) != 0;
+	out->is_delta = (s.mode & BSDF_DELTA) != 0;
 	double factor = fabs(s.wi.z);
 	if (transport == TRANSPORT_IMPORTANCE)
 		factor = fabs(wo.z) / fabs(vec3_dot(v->x.ng, v->to_prev)) * fabs(vec3_dot(v->x.ng, out->wi));
@@ -207,14 +208,14 @@ static bool sample_departure(const struct path_context *c, const struct path_ver
 	out->pdf = s.pdf;
 	out->eta = s.eta;
 	out->pdf_rev = 0;
-	if (c->unidirectional || x == &turned)
+	if (c->is_unidirectional || x == &turned)
 		return true;
 	struct bsdf_point reverse_point = world_bsdf_point(
 		x, &c->wl, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
-	if (!out->delta)
+	if (!out->is_delta)
 		out->pdf_rev = v->bsdf->ops->pdf_solid(v->bsdf, &reverse_point, s.wi, wo);
 	else if (v->bsdf->is_nonreciprocal)
-		out->pdf_rev = path_delta_chance(v->bsdf, &reverse_point, s.wi, s.mode);
+		out->pdf_rev = path_delta_probability(v->bsdf, &reverse_point, s.wi, s.mode);
 	else
 		out->pdf_rev = s.pdf;
 	return true;
@@ -304,17 +305,17 @@ static unsigned continue_subpath(struct path_context *c, struct sampler *s, enum
 		if (!hit || (next->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
 		double forward_per_solid = 1, reverse_per_solid = 1;
-		if (out.delta && side == SIDE_CAMERA)
+		if (out.is_delta && side == SIDE_CAMERA)
 			path_delta_densities(&vertex->x, out.wi, vertex->to_prev, 1 / out.eta, &forward_per_solid,
 					     &reverse_per_solid);
-		else if (out.delta)
+		else if (out.is_delta)
 			path_delta_densities(&vertex->x, vertex->to_prev, out.wi, out.eta, &reverse_per_solid,
 					     &forward_per_solid);
-		vertex->delta = out.delta;
+		vertex->is_delta = out.is_delta;
 		vertex->mode = out.mode;
 		next->beta = out.beta;
 		next->pdf = vertex_pdf(c, vertex, next, out.pdf, forward_per_solid);
-		if (!c->unidirectional)
+		if (!c->is_unidirectional)
 			v[n - 2].pdf_rev = vertex_pdf(c, vertex, &v[n - 2], out.pdf_rev, reverse_per_solid);
 		if (EFFECT_IS_ON(c->w, media))
 			apply_media(c, side, n, out.wi, transmittance);
@@ -349,12 +350,12 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
-	c->wl = world_wavelengths(w, u[DIM_WAVELENGTH]);
+	c->wl = world_sample_wavelengths(w, u[DIM_WAVELENGTH]);
 	c->time = EFFECT_IS_ON(w, motion) ? choose_time(w, film, s->block(s, SIDE_LIGHT, 0)[DIM_TIME]) : 0;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_constant(1)};
 	v[0].x.prim = prim_none_at(c->time);
 	struct camera storage;
-	const struct camera *camera = world_camera(w, &v[0].x, &storage);
+	const struct camera *camera = world_camera_at(w, &v[0].x, &storage);
 	v[0].x.p = camera_sample_point(camera, u + DIM_APERTURE_U);
 	v[0].edge.medium = w->camera_medium;
 	c->emission_edges = 0;
@@ -395,7 +396,7 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 	start.x.p = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), -2 * w->radius});
 	start.x.prim = prim_none_at(v[0].x.prim.time);
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(w, v[0].emitter, v[0].x.prim.time, &storage);
+	const struct emitter *em = world_emitter_at(w, v[0].emitter, v[0].x.prim.time, &storage);
 	struct emitter_point p = {.p = v[0].x.p, .is_infinite = true};
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
 	if (!trace_next(c, &start, d, 0, INFINITY, distance, &v[1], transmittance) || v[1].kind == VERTEX_INFINITE)
@@ -408,7 +409,7 @@ static bool leave_surface(struct path_context *c, struct path_vertex *v, const d
 			  spectrum *transmittance)
 {
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(c->w, v[0].emitter, v[0].x.prim.time, &storage);
+	const struct emitter *em = world_emitter_at(c->w, v[0].emitter, v[0].x.prim.time, &storage);
 	struct emitter_point p = world_emitter_point(&v[0].x);
 	vec3 d;
 	double solid;
@@ -430,7 +431,7 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	if (chosen < 0 || max_vertices == 0)
 		return 0;
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(w, chosen, c->time, &storage);
+	const struct emitter *em = world_emitter_at(w, chosen, c->time, &storage);
 	struct emitter_point p;
 	double pdf;
 	if (!em->ops->sample_point(em, u + DIM_EMITTER_POINT, &p, &pdf) || !(pdf > 0))
@@ -520,7 +521,7 @@ double path_intensity(const struct path_context *c, spectrum l)
 	return xyz[0] + xyz[1] + xyz[2];
 }
 
-bool path_add_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
+bool path_sample_add_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
 {
 	if (!path_accept(c, l) || out->splat_count == PATH_SPLATS_MAX)
 		return false;

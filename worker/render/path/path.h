@@ -104,7 +104,7 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 
 /* Returns the probability with which a sub-path that comes from wo chooses the specular lobe `mode`. p->transport says
  * whether the sub-path started at the camera or at the light. */
-double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode);
+double path_delta_probability(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode);
 
 /* Returns the weight of the specular lobe by which v's sub-path, which comes from v->to_prev on the camera's side,
  * leaves v. It is also zero if no sub-path ever chooses that lobe, because densities are divided by the
@@ -124,7 +124,7 @@ double path_intensity(const struct path_context *c, spectrum l);
 
 /* Adds the contribution l (f / p) at a film point. Returns false if nothing was added: l is black, or NaN, negative or
  * infinite (also if the sum exceeds a float), which is counted. */
-bool path_add_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
+bool path_sample_add_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
 /* Returns false if l is zero or invalid (NaN, infinite, negative); invalid contributions are counted. */
 bool path_accept(const struct path_context *c, spectrum l);
 

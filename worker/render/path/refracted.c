@@ -34,11 +34,12 @@ double path_pdf_refracted(const struct path_context *c, const struct path_vertex
 	if (!(distance2 > 0) || !path_can_be_hit(c, next) || !path_ray_can_meet(omega, next))
 		return 0;
 	struct bsdf_point p = world_bsdf_point(&vertex->x, &c->wl, transport);
-	double chance = path_delta_chance(vertex->bsdf, &p, frame_to_local(&vertex->x.sh, back), vertex->mode);
+	double probability =
+		path_delta_probability(vertex->bsdf, &p, frame_to_local(&vertex->x.sh, back), vertex->mode);
 	bool from_camera = transport == TRANSPORT_RADIANCE;
 	vec3 camera = from_camera ? back : omega, light = from_camera ? omega : back;
 	path_delta_densities(&vertex->x, light, camera, path_eta(vertex, &c->wl, camera), &to_light, &to_camera);
-	double lobe = chance * (from_camera ? to_light : to_camera);
+	double lobe = probability * (from_camera ? to_light : to_camera);
 	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
 }
 
@@ -83,9 +84,9 @@ static const struct path_refraction *look_up_refraction(struct path_context *c, 
 		k->y = y->x.p;
 		k->time = z->x.prim.time;
 		k->nm = c->wl.nm[0];
-		k->found = c->refract(c, z, y, &k->refraction);
+		k->has_refraction = c->refract(c, z, y, &k->refraction);
 	}
-	return k->found ? &k->refraction : NULL;
+	return k->has_refraction ? &k->refraction : NULL;
 }
 
 unsigned path_refracted_end(const struct path_vertex *const *v, unsigned k)
@@ -93,7 +94,7 @@ unsigned path_refracted_end(const struct path_vertex *const *v, unsigned k)
 	unsigned end = 1;
 	while (end < k && path_vertex_is_refracting(v[end]))
 		end++;
-	return end > 1 && end - 1 <= PATH_REFRACTED_MAX && end < k && v[end]->kind == VERTEX_SURFACE ? end : 0;
+	return end > 1 && end - 1 <= PATH_REFRACTED_VERTICES_MAX && end < k && v[end]->kind == VERTEX_SURFACE ? end : 0;
 }
 
 bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned end,
@@ -114,7 +115,7 @@ bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex
 
 double path_refracted_over_drawn_ratio(struct path_context *c, const struct path_vertex *const *v, unsigned end)
 {
-	double pdf[PATH_REFRACTED_MAX], log_transfer;
+	double pdf[PATH_REFRACTED_VERTICES_MAX], log_transfer;
 	if (!path_is_made_by_refraction(c, v, end, &log_transfer))
 		return 0;
 	for (unsigned i = 1; i < end; i++)

@@ -30,13 +30,13 @@
 /* Whether this evaluation refracts connections to emitters. */
 static inline bool path_allows_refraction(const struct path_context *c)
 {
-	return c->refract && EFFECT_IS_ON(c->w, refracted_shadows) && !c->opaque_joints;
+	return c->refract && EFFECT_IS_ON(c->w, refracted_shadows) && !c->joints_are_opaque;
 }
 
 /* Whether v could be a vertex of a refracted connection: an exactly specular lobe refracts its path there. */
 static inline bool path_vertex_is_refracting(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_TRANSMIT) && !(v->mode & BSDF_STRAIGHT) &&
+	return v->kind == VERTEX_SURFACE && v->is_delta && (v->mode & BSDF_TRANSMIT) && !(v->mode & BSDF_STRAIGHT) &&
 	       bsdf_refracts_connections(v->bsdf);
 }
 

@@ -21,7 +21,7 @@ enum { SAMPLER_BLOCK_SIZE = 8 };
  * emission of media is evaluated. Numbers that are used together lie in the same half of the block: low-discrepancy
  * samplers (sobol.h) stratify the four numbers of a half jointly. */
 enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_CAMERA_DISTANCE = 3 };
-enum { DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_HAS_LIGHT = 6, DIM_FAINT = 7 };
+enum { DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_LIGHT_SUBPATH = 6, DIM_FAINT_CONNECTION = 7 };
 enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4, DIM_TIME = 5, DIM_EMISSION = 6 };
 enum { DIM_BSDF = 0, DIM_ROULETTE = 3, DIM_NEXT_EVENT = 4, DIM_DISTANCE = 7 };
 

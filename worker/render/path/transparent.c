@@ -2,9 +2,9 @@
 /*
  * path_trace_passed follows the ray from z to y from one surface to the next, as long as each has a straight lobe, and
  * ends when nothing lies between the last surface and y. An opaque surface blocks the view. So do more than
- * PATH_PASSED_MAX surfaces, which bounds the work; paths through more surfaces are left to sub-paths that pass them
- * one by one. At the very edge of a surface, rounding (geom/accel.h) may let a ray pass although the test of the two
- * ends reports it as blocked; the ray then reaches the surface on which y lies, which blocks it.
+ * PATH_PASSED_VERTICES_MAX surfaces, which bounds the work; paths through more surfaces are left to sub-paths that pass
+ * them one by one. At the very edge of a surface, rounding (geom/accel.h) may let a ray pass although the test of the
+ * two ends reports it as blocked; the ray then reaches the surface on which y lies, which blocks it.
  */
 #include "worker/render/path/transparent.h"
 
@@ -22,7 +22,7 @@ static spectrum pass_straight(const struct path_context *c, struct path_vertex *
 {
 	if (!bsdf_passes_connections(v->bsdf) || !path_ray_can_meet(d, v))
 		return spectrum_constant(0);
-	v->delta = true;
+	v->is_delta = true;
 	v->mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
 	return path_delta_weight(c, v);
 }
@@ -56,7 +56,7 @@ bool path_trace_passed(struct path_context *c, const struct path_vertex *before,
 			y->kind == VERTEX_INFINITE ? INFINITY : sqrt(ray_length2)))
 		return false;
 	*transmittance = spectrum_constant(1);
-	for (unsigned n = 0; n < PATH_PASSED_MAX; n++) {
+	for (unsigned n = 0; n < PATH_PASSED_VERTICES_MAX; n++) {
 		struct path_vertex *v = &c->passed[n];
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from->x.p));
 		if (!path_extend(c, from, d, begin, end, v) || v->kind != VERTEX_SURFACE ||
@@ -85,10 +85,10 @@ double path_pdf_passed(const struct path_context *c, const struct path_vertex *v
 	if (!(distance2 > 0) || !path_can_be_hit(c, next) || !path_ray_can_meet(omega, next))
 		return 0;
 	struct bsdf_point p = world_bsdf_point(&vertex->x, &c->wl, transport);
-	double chance =
-		path_delta_chance(vertex->bsdf, &p, frame_to_local(&vertex->x.sh, vec3_neg(omega)), vertex->mode);
+	double probability =
+		path_delta_probability(vertex->bsdf, &p, frame_to_local(&vertex->x.sh, vec3_neg(omega)), vertex->mode);
 	/* Straight on, both results of path_delta_densities are the cosine. */
-	double lobe = chance * fabs(vec3_dot(vertex->x.ng, omega));
+	double lobe = probability * fabs(vec3_dot(vertex->x.ng, omega));
 	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
 }
 
@@ -108,8 +108,8 @@ double path_passed_ratio(const struct path_vertex *const *v, unsigned first, uns
 
 double path_passed_ratio_of_array(const struct path_vertex *v, unsigned first, unsigned last, bool over_pdf)
 {
-	const struct path_vertex *vertices[PATH_PASSED_MAX + 2];
-	double pdf[PATH_PASSED_MAX];
+	const struct path_vertex *vertices[PATH_PASSED_VERTICES_MAX + 2];
+	double pdf[PATH_PASSED_VERTICES_MAX];
 	unsigned n = last - first + 1;
 	for (unsigned i = 0; i < n + 2; i++)
 		vertices[i] = &v[first - 1 + i];

@@ -27,19 +27,20 @@
 /* Whether connections look through surfaces in this evaluation. */
 static inline bool path_allows_see_through(const struct path_context *c)
 {
-	return EFFECT_IS_ON(c->w, transparent_shadows) && !c->opaque_joints;
+	return EFFECT_IS_ON(c->w, transparent_shadows) && !c->joints_are_opaque;
 }
 
 /* Whether a connection could have passed v: the path continues straight through it. */
 static inline bool path_vertex_is_see_through(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_STRAIGHT) && bsdf_passes_connections(v->bsdf);
+	return v->kind == VERTEX_SURFACE && v->is_delta && (v->mode & BSDF_STRAIGHT) &&
+	       bsdf_passes_connections(v->bsdf);
 }
 
-/* Whether z, a vertex of the camera's sub-path, and y see each other through at least one and at most PATH_PASSED_MAX
- * surfaces. before: the vertex before z; NULL if z is on the lens. Fills in c->passed. Sets *transmittance to the share
- * of light that the surfaces let through, times the transmittance of absorbing media between z and the last surface;
- * the caller adds the edge from that surface to y. Counts rays. */
+/* Whether z, a vertex of the camera's sub-path, and y see each other through at least one and at most
+ * PATH_PASSED_VERTICES_MAX surfaces. before: the vertex before z; NULL if z is on the lens. Fills in c->passed. Sets
+ * *transmittance to the share of light that the surfaces let through, times the transmittance of absorbing media
+ * between z and the last surface; the caller adds the edge from that surface to y. Counts rays. */
 bool path_trace_passed(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 		       const struct path_vertex *y, spectrum *transmittance);
 

@@ -5,7 +5,7 @@ spectrum path_emitted_radiance(const struct path_context *c, const struct path_v
 			       const struct wavelengths *wl)
 {
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &storage);
+	const struct emitter *em = world_emitter_at(c->w, v->emitter, v->x.prim.time, &storage);
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.is_infinite = v->kind == VERTEX_INFINITE;
 	return em->ops->radiance(em, &p, w, wl);
@@ -15,7 +15,7 @@ struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, c
 				       double time)
 {
 	struct path_vertex v = {.kind = p->is_infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
-	uint32_t shape = w->emitter_shape[emitter];
+	uint32_t shape = w->emitter_shapes[emitter];
 	v.x.p = p->p;
 	v.x.ng = v.x.sh.n = p->n;
 	v.x.u = p->texture_point.u;
@@ -33,7 +33,7 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 	struct ray_hit hit;
 	c->counters[COUNT_RAYS_CLOSEST]++;
 	to->to_prev = vec3_neg(d);
-	to->delta = false;
+	to->is_delta = false;
 	to->pdf_rev = 0;
 	if (accel_closest(c->w->accel, &start, d, t_min, t_max, &hit)) {
 		const struct shape_binding *binding = &c->w->shape_bindings[hit.prim.shape];

@@ -16,8 +16,8 @@
 
 enum {
 	PATH_EDGES_MAX = 128,
-	PATH_PASSED_MAX = 16,	/* limit on the surfaces that one connection passes straight through */
-	PATH_REFRACTED_MAX = 8, /* limit on the surfaces that refract one connection */
+	PATH_PASSED_VERTICES_MAX = 16,	 /* limit on the surfaces that one connection passes straight through */
+	PATH_REFRACTED_VERTICES_MAX = 8, /* limit on the surfaces that refract one connection */
 };
 
 enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE, VERTEX_MEDIUM };
@@ -31,14 +31,14 @@ struct path_edge {
 	uint32_t previous_medium; /* medium of the edge at the preceding vertex */
 	/* Every `null` face along the edge that states media has the edge's medium on the side from which the edge
 	 * reaches it. */
-	bool media_match;
-	spectrum free_flight; /* exp(-optical depth) of the scattering media along the edge */
-	vec3 d;		      /* unit direction of the edge; either orientation */
+	bool has_matching_media;
+	spectrum scattering_transmittance; /* exp(-optical depth) of the scattering media along the edge */
+	vec3 d;				   /* unit direction of the edge; either orientation */
 };
 
 struct path_vertex {
 	enum vertex_kind kind;
-	bool delta;		 /* its own sub-path left it by an exactly specular lobe */
+	bool is_delta;		 /* its own sub-path left it by an exactly specular lobe */
 	unsigned mode;		 /* bits of enum bsdf_mode: how its own sub-path left it */
 	int32_t emitter;	 /* index of the emitter; -1 if the vertex does not emit */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
@@ -79,13 +79,13 @@ struct path_split {
 /* A path along which light from a point of an emitter is refracted to a vertex: see path/refracted.h. */
 struct path_refraction {
 	unsigned count;
-	struct path_vertex v[PATH_REFRACTED_MAX]; /* ordered from the camera to the emitter */
-	double log_transfer;			  /* log T of refracted.h */
+	struct path_vertex v[PATH_REFRACTED_VERTICES_MAX]; /* ordered from the camera to the emitter */
+	double log_transfer;				   /* log T of refracted.h */
 };
 /* The last refraction that was computed to weight a path of another technique. All connections to one light sub-path
  * need the same one, so it is kept. */
 struct path_refraction_cache {
-	bool is_filled, found;
+	bool is_filled, has_refraction;
 	vec3 z, y;
 	double time, nm;
 	struct path_refraction refraction;
@@ -105,17 +105,17 @@ struct path_context {
 	double max_survival; /* upper limit on the survival probability; 0: no roulette */
 	bool skips_classes;  /* path_sample.class_mask and class_intensity are not needed */
 	/* pdf_rev is not needed, because no technique has more than one light vertex. */
-	bool unidirectional;
+	bool is_unidirectional;
 	/* Points of emitters are joined to the lens, which also finds paths of one edge. */
 	bool joins_emitters_to_lens;
 	/* Connections do not look through surfaces, even if the world's effects allow it. */
-	bool opaque_joints;
-	/* A vertex that has been removed from the front of the camera sub-path dispersed the light (path/longer.c). */
-	bool dispersed;
-	/* Only one in light_every samples has a light sub-path, whose contributions are multiplied by light_every. 0 or
-	 * 1: every sample has one. */
-	uint32_t light_every;
-	bool connects_all; /* every connection is made, however faint */
+	bool joints_are_opaque;
+	/* A vertex that has been removed from the front of the camera sub-path dispersed the light (path/overlong.c). */
+	bool is_dispersed;
+	/* Only one in light_subpath_interval samples has a light sub-path, whose contributions are multiplied by
+	 * light_subpath_interval. 0 or 1: every sample has one. */
+	uint32_t light_subpath_interval;
+	bool makes_faint_connections; /* every connection is made, however faint */
 	/* A connection between two surfaces that contributes less than this is only made with a
 	 * probability. 0: make all. */
 	double faint_threshold;
@@ -128,7 +128,7 @@ struct path_context {
 	/* The vertices that the last connection passed (transparent.h) or at which it was refracted (refracted.h),
 	 * ordered from the camera to the light. Their pdf is that of a camera sub-path that meets them one by one. */
 	unsigned passed_count;
-	struct path_vertex passed[PATH_PASSED_MAX];
+	struct path_vertex passed[PATH_PASSED_VERTICES_MAX];
 	double log_transfer; /* log T of refracted.h if the last connection was refracted */
 	struct path_refraction_cache refraction_cache;
 	/* emission[e], for e = 1 .. emission_edges, is the contribution of the light that media emit along edge e of

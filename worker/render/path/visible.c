@@ -12,7 +12,7 @@ static bool is_visible_from_camera(const struct path_context *c, const struct pa
 				   const struct path_vertex *b)
 {
 	struct camera storage;
-	const struct camera *camera = world_camera(c->w, &eye->x, &storage);
+	const struct camera *camera = world_camera_at(c->w, &eye->x, &storage);
 	bool at_infinity = b->kind == VERTEX_INFINITE;
 	vec3 d = at_infinity ? b->x.p : vec3_sub(b->x.p, eye->x.p);
 	if (!camera_sees_direction(camera, d))
@@ -46,6 +46,6 @@ double path_ray_t_min(const struct world *w, const struct path_vertex *from, vec
 	double t_min = 0, t_max;
 	struct camera storage;
 	if (from->kind == VERTEX_CAMERA)
-		camera_clip_range(world_camera(w, &from->x, &storage), d, &t_min, &t_max);
+		camera_clip_range(world_camera_at(w, &from->x, &storage), d, &t_min, &t_max);
 	return t_min;
 }

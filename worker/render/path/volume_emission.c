@@ -4,7 +4,7 @@
 spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct path_classes *classes)
 {
 	spectrum sum = spectrum_constant(0);
-	bool dispersed = c->dispersed;
+	bool dispersed = c->is_dispersed;
 	for (unsigned e = 1; e <= c->emission_edges && e <= last; e++) {
 		dispersed = dispersed ||
 			    (e > 1 && EFFECT_IS_ON(c->w, dispersion) && path_vertex_disperses(&c->camera[e - 1]));

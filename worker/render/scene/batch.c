@@ -51,7 +51,7 @@ int batch_expand(const struct scene_node *batch, struct arena *arena, const stru
 	const struct scene_node **children = arena_alloc(arena, 2, sizeof *children);
 	struct scene_node *sensors = arena_alloc(arena, n, sizeof *sensors);
 	const struct value width = {.type = VALUE_INT, .as.integer = node_int(film, "width", SCENE_FILM_WIDTH) / n};
-	if (!children || !sensors || !(children[0] = node_with_property(film, "width", width, arena)))
+	if (!children || !sensors || !(children[0] = node_copy_with_property(film, "width", width, arena)))
 		return node_error(batch, e, ENOMEM, "out of memory");
 	children[1] = sampler;
 	for (uint32_t i = 0; i < n; i++) {

@@ -46,7 +46,7 @@ int id_table_resolve(struct id_table *t, const struct xml_element *el, struct xm
 	if (t->is_incomplete || el->is_unset)
 		return REPORT_ALREADY_REPORTED;
 	char hint[128];
-	struct spelling s = {.wanted = id};
+	struct spelling s = {.wanted_name = id};
 	for (size_t i = 0; i < t->count && t->comparison_count < COMPARISONS_MAX; i++, t->comparison_count++)
 		spelling_offer(&s, t->entries[i].id);
 	return xml_error(el, e, ENOENT, "there is no object with id \"%.64s\"%s", id,

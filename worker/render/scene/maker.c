@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * maker_node finds the plug-in of an object by its type, makes the node, and has fill_node read its contents:
- * read_property reads parameters, and read_object reads nested or referenced objects, for which it calls maker_node in
- * turn. An element is made into a node once; later references share the node.
+ * maker_make_node finds the plug-in of an object by its type, makes the node, and has fill_node read its contents:
+ * read_property reads parameters, and read_object reads nested or referenced objects, for which it calls
+ * maker_make_node in turn. An element is made into a node once; later references share the node.
  *
  * Failures: a problem is reported and reading goes on. With `is_lenient`, what is not supported is left out or
  * replaced, with a note. Circular references are an error, and the depth and number of objects are limited (nesting.h).
@@ -14,11 +14,11 @@
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/old_values.h"
-#include "worker/render/scene/over_one.h"
+#include "worker/render/scene/limit_to_one.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/plugin/plugin.h"
 #include "worker/render/scene/refuse.h"
-#include "worker/render/scene/remarks.h"
+#include "worker/render/scene/difference_notes.h"
 #include "worker/render/text/snake_case.h"
 #include "worker/render/scene/substitute.h"
 #include "worker/render/scene/transform.h"
@@ -67,7 +67,7 @@ static int add_property(struct maker *m, struct draft *d, const struct xml_eleme
 			struct value v)
 {
 	int r = param_check(el, p, &v, m->error);
-	if (r == -ERANGE && over_one_applies(d->node->cls, p, &v)) {
+	if (r == -ERANGE && limit_to_one_applies(d->node->cls, p, &v)) {
 		const struct error why = *m->error;
 		return error_set(m->error, ERANGE, "%s%s", why.text, OVER_ONE_HINT);
 	}
@@ -98,8 +98,8 @@ static bool belongs_to_other_plugin(const struct maker *m, enum plugin_class cls
  * mistake. It must not resemble a parameter that has an effect and, in 3.x, no other plug-in of the class may have it.
  * In files of 0.6 an object may have kept parameters of a type that it had before. The parameters of materials,
  * textures, media and filters show in the image; so in 3.x a name counts as a mistake there not only if it may be
- * misspelt, but whenever it may mean one of the table (guess_parameter), and if the object comes from a glTF file or
- * stands in for another plug-in. */
+ * misspelt, but whenever it may mean one of the table (refuse_guess_parameter), and if the object comes from a glTF
+ * file or stands in for another plug-in. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
@@ -113,11 +113,12 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 		return false;
 	if (!el->is_camel_case && !has_no_visible_params && (gltf_is_file_name(el->file) || d->is_stand_in))
 		return false;
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	plugin_offer_params(d->decl, &s);
-	const struct param *meant = s.best					 ? plugin_find_param(d->decl, s.best)
-				    : has_no_visible_params || el->is_camel_case ? NULL
-										 : guess_parameter(d->decl, name);
+	const struct param *meant = s.best_match ? plugin_find_param(d->decl, s.best_match)
+				    : has_no_visible_params || el->is_camel_case
+					    ? NULL
+					    : refuse_guess_parameter(d->decl, name);
 	if (!meant)
 		return el->is_camel_case || !belongs_to_other_plugin(m, cls, name);
 	return meant->status == PARAM_IGNORED;
@@ -128,10 +129,10 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 static int note_similar_name(const struct maker *m, const struct draft *d, const struct xml_element *owner,
 			     const struct xml_element *el, const char *name)
 {
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	char hint[128], text[192];
 	plugin_offer_params(d->decl, &s);
-	if (!s.best)
+	if (!s.best_match)
 		return 0;
 	snprintf(text, sizeof text, "is not known and is ignored%s", spelling_hint(&s, hint, sizeof hint));
 	return note_parameter(&m->notes, owner, el, element_written_name(el, name), text);
@@ -185,10 +186,10 @@ static int adjust_value(struct maker *m, const struct draft *d, const struct xml
 			const struct xml_element *el, const struct param *p, struct value *v)
 {
 	enum plugin_class cls = d->node->cls;
-	int r = el->is_camel_case ? adapt_old_value(&m->notes, owner, el, p, cls, m->arena, v) : 0;
+	int r = el->is_camel_case ? old_values_adapt(&m->notes, owner, el, p, cls, m->arena, v) : 0;
 	if (!r && (p->types & VALUE_CLAMPED))
 		return clip_value(&m->notes, owner, el, p, v);
-	return !r && m->is_lenient && !d->is_stand_in ? over_one_limit_value(&m->notes, owner, el, cls, p, m->arena, v)
+	return !r && m->is_lenient && !d->is_stand_in ? limit_value_to_one(&m->notes, owner, el, cls, p, m->arena, v)
 						      : r;
 }
 
@@ -308,7 +309,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return note_left_out(&m->notes, el, xml_attribute_value(owner, "type"),
 				     element_written_name(el, p->name), "an object for the parameter");
 	const struct scene_node *child;
-	int r = maker_node(m, target, &child);
+	int r = maker_make_node(m, target, &child);
 	bool is_shared = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
 	if (!r && is_shared)
 		r = nesting_add_to_scene(&m->object_count, target, m->error);
@@ -316,7 +317,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		r = nesting_add(&d->nesting, d->node->cls, el, target, is_shared, m->error);
 	if (r)
 		return r == -E2BIG && m->is_resumed ? REPORT_ALREADY_REPORTED : r;
-	if (p && (r = over_one_limit_texture(&m->notes, d->node->cls, p, m->is_lenient, m->arena, target, &child)))
+	if (p && (r = limit_texture_to_one(&m->notes, d->node->cls, p, m->is_lenient, m->arena, target, &child)))
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
@@ -440,7 +441,7 @@ static int make_stand_in(struct maker *m, struct xml_element *el, struct xml_ele
 {
 	el->is_in_progress = true;
 	m->depth++;
-	int r = maker_node(m, inner, out);
+	int r = maker_make_node(m, inner, out);
 	m->depth--;
 	el->is_in_progress = false;
 	el->nesting = inner->nesting;
@@ -475,7 +476,7 @@ static int check_contents(struct maker *m, struct xml_element *el)
 		if (c->is_ignored || is_unsupported || strcmp(c->name, "default") == 0)
 			continue;
 		if (plugin_class_find(c->name, &cls))
-			r = maker_node(m, c, &unused);
+			r = maker_make_node(m, c, &unused);
 		else if (strcmp(c->name, "ref") == 0)
 			r = id_table_resolve(&m->ids, c, &target, m->error);
 		else if (value_is_element(c->name))
@@ -507,7 +508,7 @@ static int report_refused(struct maker *m, struct xml_element *el, enum plugin_c
 {
 	if (code >= 0 || (code = report_problem(&m->report, code, m->error)))
 		return code;
-	const struct plugin_decl *meant = guess_type(m->decls, el, cls, type);
+	const struct plugin_decl *meant = refuse_guess_type(m->decls, el, cls, type);
 	return meant ? check_contents_as(m, el, meant) : check_contents(m, el);
 }
 
@@ -535,7 +536,7 @@ static int finish_node(struct maker *m, const struct draft *d, struct xml_elemen
 			m->first_flat_shape = el;
 		return REPORT_ALREADY_REPORTED;
 	}
-	int r = remarks_on_object(d->node, &m->report, m->error);
+	int r = note_object_differences(d->node, &m->report, m->error);
 	if (!r && m->is_lenient && (r = substitute_medium(&m->notes, el, d->lacks_content, d->node)))
 		return r;
 	if (!r && m->is_lenient && !m->tree->is_dialect_3 && (r = substitute_volume(&m->notes, el, d->node)))
@@ -568,7 +569,7 @@ static int check_can_make(struct maker *m, struct xml_element *el)
 
 /* An object with errors inside still becomes a node, so that all errors are found. An element that cannot become a
  * node, for example because its type is unknown, is reported once. */
-int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+int maker_make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	if (el->node) {
 		*out = el->node;

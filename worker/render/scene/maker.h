@@ -43,7 +43,7 @@ int maker_out_of_memory(struct maker *m); /* returns -ENOMEM and sets the messag
 int maker_add_asset(struct maker *m, const char *name, const struct xml_element *element);
 
 /* Stores the node of an element that is an object. It is made at the first call; references to the element share it. */
-int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
+int maker_make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
 /* Refuses an element that has no meaning where it stands; with `is_lenient`, leaves it out with a note. */
 int maker_reject_element(struct maker *m, const struct xml_element *el);
 

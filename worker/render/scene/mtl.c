@@ -147,7 +147,7 @@ int mtl_read(struct mtl *m, const struct asset_source *assets, const char *file,
 	struct error unused;
 	if (assets->open(assets->user, file, &a, &unused))
 		return 0;
-	m->exists = true;
+	m->file_exists = true;
 	struct text_lines lines = {.cursor = (const char *)a.bytes, .end = (const char *)a.bytes + a.size};
 	int r = read_lines(m, &lines, assets, arena, e);
 	assets->close(assets->user, &a);

@@ -26,7 +26,7 @@ struct mtl_material {
 
 struct mtl {
 	const char *file;
-	bool exists; /* the file can be opened */
+	bool file_exists; /* the file can be opened */
 	const struct mtl_material *last_material;
 	struct mtl_value unsupported; /* the first keyword that would change the image but is not supported */
 };

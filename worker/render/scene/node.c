@@ -17,8 +17,8 @@ const struct property *node_find_property(const struct scene_node *n, const char
 	return NULL;
 }
 
-const struct scene_node *node_with_property(const struct scene_node *n, const char *name, struct value v,
-					    struct arena *arena)
+const struct scene_node *node_copy_with_property(const struct scene_node *n, const char *name, struct value v,
+						 struct arena *arena)
 {
 	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
 	struct property *p = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *p);

@@ -65,8 +65,8 @@ const struct scene_node *node_ref(const struct scene_node *n, const char *name);
 
 /* Returns a copy of n in which the property has this value, whether or not n has the property. NULL if out of
  * memory. */
-const struct scene_node *node_with_property(const struct scene_node *n, const char *name, struct value v,
-					    struct arena *arena);
+const struct scene_node *node_copy_with_property(const struct scene_node *n, const char *name, struct value v,
+						 struct arena *arena);
 
 /* Returns whether both nodes have the same type, parameters and contents, regardless of where they stand in the
  * file. False if that takes comparing more than NODE_EQUALS_OBJECTS_MAX objects. */

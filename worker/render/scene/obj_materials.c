@@ -177,7 +177,7 @@ static int read_library(const struct obj_splitter *s, struct obj_shape *o)
 	if (!file)
 		return out_of_memory(s);
 	int r = mtl_read(&o->mtl, s->assets, file, s->arena, s->error);
-	if (!r && o->mtl.exists && asset_list_add(s->files, file, o->el, s->arena))
+	if (!r && o->mtl.file_exists && asset_list_add(s->files, file, o->el, s->arena))
 		r = out_of_memory(s);
 	return r;
 }

@@ -109,8 +109,8 @@ static int convert_to_lower(struct value *v, struct arena *arena)
 	return 0;
 }
 
-int adapt_old_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		    const struct param *p, enum plugin_class cls, struct arena *arena, struct value *v)
+int old_values_adapt(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		     const struct param *p, enum plugin_class cls, struct arena *arena, struct value *v)
 {
 	if (v->type == VALUE_STRING && p->choices && convert_to_lower(v, arena))
 		return error_set(t->error, ENOMEM, "out of memory");

@@ -20,7 +20,7 @@
  * - The components of a metal's complex index of refraction lose their signs, on which nothing depends.
  * - The microfacet distributions `phong` and `as` become `beckmann` of the same roughness.
  */
-int adapt_old_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		    const struct param *p, enum plugin_class cls, struct arena *arena, struct value *v);
+int old_values_adapt(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		     const struct param *p, enum plugin_class cls, struct arena *arena, struct value *v);
 
 #endif

@@ -20,7 +20,7 @@ static void convert_to_float(struct value *v)
 static int refuse_choice(const struct xml_element *el, const struct param *p, const char *word, struct error *e)
 {
 	char choice[64], names[16][64], hint[128], list[512] = "";
-	struct spelling s = {.wanted = word};
+	struct spelling s = {.wanted_name = word};
 	size_t n = 0;
 	for (const char *rest = p->choices; n < 16 && (rest = element_next_name(rest, choice, sizeof choice)); n++) {
 		memcpy(names[n], choice, sizeof choice);

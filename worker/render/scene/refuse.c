@@ -37,7 +37,7 @@ static const char *lenient_hint(const struct xml_element *el, enum plugin_class 
 static const char *element_synonym(const char *name)
 {
 	static const struct {
-		const char *other, *ours;
+		const char *synonym, *element;
 	} names[] = {
 		{"bool", "boolean"},	  {"int", "integer"},	 {"double", "float"},  {"number", "float"},
 		{"str", "string"},	  {"text", "string"},	 {"color", "rgb"},     {"colour", "rgb"},
@@ -46,8 +46,8 @@ static const char *element_synonym(const char *name)
 		{"image", "texture"},	  {"define", "default"},
 	};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (strcmp(names[i].other, name) == 0)
-			return names[i].ours;
+		if (strcmp(names[i].synonym, name) == 0)
+			return names[i].element;
 	return NULL;
 }
 
@@ -60,7 +60,7 @@ int refuse_element(const struct xml_element *el, struct error *e)
 				 "gives a diffuse base to the plastic above a dipole");
 	if (strcmp(el->name, "field") == 0)
 		return xml_error(el, e, EINVAL, "fields are not supported; --lenient leaves them out");
-	struct spelling s = {.wanted = el->name};
+	struct spelling s = {.wanted_name = el->name};
 	plugin_offer_classes(&s);
 	value_offer_elements(&s);
 	spelling_offer(&s, "ref");
@@ -70,34 +70,34 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	spelling_offer(&s, "path");
 	const char *synonym = element_synonym(el->name), *parent_name = el->parent ? el->parent->name : "";
 	if (synonym)
-		s.best = synonym;
-	else if (s.best && strcmp(s.best, el->name) == 0) /* right name, wrong place */
+		s.best_match = synonym;
+	else if (s.best_match && strcmp(s.best_match, el->name) == 0) /* right name, wrong place */
 		return xml_error(el, e, EINVAL, "has no place in <%.64s>", parent_name);
 	return xml_error(el, e, EINVAL, "there is no element of this name%s",
-			 s.best ? spelling_hint(&s, hint, sizeof hint) : "; --lenient leaves it out");
+			 s.best_match ? spelling_hint(&s, hint, sizeof hint) : "; --lenient leaves it out");
 }
 
 /* Offers the types of a class, unless a type is known to be right, or is no name but an image format. */
 static void offer_types(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls,
 			struct spelling *s)
 {
-	if (!(cls == PLUGIN_TEXTURE && gltf_is_file_name(el->file)) && !plugin_is_known_to_mitsuba(cls, s->wanted))
+	if (!(cls == PLUGIN_TEXTURE && gltf_is_file_name(el->file)) && !plugin_is_known_to_mitsuba(cls, s->wanted_name))
 		plugin_offer_types(decls, cls, s);
 }
 
-const struct plugin_decl *guess_type(const struct plugin_decl *decls, const struct xml_element *el,
-				     enum plugin_class cls, const char *type)
+const struct plugin_decl *refuse_guess_type(const struct plugin_decl *decls, const struct xml_element *el,
+					    enum plugin_class cls, const char *type)
 {
-	struct spelling s = {.wanted = type};
+	struct spelling s = {.wanted_name = type};
 	offer_types(decls, el, cls, &s);
-	return s.best ? plugin_find(decls, cls, s.best) : NULL;
+	return s.best_match ? plugin_find(decls, cls, s.best_match) : NULL;
 }
 
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e)
 {
 	char hint[128], similar[128] = "", checked[96] = "", list[512];
-	struct spelling s = {.wanted = type};
+	struct spelling s = {.wanted_name = type};
 	if (cls == PLUGIN_TEXTURE && gltf_is_file_name(el->file)) /* an extension, whose name is the image's format */
 		return xml_error(el, e, ENOTSUP, "images of %.64s are not supported; export PNG, JPEG or WebP%s", type,
 				 LENIENT_TEXTURE_HINT);
@@ -107,8 +107,8 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported%s (supported: %s)",
 				 plugin_class_name(cls), lenient_hint(el, cls, type, hint, sizeof hint), list);
 	spelling_hint(&s, similar, sizeof similar);
-	if (s.best && el->first_child)
-		snprintf(checked, sizeof checked, "its content is checked as that of `%.48s`; ", s.best);
+	if (s.best_match && el->first_child)
+		snprintf(checked, sizeof checked, "its content is checked as that of `%.48s`; ", s.best_match);
 	const char *lenient = lenient_hint(el, cls, type, hint, sizeof hint);
 	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (%ssupported: %s)", plugin_class_name(cls),
 			 similar, *similar && *lenient ? lenient + 1 : lenient, checked,
@@ -127,11 +127,11 @@ static bool is_name_part(const char *a, const char *b)
 	return (b[n] == '_' && strncmp(a, b, n) == 0) || (b[m - n - 1] == '_' && strcmp(a, b + m - n) == 0);
 }
 
-const struct param *guess_parameter(const struct plugin_decl *owner, const char *name)
+const struct param *refuse_guess_parameter(const struct plugin_decl *owner, const char *name)
 {
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	plugin_offer_params(owner, &s);
-	const char *usual = lenient_param_name(owner->type, name), *best = s.best;
+	const char *usual = lenient_param_name(owner->type, name), *best = s.best_match;
 	if (!best && strcmp(usual, name) != 0)
 		best = usual;
 	const struct param *meant = best ? plugin_find_param(owner, best) : NULL;
@@ -155,8 +155,8 @@ int refuse_property(const struct plugin_decl *owner, const char *type, const str
 	const char *value = xml_attribute_value(el, "value");
 	if (gltf_is_file_name(el->file) && value && strcmp(value, ELEMENT_UNSUPPORTED) == 0)
 		return xml_error(el->parent, e, ENOTSUP, "`%.64s` is not supported; --lenient leaves it out", name);
-	const struct param *meant = guess_parameter(owner, name);
-	struct spelling s = {.wanted = name, .best = meant ? meant->name : NULL};
+	const struct param *meant = refuse_guess_parameter(owner, name);
+	struct spelling s = {.wanted_name = name, .best_match = meant ? meant->name : NULL};
 	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
 			 plugin_class_name(owner->cls), type, written, spelling_hint(&s, hint, sizeof hint), list);
 }

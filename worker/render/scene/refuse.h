@@ -16,12 +16,12 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 
 /* Returns the plug-in whose name an unknown type resembles, under which refuse_type says that its content is checked;
  * NULL if there is none. */
-const struct plugin_decl *guess_type(const struct plugin_decl *decls, const struct xml_element *el,
-				     enum plugin_class cls, const char *type);
+const struct plugin_decl *refuse_guess_type(const struct plugin_decl *decls, const struct xml_element *el,
+					    enum plugin_class cls, const char *type);
 
 /* Returns the parameter of `owner` that an unknown name may mean: as a misspelling, as another usual name, or, if
  * the parameter has an effect, as a part of its name. NULL if there is none. */
-const struct param *guess_parameter(const struct plugin_decl *owner, const char *name);
+const struct param *refuse_guess_parameter(const struct plugin_decl *owner, const char *name);
 
 /* Refuses a parameter that is unknown (p NULL) or not supported. `owner` is the plug-in, `type` the type written in
  * the file. */

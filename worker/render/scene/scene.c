@@ -22,7 +22,7 @@
 #include "worker/render/scene/notes.h"
 #include "worker/render/scene/obj_materials.h"
 #include "worker/render/plugin/plugin.h"
-#include "worker/render/scene/remarks.h"
+#include "worker/render/scene/difference_notes.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/subsurface.h"
 #include "worker/render/scene/texture_names.h"
@@ -34,7 +34,7 @@
 
 static int make_object(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
-	int r = maker_node(m, el, out);
+	int r = maker_make_node(m, el, out);
 	if (!r)
 		r = nesting_add_to_scene(&m->object_count, el, m->error);
 	uint32_t count = 1;
@@ -198,7 +198,7 @@ static int make_scene(struct maker *m)
 	if (!r)
 		r = note_flat_shapes(m);
 	if (!r && !m->tree->has_missing_files)
-		r = remarks_on_scene(objects, s->object_count, s->is_dialect_3, &m->report, m->error);
+		r = note_scene_differences(objects, s->object_count, s->is_dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 

@@ -247,7 +247,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	for (const struct scene_node *n = integrator; n; n = integrator_inner(n))
 		roulette = node_int(n, "rr_depth", roulette);
 	for (const struct scene_node *n = integrator; n; n = integrator_inner(n))
-		out->hide_emitters |= node_bool(n, "hide_emitters", false);
+		out->hides_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE,
 				  "a depth of 0 shows nothing; 1 shows emitters seen directly, -1 is no limit");
@@ -389,7 +389,7 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 
 #define DEFAULT_SENSOR_FOV 45.0
 
-/* The sensor of a scene that has none; scene_settings_place_default_sensor() gives its position. */
+/* The sensor of a scene that has none; scene_settings_place_sensor() gives its position. */
 static const struct property default_sensor_properties[] = {
 	{"fov", 0, {.type = VALUE_FLOAT, .as.number = DEFAULT_SENSOR_FOV}}};
 static const struct scene_node default_sensor = {.cls = PLUGIN_SENSOR,
@@ -399,8 +399,7 @@ static const struct scene_node default_sensor = {.cls = PLUGIN_SENSOR,
 						 .property_count = 1,
 						 .properties = default_sensor_properties};
 
-int scene_settings_place_default_sensor(struct scene_settings *s, const char *file, vec3 low, vec3 high,
-					struct error *e)
+int scene_settings_place_sensor(struct scene_settings *s, const char *file, vec3 low, vec3 high, struct error *e)
 {
 	double size = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z)),
 	       distance = size / (2 * tan(DEFAULT_SENSOR_FOV / 2 / 57.295779513082320877));

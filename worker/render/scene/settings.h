@@ -28,7 +28,7 @@ struct scene_settings {
 	uint64_t spp;					  /* sample_count; 0: none given */
 	uint32_t max_depth;	 /* edges of the longest path, 1..128 (-1 and larger values become 128); default 128 */
 	uint32_t roulette_depth; /* scattering events before Russian roulette begins (rr_depth), from 1 on; default 5 */
-	bool hide_emitters;	 /* hides paths of one edge, which show emitters directly */
+	bool hides_emitters;	 /* hides paths of one edge, which show emitters directly */
 	char integrator[32]; /* type of the scene's own integrator ("": none), which is ignored except for its depths
 				and media */
 	mat4 to_world;	     /* camera, as the shutter opens: +z forward, +x LEFT on the image, +y up; no scale */
@@ -46,7 +46,7 @@ struct scene_settings {
 	double line_exposure; /* exposure of a line, as a fraction of the time from the start of the first to the end of
 				 the last */
 	double aperture_radius, focus_distance; /* thinlens, telecentric; radius 0: a pinhole, whatever the distance */
-	bool is_unplaced; /* the scene has no sensor: scene_settings_place_default_sensor() gives the camera's position
+	bool is_unplaced; /* the scene has no sensor: scene_settings_place_sensor() gives the camera's position
 			   */
 };
 
@@ -75,8 +75,7 @@ const struct scene_node *scene_sensor(const struct scene *s, uint32_t number);
 
 /* For a scene without a sensor, whose shapes lie between low and high: places the camera that both versions of
  * Mitsuba supply. file: name of the scene file, for the error if there is no shape. */
-int scene_settings_place_default_sensor(struct scene_settings *s, const char *file, vec3 low, vec3 high,
-					struct error *e);
+int scene_settings_place_sensor(struct scene_settings *s, const char *file, vec3 low, vec3 high, struct error *e);
 
 /* Declarations of all sensors, films, reconstruction filters, samplers and integrators; ends with a NULL type. */
 extern const struct plugin_decl setting_decls[];

@@ -154,7 +154,7 @@ static int read_file(const struct xml_element *el, const char *name, const struc
 {
 	struct asset a;
 	struct error inner;
-	struct arena_share *share = arena_share(arena, name, strlen(name) + 1);
+	struct arena_interned *share = arena_intern(arena, name, strlen(name) + 1);
 	struct value *cached = share ? share->user : NULL;
 	if (cached) {
 		*out = *cached;
@@ -436,7 +436,7 @@ static int read_typed(const struct xml_element *el, const char *type, const stru
 {
 	(void)assets;
 	char hint[128], list[256] = "";
-	struct spelling s = {.wanted = type};
+	struct spelling s = {.wanted_name = type};
 	for (int i = 0; i < TYPES; i++) {
 		spelling_offer(&s, types[i].type);
 		spelling_append_to_list(list, sizeof list, types[i].type);

@@ -207,7 +207,7 @@ static const struct step *find_step(const char *name, struct spelling *s)
 
 static int read_step(const struct xml_element *el, mat4 *out, struct error *e)
 {
-	struct spelling s = {.wanted = el->name};
+	struct spelling s = {.wanted_name = el->name};
 	const struct step *step = find_step(el->name, &s);
 	char hint[128];
 	if (!step)

@@ -30,7 +30,7 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 		return r;
 	out->as.boolean = strcasecmp(text, "true") == 0; /* Python writes True */
 	if (!out->as.boolean && strcasecmp(text, "false") != 0) {
-		struct spelling s = {.wanted = text};
+		struct spelling s = {.wanted_name = text};
 		char hint[32];
 		spelling_offer(&s, "true");
 		spelling_offer(&s, "false");

@@ -104,7 +104,7 @@ void render_setting_print_range(const struct render_setting *k, char *text, size
 
 static int unknown_name_error(const char *name, struct error *e)
 {
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	char hint[80], names[256] = "";
 	for (size_t i = 0; i < SETTING_COUNT; i++) {
 		spelling_offer(&s, setting_table[i].name);
@@ -117,11 +117,11 @@ static int unknown_name_error(const char *name, struct error *e)
 /* Returns a hint about a setting that is written without a value; "" if only the value is missing. */
 static const char *name_hint(const char *name, char *text, size_t size)
 {
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	for (size_t i = 0; i < SETTING_COUNT; i++)
 		spelling_offer(&s, setting_table[i].name);
-	if (s.best && s.distance == 0)
-		s.best = NULL;
+	if (s.best_match && s.best_distance == 0)
+		s.best_match = NULL;
 	return spelling_hint(&s, text, size);
 }
 
@@ -137,7 +137,7 @@ static int find_setting(const char *name, size_t *index, struct error *e)
 static const char *value_hint(const struct render_setting *k, const char *wanted, char *text, size_t size)
 {
 	char choice[VALUE_BYTES];
-	struct spelling s = {.wanted = wanted};
+	struct spelling s = {.wanted_name = wanted};
 	for (int i = 0; k->kind == SETTING_CHOICE && copy_choice(k->choices, i, 0, choice, sizeof choice); i++)
 		spelling_offer(&s, choice);
 	return spelling_hint(&s, text, size);

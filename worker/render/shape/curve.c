@@ -73,8 +73,8 @@ static void extend_bounds(struct curve *c, const struct chain_point *p)
 {
 	double r = p->radius;
 	vec3 q = p->center;
-	c->low = (vec3){fmin(c->low.x, q.x - r), fmin(c->low.y, q.y - r), fmin(c->low.z, q.z - r)};
-	c->high = (vec3){fmax(c->high.x, q.x + r), fmax(c->high.y, q.y + r), fmax(c->high.z, q.z + r)};
+	c->box_min = (vec3){fmin(c->box_min.x, q.x - r), fmin(c->box_min.y, q.y - r), fmin(c->box_min.z, q.z - r)};
+	c->box_max = (vec3){fmax(c->box_max.x, q.x + r), fmax(c->box_max.y, q.y + r), fmax(c->box_max.z, q.z + r)};
 	c->max_radius = fmax(c->max_radius, r);
 }
 
@@ -83,8 +83,8 @@ int curve_measure(struct curve *c)
 	struct list points = {.item_size = sizeof(struct chain_point)};
 	uint64_t sum = 0;
 	int rc = 0;
-	c->low = (vec3){INFINITY, INFINITY, INFINITY};
-	c->high = vec3_neg(c->low);
+	c->box_min = (vec3){INFINITY, INFINITY, INFINITY};
+	c->box_max = vec3_neg(c->box_min);
 	c->max_radius = 0;
 	for (uint32_t i = 0; i < c->curve_count && !rc; i++) {
 		rc = curve_make_chain(c, i, &points);

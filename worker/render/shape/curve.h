@@ -19,7 +19,7 @@ struct curve {
 	/* Set by curve_measure: the number of points of all chains, the bounding box of their spheres, and the largest
 	 * radius. */
 	uint32_t chain_point_count;
-	vec3 low, high;
+	vec3 box_min, box_max;
 	double max_radius;
 };
 

@@ -24,10 +24,10 @@ struct curve_reader {
 	const struct scene_node *node;
 	const char *file_name;
 	mat4 to_world;
-	double radius;	     /* of all points; negative: each line has its own */
-	uint32_t min_points; /* of a curve */
-	bool drop_short;     /* curves with fewer points are left out */
-	bool in_curve;
+	double radius;		 /* of all points; negative: each line has its own */
+	uint32_t min_points;	 /* of a curve */
+	bool drops_short_curves; /* curves with fewer points are left out */
+	bool is_in_curve;
 	struct curve_points *out;
 	struct error *error;
 };
@@ -55,7 +55,7 @@ static int add_curve_start(struct curve_reader *r)
 static int add_point(struct curve_reader *r, const double p[4], int line)
 {
 	struct list *points = &r->out->point_list;
-	int rc = r->in_curve ? 0 : add_curve_start(r);
+	int rc = r->is_in_curve ? 0 : add_curve_start(r);
 	if (rc)
 		return rc;
 	if (points->count >= POINTS_MAX)
@@ -74,20 +74,20 @@ static int add_point(struct curve_reader *r, const double p[4], int line)
 		return out_of_memory(r);
 	vec3_store(new, world_position);
 	new[3] = p[3];
-	r->in_curve = true;
+	r->is_in_curve = true;
 	return 0;
 }
 
 static int end_curve(struct curve_reader *r, int line)
 {
 	struct list *points = &r->out->point_list, *firsts = &r->out->first_point_list;
-	if (!r->in_curve)
+	if (!r->is_in_curve)
 		return 0;
-	r->in_curve = false;
+	r->is_in_curve = false;
 	uint32_t first = ((const uint32_t *)firsts->items)[firsts->count - 1], count = (uint32_t)points->count - first;
 	if (count >= r->min_points)
 		return 0;
-	if (!r->drop_short)
+	if (!r->drops_short_curves)
 		return node_error(r->node, r->error, EINVAL, "%s:%d: a curve of %u control point%s; it needs %u",
 				  r->file_name, line, count, count == 1 ? "" : "s", r->min_points);
 	points->count = first;
@@ -195,8 +195,11 @@ int curve_file_read(const struct scene_node *n, const struct asset_source *asset
 int curve_file_read_hair(const struct scene_node *n, const struct asset_source *assets, double radius,
 			 struct curve_points *out, struct error *e)
 {
-	return read_file(
-		&(struct curve_reader){
-			.node = n, .radius = radius, .min_points = 2, .drop_short = true, .out = out, .error = e},
-		assets);
+	return read_file(&(struct curve_reader){.node = n,
+						.radius = radius,
+						.min_points = 2,
+						.drops_short_curves = true,
+						.out = out,
+						.error = e},
+			 assets);
 }

@@ -21,7 +21,7 @@
 #define SEAM_HEIGHT 1e-9
 
 /* The contributions of the triangles around a place. */
-struct place {
+struct displaced_place {
 	vec3 position, direction_sum, normal_sum;	       /* sums are weighted */
 	double weight_sum, height_sum, min_height, max_height; /* height_sum: weighted */
 	bool has_samples, is_crease; /* some triangle has contributed; the place is on a crease or seam */
@@ -38,15 +38,15 @@ struct displacer {
 	const struct sphere *sphere; /* NULL: the base mesh is the surface itself */
 	struct mesh base, out;
 	struct displace_grid grid;
-	struct place *places;
+	struct displaced_place *places;
 	struct normal_delta *normal_deltas;
 	double max_abs_height; /* largest |height| */
 };
 
 /* The surface at a point before displacement, and the height there. */
-struct sample {
+struct surface_sample {
 	vec3 p, n;
-	double u, v, h;
+	double u, v, height;
 };
 
 static vec3 mix(const double (*a)[3], const uint32_t t[3], const double b[3])
@@ -62,20 +62,20 @@ static vec3 sphere_axis(const struct sphere *s, int k)
 
 /* Samples the sphere in the direction `direction`. u is continuous beyond the octant's own quarter, and at the poles
  * has the value of its middle. */
-static void sample_sphere(const struct sphere *sphere, uint32_t octant, vec3 direction, struct sample *s)
+static void sample_sphere(const struct sphere *sphere, uint32_t octant, vec3 direction, struct surface_sample *s)
 {
 	vec3 w = vec3_normalize(direction);
 	double x = vec3_dot(w, sphere_axis(sphere, 0)), y = vec3_dot(w, sphere_axis(sphere, 1)),
 	       z = vec3_dot(w, sphere_axis(sphere, 2));
 	s->p = vec3_madd(sphere->center, sphere->radius, w);
-	s->n = sphere->flip_normals ? vec3_neg(w) : w;
+	s->n = sphere->flips_normals ? vec3_neg(w) : w;
 	double middle = ((octant & 3) + 0.5) * M_PI / 2, c = cos(middle), k = sin(middle);
 	double offset_angle = hypot(x, y) > 1e-12 ? atan2(c * y - k * x, c * x + k * y) : 0;
 	s->u = (middle + offset_angle) / (2 * M_PI);
 	s->v = acos(fmin(fmax(z, -1), 1)) / M_PI;
 }
 
-static void sample_base(const struct displacer *w, uint32_t triangle, double b1, double b2, struct sample *s)
+static void sample_base(const struct displacer *w, uint32_t triangle, double b1, double b2, struct surface_sample *s)
 {
 	const struct mesh *m = &w->base;
 	const uint32_t *t = m->index[triangle];
@@ -93,7 +93,7 @@ static void sample_base(const struct displacer *w, uint32_t triangle, double b1,
 			s->v = b[0] * m->uv[t[0]][1] + b[1] * m->uv[t[1]][1] + b[2] * m->uv[t[2]][1];
 		}
 	}
-	s->h = w->d->scale * w->d->height(w->d->user, s->u, s->v);
+	s->height = w->d->scale * w->d->height(w->d->user, s->u, s->v);
 }
 
 static vec3 tangential_part(vec3 v, vec3 n)
@@ -110,18 +110,18 @@ static vec3 normalize_or(vec3 v, vec3 fallback)
 /* Returns the normal of the displaced surface from central differences. The points may be outside the triangle: its
  * plane, normals and (u,v) are extrapolated. */
 static vec3 displaced_normal(const struct displacer *w, uint32_t triangle, double b1, double b2,
-			     const struct sample *center)
+			     const struct surface_sample *center)
 {
 	double step = 1.0 / w->grid.parts_per_edge;
 	vec3 base_difference[2], displaced_difference[2];
 	for (int k = 0; k < 2; k++) {
-		struct sample a, b;
+		struct surface_sample a, b;
 		double s1 = k == 0 ? step : 0, s2 = k == 1 ? step : 0;
 		sample_base(w, triangle, b1 + s1, b2 + s2, &a);
 		sample_base(w, triangle, b1 - s1, b2 - s2, &b);
 		base_difference[k] = tangential_part(vec3_sub(a.p, b.p), center->n);
-		displaced_difference[k] =
-			vec3_madd(vec3_madd(base_difference[k], a.h - b.h, center->n), center->h, vec3_sub(a.n, b.n));
+		displaced_difference[k] = vec3_madd(vec3_madd(base_difference[k], a.height - b.height, center->n),
+						    center->height, vec3_sub(a.n, b.n));
 	}
 	vec3 n = vec3_cross(displaced_difference[0], displaced_difference[1]);
 	bool is_reversed = vec3_dot(vec3_cross(base_difference[0], base_difference[1]), center->n) < 0;
@@ -135,16 +135,16 @@ static double corner_angle(const struct mesh *m, const uint32_t t[3], uint32_t k
 			  vec3_sub(vec3_load(m->position[t[(k + 2) % 3]]), p));
 }
 
-static void add_to_place(struct place *c, double weight, const struct sample *s, vec3 normal)
+static void add_to_place(struct displaced_place *c, double weight, const struct surface_sample *s, vec3 normal)
 {
 	if (!c->has_samples)
 		c->position = s->p;
-	c->min_height = c->has_samples ? fmin(c->min_height, s->h) : s->h;
-	c->max_height = c->has_samples ? fmax(c->max_height, s->h) : s->h;
+	c->min_height = c->has_samples ? fmin(c->min_height, s->height) : s->height;
+	c->max_height = c->has_samples ? fmax(c->max_height, s->height) : s->height;
 	c->has_samples = true;
 	c->direction_sum = vec3_madd(c->direction_sum, weight, s->n);
 	c->normal_sum = vec3_madd(c->normal_sum, weight, normal);
-	c->height_sum += weight * s->h;
+	c->height_sum += weight * s->height;
 	c->weight_sum += weight;
 }
 
@@ -176,18 +176,18 @@ static void emit_vertex(struct displacer *w, uint32_t triangle, uint32_t i, uint
 {
 	uint32_t parts = w->grid.parts_per_edge;
 	struct displace_point point = displace_grid_point(&w->grid, triangle, i, j);
-	struct sample s;
+	struct surface_sample s;
 	double b1 = (double)i / parts, b2 = (double)j / parts;
 	sample_base(w, triangle, b1, b2, &s);
 	vec3 normal = displaced_normal(w, triangle, b1, b2, &s);
-	w->max_abs_height = fmax(w->max_abs_height, fabs(s.h));
+	w->max_abs_height = fmax(w->max_abs_height, fabs(s.height));
 	mix_attributes(w, triangle, b1, b2, point.vertex);
 	if (w->out.uv) {
 		w->out.uv[point.vertex][0] = s.u;
 		w->out.uv[point.vertex][1] = s.v;
 	}
 	if (point.is_interior) {
-		vec3_store(w->out.position[point.vertex], vec3_madd(s.p, s.h, s.n));
+		vec3_store(w->out.position[point.vertex], vec3_madd(s.p, s.height, s.n));
 		vec3_store(w->out.normal[point.vertex], normal);
 		return;
 	}
@@ -200,7 +200,7 @@ static void emit_vertex(struct displacer *w, uint32_t triangle, uint32_t i, uint
 
 /* Moves a place by the mean height along the mean normal. Places without a mean normal, where opposite sheets touch, do
  * not move. */
-static void finish_place(const struct displacer *w, struct place *c)
+static void finish_place(const struct displacer *w, struct displaced_place *c)
 {
 	double length = vec3_length(c->direction_sum), height = c->height_sum / c->weight_sum;
 	bool agree = length >= CREASE_COSINE * c->weight_sum &&
@@ -215,7 +215,7 @@ static void finish_vertex(struct displacer *w, uint32_t triangle, uint32_t i, ui
 	struct displace_point point = displace_grid_point(&w->grid, triangle, i, j);
 	if (point.is_interior)
 		return;
-	const struct place *c = &w->places[point.place];
+	const struct displaced_place *c = &w->places[point.place];
 	vec3_store(w->out.position[point.vertex], c->position);
 	if (!c->is_crease)
 		vec3_store(w->out.normal[point.vertex],
@@ -248,7 +248,7 @@ static void add_normal_deltas(struct displacer *w, uint32_t triangle, const uint
 {
 	vec3 base[3], displaced[3];
 	for (int k = 0; k < 3; k++) {
-		struct sample s;
+		struct surface_sample s;
 		sample_base(w, triangle, (double)ij[k][0] / w->grid.parts_per_edge,
 			    (double)ij[k][1] / w->grid.parts_per_edge, &s);
 		base[k] = s.p;
@@ -368,7 +368,7 @@ static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena
 		const vec3 equator[4] = {x, y, vec3_neg(x), vec3_neg(y)};
 		const vec3 c[3] = {t < 4 ? z : vec3_neg(z), equator[t & 3], equator[(t + 1) & 3]};
 		bool is_mirrored = vec3_dot(vec3_cross(x, y), z) < 0,
-		     is_reversed = ((t >= 4) != s->flip_normals) != is_mirrored;
+		     is_reversed = ((t >= 4) != s->flips_normals) != is_mirrored;
 		for (uint32_t k = 0; k < 3; k++) {
 			vec3_store(m->normal[3 * t + k], c[k]);
 			vec3_store(m->position[3 * t + k], vec3_madd(s->center, s->radius, c[k]));

@@ -18,7 +18,7 @@ const struct shape_ops shape_ops_instance = {{PLUGIN_SHAPE, "instance",
 					      1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD},
 					     NULL};
 
-struct listing {
+struct shape_listing {
 	struct arena *arena;
 	struct listed_shape *shapes;
 	uint32_t count, capacity;
@@ -28,20 +28,20 @@ struct listing {
 	struct error *e;
 };
 
-static int out_of_memory(struct listing *l)
+static int out_of_memory(struct shape_listing *l)
 {
 	return error_set(l->e, ENOMEM, "out of memory while listing shapes");
 }
 
 static const struct scene_node *node_placed_at(const struct scene_node *n, mat4 to_world, struct arena *arena)
 {
-	return node_with_property(n, "to_world", (struct value){.type = VALUE_TRANSFORM, .as.transform = to_world},
-				  arena);
+	return node_copy_with_property(n, "to_world", (struct value){.type = VALUE_TRANSFORM, .as.transform = to_world},
+				       arena);
 }
 
 /* Replaces a moving node by a still one at its position when the shutter opens. *animation: its motion while the
  * shutter is open; NULL if it does not move then. */
-static int freeze_motion(struct listing *l, const struct scene_node **n, const struct animation **animation)
+static int freeze_motion(struct shape_listing *l, const struct scene_node **n, const struct animation **animation)
 {
 	const struct animation *a = node_animation(*n);
 	struct motion m;
@@ -57,7 +57,7 @@ static int freeze_motion(struct listing *l, const struct scene_node **n, const s
 	return *n ? 0 : out_of_memory(l);
 }
 
-static int append_shape(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
+static int append_shape(struct shape_listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	const struct animation *animation = l->animation;
 	if (instance && node_animation(n))
@@ -83,16 +83,16 @@ static int append_shape(struct listing *l, const struct scene_node *n, const str
 	return 0;
 }
 
-static int list_node(struct listing *l, const struct scene_node *n, const struct scene_node *instance);
+static int list_node(struct shape_listing *l, const struct scene_node *n, const struct scene_node *instance);
 
 /* Handles the result of listing one object: reports an error if problems are collected. Returns 0 to continue with the
  * next object, or the code. */
-static int handle_result(struct listing *l, int code)
+static int handle_result(struct shape_listing *l, int code)
 {
 	return l->report && code != -E2BIG ? report_problem_once(l->report, code, l->e) : code;
 }
 
-static int list_children(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
+static int list_children(struct shape_listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	int rc = 0;
 	for (uint32_t i = 0; i < n->child_count && !rc; i++)
@@ -100,7 +100,7 @@ static int list_children(struct listing *l, const struct scene_node *n, const st
 	return rc;
 }
 
-static int list_instance(struct listing *l, const struct scene_node *n, const struct scene_node *outer)
+static int list_instance(struct shape_listing *l, const struct scene_node *n, const struct scene_node *outer)
 {
 	const struct scene_node *group = node_child(n, PLUGIN_SHAPE, 0);
 	if (!group || node_child(n, PLUGIN_SHAPE, 1) || strcmp(group->type, "shapegroup") != 0)
@@ -117,7 +117,7 @@ static int list_instance(struct listing *l, const struct scene_node *n, const st
 	return rc;
 }
 
-static int list_node(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
+static int list_node(struct shape_listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	if (strcmp(n->type, "instance") == 0)
 		return list_instance(l, n, instance);
@@ -144,7 +144,7 @@ static int compare_uses(const void *x, const void *y)
 
 /* Finds the shapes that instantiate the same node. Addresses do not affect the result, since of equal nodes the first
  * in the list is recorded. */
-static int find_uses(struct listing *l)
+static int find_uses(struct shape_listing *l)
 {
 	uint32_t n = 0;
 	struct node_use *uses = arena_alloc(l->arena, l->count, sizeof *uses);
@@ -169,7 +169,7 @@ static int find_uses(struct listing *l)
 int shape_list_make(const struct scene *s, double open, double close, struct arena *arena, struct report *report,
 		    struct listed_shape **shapes, uint32_t *count, struct error *e)
 {
-	struct listing l = {.arena = arena, .open = open, .close = close, .report = report, .e = e};
+	struct shape_listing l = {.arena = arena, .open = open, .close = close, .report = report, .e = e};
 	int rc = 0;
 	for (uint32_t i = 0; i < s->object_count && !rc; i++)
 		if (s->objects[i]->cls == PLUGIN_SHAPE && strcmp(s->objects[i]->type, "shapegroup") != 0)

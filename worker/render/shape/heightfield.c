@@ -149,7 +149,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	int r = read_image(n, assets, &decoded, &f, e);
 	if (!r)
 		r = make_mesh(&f, smooth, n, arena, &out->mesh, e);
-	out->face_normals = !smooth;
+	out->has_face_normals = !smooth;
 	arena_fini(&decoded);
 	return r;
 }

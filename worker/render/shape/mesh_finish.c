@@ -139,17 +139,17 @@ int mesh_finish(struct mesh *m, const struct mesh_finish_options *f, struct aren
 	if (r)
 		return r;
 	*dropped = drop_degenerate(m);
-	if (f->max_smooth_angle >= 0 && f->face_normals)
+	if (f->max_smooth_angle >= 0 && f->has_face_normals)
 		return node_error(n, e, EINVAL, "max_smooth_angle and face_normals contradict each other");
 	if (f->max_smooth_angle >= 0 && (r = mesh_smooth(m, f->max_smooth_angle, arena, n, e)))
 		return r;
 	if (m->normal)
 		wind_by_normals(m);
-	if (f->face_normals)
+	if (f->has_face_normals)
 		m->normal = NULL;
 	else if (lacks_normals(m) && (r = compute_normals(m, arena, n, e)))
 		return r;
-	if (f->flip_normals) {
+	if (f->flips_normals) {
 		for (uint32_t i = 0; i < m->triangle_count; i++)
 			reverse_winding(m->index[i]);
 		for (uint32_t i = 0; i < m->vertex_count && m->normal; i++)

@@ -25,7 +25,7 @@ struct reader {
 	struct error *error;
 	const char *p, *end;
 	int line;
-	bool in_mesh; /* a face now belongs to the last mesh */
+	bool is_in_mesh; /* a face now belongs to the last mesh */
 };
 
 static int out_of_memory(const struct reader *o)
@@ -204,14 +204,14 @@ static int begin_mesh(struct reader *o)
 	if (!m)
 		return out_of_memory(o);
 	*m = (struct obj_mesh){f->runs.count - 1, f->corners.count, f->triangles.count};
-	o->in_mesh = true;
+	o->is_in_mesh = true;
 	return 0;
 }
 
 static int read_face(struct reader *o)
 {
 	uint32_t first = (uint32_t)o->file->corners.count, n = 0;
-	if (!o->in_mesh && begin_mesh(o))
+	if (!o->is_in_mesh && begin_mesh(o))
 		return -ENOMEM;
 	for (; !at_end_of_line(o); n++) {
 		int r = read_corner(o);
@@ -253,7 +253,7 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 static int read_material(struct reader *o)
 {
 	size_t length;
-	o->in_mesh = false;
+	o->is_in_mesh = false;
 	const char *name = number_line_rest(o->p, o->end, &length);
 	return begin_run(o, name, length);
 }
@@ -274,7 +274,7 @@ static int read_line(struct reader *o)
 	if (n == 6 && memcmp(word, "usemtl", 6) == 0)
 		return read_material(o);
 	if (n == 1 && *word == 'g')
-		o->in_mesh = false;
+		o->is_in_mesh = false;
 	return n == 1 && *word == 'f' ? read_face(o) : 0;
 }
 

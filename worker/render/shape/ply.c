@@ -49,7 +49,7 @@ enum property_role {
 struct ply_property {
 	enum scalar type, count_type; /* count_type: of a list's length; SCALAR_NONE: not a list */
 	enum property_role role;
-	bool in_attribute;
+	bool is_in_attribute;
 	uint32_t group, channel; /* of the attribute */
 };
 
@@ -79,8 +79,8 @@ struct ply {
 	bool has_role[ROLES];
 	uint64_t triangle_count;
 	struct mesh *mesh;
-	bool flip_v;
-	const bool *srgb; /* the parameter `srgb`; NULL: not given */
+	bool flips_v;
+	const bool *is_srgb; /* the parameter `is_srgb`; NULL: not given */
 };
 
 /* Reads the next word of a line of the header. Returns false at the end of the line. */
@@ -206,8 +206,8 @@ static int read_property(struct ply *f)
 	if (p.role >= 0 && p.role < ROLES)
 		f->has_role[p.role] = true;
 	if (p.role == ROLE_NONE && !is_list && el->kind != ELEMENT_OTHER)
-		p.in_attribute = attribute_groups_add(&el->groups, name, &p.group, &p.channel);
-	if (p.in_attribute)
+		p.is_in_attribute = attribute_groups_add(&el->groups, name, &p.group, &p.channel);
+	if (p.is_in_attribute)
 		el->is_integer[p.group] = p.type < FLOAT32;
 	el->properties[el->property_count++] = p;
 	return 0;
@@ -367,7 +367,7 @@ static int store_vertex(struct ply *f, const struct ply_element *el, uint64_t i,
 				(vec3){role_values[ROLE_NX], role_values[ROLE_NY], role_values[ROLE_NZ]});
 	if (m->uv) {
 		m->uv[i][0] = role_values[ROLE_U];
-		m->uv[i][1] = f->flip_v ? 1 - role_values[ROLE_V] : role_values[ROLE_V];
+		m->uv[i][1] = f->flips_v ? 1 - role_values[ROLE_V] : role_values[ROLE_V];
 	}
 	return 0;
 }
@@ -377,7 +377,7 @@ static double attribute_value(const struct ply *f, enum scalar type, double x)
 {
 	static const double max_value[] = {[INT8] = 0x7f,     [UINT8] = 0xff,	    [INT16] = 0x7fff,
 					   [UINT16] = 0xffff, [INT32] = 0x7fffffff, [UINT32] = 0xffffffff};
-	bool is_integer = type < FLOAT32, is_encoded = f->srgb ? *f->srgb : is_integer;
+	bool is_integer = type < FLOAT32, is_encoded = f->is_srgb ? *f->is_srgb : is_integer;
 	x = is_integer ? x / max_value[type] : x;
 	/* Numbers out of range are not decoded, since their powers may overflow; they stay out of range. */
 	return is_encoded && fabs(x) <= MESH_ATTRIBUTE_MAX ? srgb_to_linear(x) : x;
@@ -391,7 +391,7 @@ static void store_attributes(const struct ply *f, const struct ply_element *el, 
 		 end = el->kind == ELEMENT_FACE ? f->triangle_count : i + 1;
 	for (uint32_t k = 0; k < el->property_count; k++) {
 		const struct ply_property *p = &el->properties[k];
-		struct attribute *a = p->in_attribute ? el->attributes[p->group] : NULL;
+		struct attribute *a = p->is_in_attribute ? el->attributes[p->group] : NULL;
 		if (!a || p->channel >= a->channels)
 			continue;
 		double value = attribute_value(f, p->type, attribute_values[k]);
@@ -501,7 +501,7 @@ static int add_attributes(struct ply *f, struct ply_element *el, uint64_t bytes,
 							 channels, 2 * ATTRIBUTE_GROUPS_MAX, arena);
 		if (!a)
 			return node_error(f->node, f->error, ENOMEM, "%s: out of memory", f->name);
-		a->is_srgb = !f->srgb && !el->is_integer[k];
+		a->is_srgb = !f->is_srgb && !el->is_integer[k];
 		el->attributes[k] = a;
 	}
 	return 0;
@@ -554,8 +554,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 			.p = bytes,
 			.end = bytes + a.size,
 			.mesh = &out->mesh,
-			.flip_v = node_bool(n, "flip_tex_coords", false),
-			.srgb = node_find_property(n, "srgb") ? &srgb : NULL};
+			.flips_v = node_bool(n, "flip_tex_coords", false),
+			.is_srgb = node_find_property(n, "srgb") ? &srgb : NULL};
 	r = read_file(&f, arena);
 	assets->close(assets->user, &a);
 	return r;

@@ -334,7 +334,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	else if (s.triangles.count == 0)
 		rc = node_error(n, e, EINVAL, "%s: its values do not change their sign: there is no surface",
 				node_string(n, "filename", ""));
-	out->face_normals = !smooth;
+	out->has_face_normals = !smooth;
 	out->is_generated = true;
 	for (int k = 0; k < 2; k++) {
 		mem_free(s.field[k]);

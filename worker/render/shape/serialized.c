@@ -328,7 +328,7 @@ static int read_mesh(struct stream *s, int version, struct arena *arena, struct 
 		r = check_end(s);
 	for (uint32_t i = 0; !r && m->normal && i < m->vertex_count; i++)
 		vec3_store(m->normal[i], vec3_unit_or_zero(vec3_load(m->normal[i])));
-	out->face_normals = flags & HAS_FACE_NORMALS;
+	out->has_face_normals = flags & HAS_FACE_NORMALS;
 	return r;
 }
 

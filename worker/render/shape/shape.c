@@ -19,9 +19,9 @@ const struct shape_ops *const shape_registry[] = {
 static int finish_shape(struct shape_geometry *out, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
 			struct error *e)
 {
-	struct mesh_finish_options f = {out->in_world_space ? mat4_identity() : node_transform(n, "to_world"),
+	struct mesh_finish_options f = {out->is_in_world_space ? mat4_identity() : node_transform(n, "to_world"),
 					node_bool(n, "flip_normals", false),
-					out->face_normals || node_bool(n, "face_normals", false),
+					out->has_face_normals || node_bool(n, "face_normals", false),
 					node_float(n, "max_smooth_angle", -1)};
 	int r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
 	if (out->is_generated && out->mesh.triangle_count > 0)
@@ -38,7 +38,7 @@ int shape_curves_to_mesh(struct shape_geometry *g, const struct scene_node *n, s
 		return node_error(n, e, EFBIG, "its curves make more than %d triangles", MESH_TRIANGLES_MAX);
 	if (rc)
 		return node_error(n, e, -rc, "out of memory");
-	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .in_world_space = true, .is_generated = true};
+	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .is_in_world_space = true, .is_generated = true};
 	return finish_shape(g, n, arena, dropped, e);
 }
 

@@ -17,19 +17,19 @@
 struct sphere {
 	vec3 center;
 	double radius;
-	bool flip_normals; /* normals point inwards */
-	mat4 to_world;	   /* rotation of the (u,v) parametrisation only, orthonormal */
+	bool flips_normals; /* normals point inwards */
+	mat4 to_world;	    /* rotation of the (u,v) parametrisation only, orthonormal */
 };
 
 enum shape_kind { SHAPE_MESH, SHAPE_SPHERE, SHAPE_CURVE };
 
 struct shape_geometry {
 	enum shape_kind kind;
-	struct mesh mesh;    /* its arrays are in the arena given */
-	bool in_world_space; /* to_world has been applied to the mesh */
-	bool is_generated;   /* the triangles do not come from a file, so those without area are not reported */
-	bool face_normals;   /* the file asks for flat shading */
-	bool has_materials;  /* the file assigns materials to faces; these are not read */
+	struct mesh mesh;	/* its arrays are in the arena given */
+	bool is_in_world_space; /* to_world has been applied to the mesh */
+	bool is_generated;	/* the triangles do not come from a file, so those without area are not reported */
+	bool has_face_normals;	/* the file asks for flat shading */
+	bool has_materials;	/* the file assigns materials to faces; these are not read */
 	struct sphere sphere;
 	struct curve curve;
 };
@@ -38,7 +38,7 @@ struct shape_ops {
 	struct plugin_decl decl;
 	/* NULL: the shape contains others (group.h) and is not built itself. */
 	/* Sets *out to the sphere or the curves in world space, or to the mesh, which is in object space unless
-	 * `in_world_space`; shape_build transforms and checks it. Returns 0 or a negative error code. */
+	 * `is_in_world_space`; shape_build transforms and checks it. Returns 0 or a negative error code. */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
 };

@@ -42,7 +42,7 @@ static int make_sphere(const struct scene_node *n, const mat4 *m, double scale, 
 {
 	s->center = mat4_point(m, s->center);
 	s->radius *= scale;
-	s->flip_normals = node_bool(n, "flip_normals", false);
+	s->flips_normals = node_bool(n, "flip_normals", false);
 	double handedness = mat4_det3(*m) < 0 ? -1 : 1;
 	z = vec3_normalize(z);
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));

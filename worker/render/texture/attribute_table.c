@@ -24,7 +24,7 @@ static int refuse_attribute(const struct attribute_table *t, const char *name, c
 			    struct error *e)
 {
 	char mesh[160], hint[160] = "", known[160] = "";
-	struct spelling s = {.wanted = name};
+	struct spelling s = {.wanted_name = name};
 	for (uint32_t i = 0; i < t->count; i++) {
 		spelling_offer(&s, t->attributes[i].name);
 		spelling_append_to_list(known, sizeof known, t->attributes[i].name);

@@ -106,9 +106,9 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 		role = COLOR_REFLECTANCE;
 	const struct raster_options range = {color_role_is_number(role) ? -DBL_MAX : 0,
 					     role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
-					     !build->is_number	? IMAGE_ALL
-					     : build->dialect_3 ? IMAGE_LUMINANCE
-								: IMAGE_MEAN};
+					     !build->is_number	   ? IMAGE_ALL
+					     : build->is_dialect_3 ? IMAGE_LUMINANCE
+								   : IMAGE_MEAN};
 	int code = raster_read(&b->raster, n, build->assets, &range, build->arena, e);
 	if (code)
 		return code;
@@ -151,13 +151,13 @@ static double bitmap_height(const struct texture *t, double u, double v)
 	return b->raster.image.channels == 1 ? rgb[0] : rec709_luminance(rgb);
 }
 
-static void bitmap_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+static void bitmap_eval_derivatives(const struct texture *t, double u, double v, struct texture_derivatives *j)
 {
 	const struct bitmap *b = t->data;
 	const double(*m)[3] = b->map.m;
-	struct raster_jet p;
+	struct raster_derivatives p;
 	uv_map_apply(&b->map, &u, &v);
-	raster_jet(&b->raster, u, v, &p);
+	raster_eval_derivatives(&b->raster, u, v, &p);
 	j->is_grey = b->raster.image.channels == 1;
 	for (int k = 0; k < 3; k++) {
 		j->x[k] = p.x[k];
@@ -200,7 +200,7 @@ const struct texture_ops texture_ops_bitmap = {
 	.create = bitmap_create,
 	.eval = bitmap_eval,
 	.height = bitmap_height,
-	.jet = bitmap_jet,
+	.eval_derivatives = bitmap_eval_derivatives,
 	.max = bitmap_max,
 	.color_kind = bitmap_color_kind,
 	.aspect = bitmap_aspect,

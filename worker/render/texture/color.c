@@ -48,7 +48,7 @@ static void look_up_coefficients(const double rgb[3], double c[3])
 	const int n = UPSAMPLE_TABLE_SIZE;
 	int l = rgb[0] >= rgb[1] ? (rgb[0] >= rgb[2] ? 0 : 2) : (rgb[1] >= rgb[2] ? 1 : 2);
 	double z = rgb[l], x = rgb[(l + 1) % 3] * (n - 1) / z, y = rgb[(l + 2) % 3] * (n - 1) / z;
-	int xi = (int)x, yi = (int)y, zi = (int)search_cell(upsample_values, UPSAMPLE_TABLE_SIZE - 1, z);
+	int xi = (int)x, yi = (int)y, zi = (int)search_find_cell(upsample_values, UPSAMPLE_TABLE_SIZE - 1, z);
 	xi = xi > n - 2 ? n - 2 : xi;
 	yi = yi > n - 2 ? n - 2 : yi;
 	double fx = x - xi, fy = y - yi,
@@ -116,7 +116,7 @@ static struct color color_white(double x, enum color_role role)
 	struct color c = color_constant(x);
 	if (role == COLOR_ILLUMINANT) {
 		c.kind = COLOR_KIND_D65;
-		c.times_d65 = true;
+		c.is_times_d65 = true;
 	}
 	return c;
 }
@@ -184,7 +184,7 @@ static struct table_position find_position(const struct color *c, double nm)
 	double guess = (nm - nm_table[0]) * c->intervals_per_nm;
 	uint32_t g = guess >= (double)last ? last : (uint32_t)guess;
 	if (!(nm_table[g] <= nm && nm <= nm_table[g + 1]))
-		g = search_cell(nm_table, c->count - 1, nm);
+		g = search_find_cell(nm_table, c->count - 1, nm);
 	return (struct table_position){g, (nm - nm_table[g]) / (nm_table[g + 1] - nm_table[g])};
 }
 
@@ -195,7 +195,7 @@ static double value_at_position(const struct color *c, struct table_position p)
 
 static double table_value(const struct color *c, double nm)
 {
-	if (c->zero_outside && (nm < c->nm[0] || nm > c->nm[c->count - 1]))
+	if (c->is_zero_outside && (nm < c->nm[0] || nm > c->nm[c->count - 1]))
 		return 0;
 	return value_at_position(c, find_position(c, nm));
 }
@@ -228,7 +228,7 @@ struct color color_from_samples(uint32_t n, const double *nm, const double *valu
 			  .intervals_per_nm = (n - 1) / (nm[n - 1] - nm[0]),
 			  .nm = nm,
 			  .value = value,
-			  .zero_outside = zero_outside};
+			  .is_zero_outside = zero_outside};
 	compute_rgb(&c, under_d65);
 	return c;
 }
@@ -245,8 +245,8 @@ static int color_from_spectrum(const struct value *v, enum color_role role, stru
 			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
 	}
 	/* Once for all the materials that refer to it or repeat it. */
-	const struct arena_share *nm = arena_share(arena, v->as.spectrum.nm, n * sizeof(double)),
-				 *value = arena_share(arena, v->as.spectrum.value, n * sizeof(double));
+	const struct arena_interned *nm = arena_intern(arena, v->as.spectrum.nm, n * sizeof(double)),
+				    *value = arena_intern(arena, v->as.spectrum.value, n * sizeof(double));
 	if (!nm || !value)
 		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
 	*out = color_from_samples(n, nm->bytes, value->bytes, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
@@ -303,7 +303,7 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 	if (c->count)
 		for (int i = 0; i < lanes; i++)
 			s.v[i] *= table_value(c, w->nm[i]);
-	if (c->times_d65)
+	if (c->is_times_d65)
 		for (int i = 0; i < lanes; i++)
 			s.v[i] *= color_d65(w->nm[i]);
 	return s;
@@ -322,7 +322,7 @@ spectrum color_eval_colored(const struct color *c, const struct wavelengths *w)
 
 void color_eval_pair(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2])
 {
-	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w) || w->is_rgb) {
+	if (!a->count || a->nm != b->nm || a->is_zero_outside || WAVELENGTHS_GREY(w) || w->is_rgb) {
 		out[0] = color_eval(a, w);
 		out[1] = color_eval(b, w);
 		return;
@@ -373,7 +373,7 @@ double color_max_d65(void)
 
 static bool is_invisible(const struct color *c)
 {
-	return c->zero_outside && (c->nm[0] > WAVELENGTH_MAX || c->nm[c->count - 1] < WAVELENGTH_MIN);
+	return c->is_zero_outside && (c->nm[0] > WAVELENGTH_MAX || c->nm[c->count - 1] < WAVELENGTH_MIN);
 }
 
 double color_max(const struct color *c)
@@ -387,7 +387,7 @@ double color_max(const struct color *c)
 			largest = fmax(largest, c->value[i]);
 		m *= largest;
 	}
-	if (c->times_d65)
+	if (c->is_times_d65)
 		m *= color_max_d65();
 	return m;
 }

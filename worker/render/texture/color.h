@@ -29,15 +29,15 @@ enum color_kind { COLOR_KIND_CONSTANT, COLOR_KIND_D65, COLOR_KIND_OTHER };
 
 struct color {
 	enum color_kind kind;
-	double scale;	 /* factor of the following */
-	bool times_d65;	 /* times normalised D65 */
-	bool is_sigmoid; /* times S(c0 x^2 + c1 x + c2), x the wavelength in nm */
+	double scale;	   /* factor of the following */
+	bool is_times_d65; /* times normalised D65 */
+	bool is_sigmoid;   /* times S(c0 x^2 + c1 x + c2), x the wavelength in nm */
 	double coefficient[3];
-	uint32_t count; /* > 0: times a piecewise linear table; beyond its ends 0 if zero_outside, otherwise the end
+	uint32_t count; /* > 0: times a piecewise linear table; beyond its ends 0 if is_zero_outside, otherwise the end
 			   values */
 	double intervals_per_nm;  /* pieces per nm, on average */
 	const double *nm, *value; /* in the arena */
-	bool zero_outside;
+	bool is_zero_outside;
 	bool has_rgb; /* with colour=rgb, the components are scale times rgb; otherwise each is the scale */
 	double rgb[3];
 };
@@ -49,9 +49,9 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 /* Makes a colour from linear Rec. 709. Returns 0, or -EINVAL if a component is out of the role's range. */
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
 /* Returns a colour that is linear between n >= 2 values at ascending nm; both arrays must outlive it. Beyond the ends
- * it is 0 if zero_outside, like all of Mitsuba's tables; otherwise it keeps the value at the end, which suits indices
- * and coefficients of media, where 0 is never meant. With colour=rgb, its components are those of light with these
- * values, times D65 if under_d65. */
+ * it is 0 if is_zero_outside, like all of Mitsuba's tables; otherwise it keeps the value at the end, which suits
+ * indices and coefficients of media, where 0 is never meant. With colour=rgb, its components are those of light with
+ * these values, times D65 if under_d65. */
 struct color color_from_samples(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65);
 struct color color_constant(double x);
 spectrum color_eval_colored(const struct color *c, const struct wavelengths *w); /* color_eval, if not grey */

@@ -20,7 +20,7 @@ struct mesh_attribute {
 	double scale, max;
 	enum color_role role;
 	enum color_kind color_kind;
-	bool takes_mean; /* of the components */
+	bool uses_mean; /* of the components */
 };
 
 static int refuse_role(const struct scene_node *n, enum color_role role, struct error *e)
@@ -31,7 +31,7 @@ static int refuse_role(const struct scene_node *n, enum color_role role, struct 
 
 static void find_bounds(struct mesh_attribute *m, const struct attribute_values *v)
 {
-	bool grey = v->is_grey || m->takes_mean;
+	bool grey = v->is_grey || m->uses_mean;
 	double ends[2] = {m->scale * (double)v->min, m->scale * (double)v->max};
 	double max_value = fmax(fmax(ends[0], ends[1]), 0);
 	if (m->role == COLOR_ILLUMINANT) {
@@ -69,9 +69,9 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 				     .channels = v->channels,
 				     .scale = node_float(n, "scale", 1),
 				     .role = role,
-				     .takes_mean = build->is_number && v->channels > 1};
+				     .uses_mean = build->is_number && v->channels > 1};
 	find_bounds(m, v);
-	double max_value = v->is_grey || m->takes_mean ? m->max : m->max / COLOR_UNBOUNDED_SCALE;
+	double max_value = v->is_grey || m->uses_mean ? m->max : m->max / COLOR_UNBOUNDED_SCALE;
 	if (role == COLOR_UNBOUNDED && !(max_value <= PARAM_METAL_MAX))
 		return node_error(n, e, ERANGE, "the attribute has numbers up to %g: they must be within [0, %g]",
 				  max_value, PARAM_METAL_MAX);
@@ -114,7 +114,7 @@ static spectrum mesh_attribute_eval(const struct texture *t, const struct textur
 	eval_rgb(m, point, rgb);
 	for (int k = 0; k < 3; k++)
 		rgb[k] = fmin(fmax(rgb[k], 0), limit);
-	if (m->takes_mean)
+	if (m->uses_mean)
 		return spectrum_constant((rgb[0] + rgb[1] + rgb[2]) / 3);
 	return m->role == COLOR_ILLUMINANT  ? color_eval_rgb_illuminant(rgb, w)
 	       : m->role == COLOR_UNBOUNDED ? color_eval_rgb_unbounded(rgb, w)

@@ -50,7 +50,8 @@ static int checkerboard_create(struct texture *t, const struct scene_node *n, en
 			       const struct texture_build *build, struct error *e)
 {
 	((struct pattern *)t->data)->choose = choose_square;
-	return create_pattern(t, n, (const double[2]){0.4, 0.2}, build->is_number && build->dialect_3, role, build, e);
+	return create_pattern(t, n, (const double[2]){0.4, 0.2}, build->is_number && build->is_dialect_3, role, build,
+			      e);
 }
 
 static int gridtexture_create(struct texture *t, const struct scene_node *n, enum color_role role,
@@ -79,9 +80,9 @@ static double pattern_height(const struct texture *t, double u, double v)
 }
 
 /* Edges between the two textures have no effect on the derivatives. */
-static void pattern_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+static void pattern_eval_derivatives(const struct texture *t, double u, double v, struct texture_derivatives *j)
 {
-	texture_jet(texture_at(t->data, u, v), u, v, j);
+	texture_eval_derivatives(texture_at(t->data, u, v), u, v, j);
 }
 
 static double pattern_max(const struct texture *t)
@@ -108,7 +109,7 @@ static enum color_kind pattern_color_kind(const struct texture *t)
 		.create = NAME##_create,                                                   \
 		.eval = pattern_eval,                                                      \
 		.height = pattern_height,                                                  \
-		.jet = pattern_jet,                                                        \
+		.eval_derivatives = pattern_eval_derivatives,                              \
 		.max = pattern_max,                                                        \
 		.color_kind = pattern_color_kind,                                          \
 	}

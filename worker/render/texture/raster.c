@@ -98,7 +98,7 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		.byte_count = node_int(n, "byte_count", 0),
 		.skip_bytes = node_int(n, "skip_bytes", 0),
 		.is_base64 = node_bool(n, "base64", false),
-		.is_linear = gamma > 0 || node_bool(n, "raw", options->default_raw && gamma != -1),
+		.is_linear = gamma > 0 || node_bool(n, "raw", options->is_raw_by_default && gamma != -1),
 		.channel = selected == IMAGE_ALL ? options->default_channel : selected,
 		.threshold = node_float(n, "threshold", -1),
 		.power = gamma > 0 ? gamma : 1,
@@ -225,10 +225,10 @@ static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
 	return backwards ? -(double)pixels : (double)pixels;
 }
 
-void raster_jet(const struct raster *r, double u, double v, struct raster_jet *out)
+void raster_eval_derivatives(const struct raster *r, double u, double v, struct raster_derivatives *out)
 {
 	struct corners q;
-	*out = (struct raster_jet){.x = {0}};
+	*out = (struct raster_derivatives){.x = {0}};
 	if (r->is_nearest) {
 		eval_nearest(r, u, v, out->x);
 		return;

@@ -23,8 +23,8 @@ struct raster {
 };
 
 struct raster_options {
-	double min, max;  /* pixels outside are clamped */
-	bool default_raw; /* default of the parameter `raw`, unless `gamma` is given */
+	double min, max;	/* pixels outside are clamped */
+	bool is_raw_by_default; /* default of the parameter `raw`, unless `gamma` is given */
 	enum image_channel
 		default_channel; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
 };
@@ -47,10 +47,10 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
 /* The value with its derivatives with respect to u and v, and the mixed one. The other second derivatives are 0 between
  * pixel centres. */
-struct raster_jet {
+struct raster_derivatives {
 	double x[3], du[3], dv[3], duv[3];
 };
-void raster_jet(const struct raster *r, double u, double v, struct raster_jet *out);
+void raster_eval_derivatives(const struct raster *r, double u, double v, struct raster_derivatives *out);
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);
 bool raster_is_grey(const struct raster *r);
 double raster_max(const struct raster *r);

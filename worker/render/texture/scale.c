@@ -78,10 +78,10 @@ static double scale_height(const struct texture *t, double u, double v)
 	return s->factor * texture_height(&s->inner, u, v);
 }
 
-static void scale_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+static void scale_eval_derivatives(const struct texture *t, double u, double v, struct texture_derivatives *j)
 {
 	const struct scale *s = t->data;
-	texture_jet(&s->inner, u, v, j);
+	texture_eval_derivatives(&s->inner, u, v, j);
 	for (int k = 0; k < 3; k++) {
 		j->x[k] *= s->factor;
 		j->du[k] *= s->factor;
@@ -125,7 +125,7 @@ const struct texture_ops texture_ops_scale = {
 	.create = scale_create,
 	.eval = scale_eval,
 	.height = scale_height,
-	.jet = scale_jet,
+	.eval_derivatives = scale_eval_derivatives,
 	.max = scale_max,
 	.color_kind = scale_color_kind,
 	.aspect = scale_aspect,

@@ -37,7 +37,7 @@ static inline double texture_interpolate(const float *value, size_t channels, co
 struct texture_build {
 	const struct asset_source *assets;
 	struct arena *arena;
-	bool dialect_3;
+	bool is_dialect_3;
 	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: no mesh */
 	const struct volume_build *volumes; /* NULL: the texture is not on a surface in the world */
 	/* The texture stands for a number such as a roughness or a weight, not for a spectrum. For coloured images,
@@ -47,7 +47,7 @@ struct texture_build {
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */
-struct texture_jet {
+struct texture_derivatives {
 	double x[3], du[3], dv[3], duu[3], duv[3], dvv[3];
 	bool is_grey; /* all three numbers are equal */
 };
@@ -58,9 +58,10 @@ struct texture_ops {
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);
 	spectrum (*eval)(const struct texture *t, const struct texture_point *point, const struct wavelengths *w);
-	double (*height)(const struct texture *t, double u, double v);			 /* for COLOR_HEIGHT */
-	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* for COLOR_RELIEF */
-	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
+	double (*height)(const struct texture *t, double u, double v); /* for COLOR_HEIGHT */
+	void (*eval_derivatives)(const struct texture *t, double u, double v,
+				 struct texture_derivatives *j); /* for COLOR_RELIEF */
+	double (*max)(const struct texture *t);			 /* upper bound over (u,v) and wavelengths */
 	enum color_kind (*color_kind)(const struct texture *t);
 	double (*aspect)(const struct texture *t); /* width over height of the image; NULL: 1 */
 };
@@ -92,12 +93,12 @@ static inline double texture_height(const struct texture *t, double u, double v)
 	return t->ops ? t->ops->height(t, u, v) : t->color.scale;
 }
 
-static inline void texture_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+static inline void texture_eval_derivatives(const struct texture *t, double u, double v, struct texture_derivatives *j)
 {
 	if (t->ops)
-		t->ops->jet(t, u, v, j);
+		t->ops->eval_derivatives(t, u, v, j);
 	else
-		*j = (struct texture_jet){.x = {t->relief[0], t->relief[1], t->relief[2]}};
+		*j = (struct texture_derivatives){.x = {t->relief[0], t->relief[1], t->relief[2]}};
 }
 
 double texture_aspect(const struct texture *t);

@@ -99,13 +99,13 @@ static bool is_rotated(const mat4 *m)
 
 #define FLATTENED_MESSAGE "to_world flattens the volume (it has no inverse)"
 
-static int place_grid(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *b,
+static int place_grid(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *build,
 		      struct error *e)
 {
-	double cells_per_unit[3], offset = b->dialect_3 && !g->is_nearest ? -0.5 : 0;
+	double cells_per_unit[3], offset = build->is_dialect_3 && !g->is_nearest ? -0.5 : 0;
 	mat4 to_world = node_transform(n, "to_world"), to_volume;
 	for (int i = 0; i < 3; i++) {
-		double cells = b->dialect_3 || g->is_nearest ? g->size[i] : g->size[i] - 1;
+		double cells = build->is_dialect_3 || g->is_nearest ? g->size[i] : g->size[i] - 1;
 		bool is_bounded = isfinite(box[0][i]) && isfinite(box[1][i]);
 		cells_per_unit[i] = is_bounded && box[1][i] > box[0][i] ? cells / (box[1][i] - box[0][i]) : 0;
 		g->cell_min[i] = offset;
@@ -118,10 +118,11 @@ static int place_grid(struct grid *g, const struct scene_node *n, double box[2][
 	mat4 to_cells = mat4_mul(mat4_scale((vec3){cells_per_unit[0], cells_per_unit[1], cells_per_unit[2]}),
 				 mat4_translate((vec3){-box[0][0], -box[0][1], -box[0][2]}));
 	to_cells = mat4_mul(mat4_translate((vec3){offset, offset, offset}), mat4_mul(to_cells, to_volume));
-	mat4 to_scene = mat4_mul(mat4_translate(b->world_center),
-				 mat4_scale((vec3){1 / b->world_scale, 1 / b->world_scale, 1 / b->world_scale}));
+	mat4 to_scene =
+		mat4_mul(mat4_translate(build->world_center),
+			 mat4_scale((vec3){1 / build->world_scale, 1 / build->world_scale, 1 / build->world_scale}));
 	g->to_cells = mat4_mul(to_cells, to_scene);
-	if (!b->dialect_3 || !is_rotated(&g->to_cells))
+	if (!build->is_dialect_3 || !is_rotated(&g->to_cells))
 		return 0;
 	/* Mitsuba 3 bounds a medium by the bounding box of its volume that is parallel to the world's axes. */
 	vec3 min, max;
@@ -151,7 +152,7 @@ static enum grid_wrap parse_wrap_mode(const struct scene_node *n, bool dialect_3
 }
 
 int volume_make_grid(struct grid *g, const struct scene_node *n, const struct grid_file *f,
-		     const struct volume_build *b, struct error *e)
+		     const struct volume_build *build, struct error *e)
 {
 	double box[2][3];
 	*g = (struct grid){.size = {(int)f->size[0], (int)f->size[1], (int)f->size[2]},
@@ -159,16 +160,16 @@ int volume_make_grid(struct grid *g, const struct scene_node *n, const struct gr
 			   .value = f->value,
 			   .occupied_bricks = f->occupied_bricks,
 			   .is_nearest = strcmp(node_string(n, "filter_type", "trilinear"), "nearest") == 0,
-			   .wrap = parse_wrap_mode(n, b->dialect_3)};
-	read_box(n, f, b->dialect_3, box);
-	return place_grid(g, n, box, b, e);
+			   .wrap = parse_wrap_mode(n, build->is_dialect_3)};
+	read_box(n, f, build->is_dialect_3, box);
+	return place_grid(g, n, box, build, e);
 }
 
-static int read_grid(struct volume *v, const struct scene_node *n, enum color_role role, const struct volume_build *b,
-		     struct error *e)
+static int read_grid(struct volume *v, const struct scene_node *n, enum color_role role,
+		     const struct volume_build *build, struct error *e)
 {
 	struct grid_file f;
-	int rc = grid_file_read_cached(b->cache, n, b->assets, b->arena, &f, e);
+	int rc = grid_file_read_cached(build->cache, n, build->assets, build->arena, &f, e);
 	if (!rc)
 		rc = check_values(n, &f, role, e);
 	if (rc)
@@ -180,11 +181,11 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 		const double rgb[3] = {k == 0, k == 1, k == 2};
 		rc = color_from_rgb(rgb, COLOR_REFLECTANCE, &v->primary[k]);
 	}
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	struct grid *g = arena_alloc(build->arena, 1, sizeof *g);
 	if (!rc && !g)
 		rc = node_error(n, e, ENOMEM, "out of memory");
 	if (!rc)
-		rc = volume_make_grid(g, n, &f, b, e);
+		rc = volume_make_grid(g, n, &f, build, e);
 	v->grid = g;
 	if (!rc && g->is_world_aligned && role != COLOR_REFLECTANCE && g->wrap != GRID_CLAMP)
 		rc = node_error(n, e, ENOTSUP, "a rotated density cannot repeat itself (wrap_mode)");
@@ -202,20 +203,20 @@ static const struct grid unit_grid = {.size = {1, 1, 1},
 				      .wrap = GRID_CLAMP};
 
 /* Limits a constant colour to the unit cube; outside, the value is 0. */
-static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
+static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	struct grid *g = arena_alloc(build->arena, 1, sizeof *g);
 	if (!g)
 		return node_error(n, e, ENOMEM, "out of memory");
 	*g = unit_grid;
 	v->max_value = 1;
 	v->grid = g;
-	return place_grid(g, n, unit, b, e);
+	return place_grid(g, n, unit, build, e);
 }
 
 int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
-		     enum color_role role, bool in_cube, const struct volume_build *b, struct error *e)
+		     enum color_role role, bool in_cube, const struct volume_build *build, struct error *e)
 {
 	const struct property *p = node_find_property(n, name);
 	bool nested = p && p->value.type == VALUE_NODE;
@@ -223,23 +224,23 @@ int volume_from_node(struct volume *v, const struct scene_node *n, const char *n
 	if (nested) {
 		n = p->value.as.node;
 		if (strcmp(n->type, "gridvolume") == 0)
-			return read_grid(v, n, role, b, e);
+			return read_grid(v, n, role, build, e);
 		p = node_find_property(n, "value");
-		if (!p && !b->dialect_3)
+		if (!p && !build->is_dialect_3)
 			return node_error(n, e, EINVAL, "needs a value; --lenient leaves it out");
 		v->color = color_constant(1);
 	}
 	struct error reason;
-	int code = p ? color_from_value(&p->value, role, b->arena, &v->color, &reason) : 0;
+	int code = p ? color_from_value(&p->value, role, build->arena, &v->color, &reason) : 0;
 	if (code)
 		return node_error(n, e, -code, "%s: %s", nested ? "value" : name, reason.text);
-	return in_cube ? add_cube(v, n, b, e) : 0;
+	return in_cube ? add_cube(v, n, build, e) : 0;
 }
 
 /* Gives v a grid that consists of one cell of value 1, which is the given box. */
-static int add_unit_cell(struct volume *v, vec3 min, vec3 max, const struct volume_build *b)
+static int add_unit_cell(struct volume *v, vec3 min, vec3 max, const struct volume_build *build)
 {
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	struct grid *g = arena_alloc(build->arena, 1, sizeof *g);
 	vec3 size = vec3_sub(max, min);
 	if (!g)
 		return -ENOMEM;
@@ -252,7 +253,7 @@ static int add_unit_cell(struct volume *v, vec3 min, vec3 max, const struct volu
 }
 
 int volume_adopt_bounds(struct volume *v, const struct volume *other, const struct scene_node *n,
-			const struct volume_build *b, struct error *e)
+			const struct volume_build *build, struct error *e)
 {
 	/* Without a grid, the box of the whole scene, whose radius is 1. */
 	vec3 min = {-2, -2, -2}, max = {2, 2, 2};
@@ -263,10 +264,10 @@ int volume_adopt_bounds(struct volume *v, const struct volume *other, const stru
 		max = other->grid->world_max;
 	}
 	if (!v->grid)
-		return other->grid && add_unit_cell(v, min, max, b) ? node_error(n, e, ENOMEM, "out of memory") : 0;
+		return other->grid && add_unit_cell(v, min, max, build) ? node_error(n, e, ENOMEM, "out of memory") : 0;
 	if (v->grid->wrap != GRID_CLAMP)
 		return node_error(n, e, ENOTSUP, "its grid cannot repeat itself (wrap_mode)");
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	struct grid *g = arena_alloc(build->arena, 1, sizeof *g);
 	if (!g)
 		return node_error(n, e, ENOMEM, "out of memory");
 	*g = *v->grid;
@@ -275,24 +276,24 @@ int volume_adopt_bounds(struct volume *v, const struct volume *other, const stru
 	return 0;
 }
 
-static bool has_same_points(const struct grid *a, const struct grid *b)
+static bool has_same_points(const struct grid *a, const struct grid *build)
 {
-	bool same = a->is_nearest == b->is_nearest && a->wrap == b->wrap;
+	bool same = a->is_nearest == build->is_nearest && a->wrap == build->wrap;
 	for (int i = 0; i < 3; i++)
-		same = same && a->size[i] == b->size[i];
-	return same && memcmp(&a->to_cells, &b->to_cells, sizeof a->to_cells) == 0;
+		same = same && a->size[i] == build->size[i];
+	return same && memcmp(&a->to_cells, &build->to_cells, sizeof a->to_cells) == 0;
 }
 
 /* Makes a grid of ones at the points of `points`, within the box of `box`. */
-static int add_ones(struct grid *g, const struct grid *points, const struct grid *box, const struct volume_build *b)
+static int add_ones(struct grid *g, const struct grid *points, const struct grid *box, const struct volume_build *build)
 {
 	vec3 min, max;
 	size_t count = (size_t)points->size[0] * (size_t)points->size[1] * (size_t)points->size[2];
-	float *value = arena_alloc(b->arena, count, sizeof *value);
+	float *value = arena_alloc(build->arena, count, sizeof *value);
 	*g = *points;
 	g->channels = 1;
 	g->value = value;
-	unsigned char *bricks = arena_alloc(b->arena, grid_brick_count(g), 1);
+	unsigned char *bricks = arena_alloc(build->arena, grid_brick_count(g), 1);
 	g->occupied_bricks = bricks;
 	if (!value || !bricks || !box_in_world(box, &min, &max))
 		return -ENOMEM;
@@ -304,10 +305,10 @@ static int add_ones(struct grid *g, const struct grid *points, const struct grid
 }
 
 int volume_scale_by_area(struct volume *v, const struct grid area[2], const struct scene_node *n,
-			 const struct volume_build *b, struct error *e)
+			 const struct volume_build *build, struct error *e)
 {
 	bool is_cube = v->grid && v->grid->value == &unit_value;
-	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	struct grid *g = arena_alloc(build->arena, 1, sizeof *g);
 	if (!g)
 		return node_error(n, e, ENOMEM, "out of memory");
 	if (!v->grid)
@@ -316,7 +317,7 @@ int volume_scale_by_area(struct volume *v, const struct grid area[2], const stru
 		return node_error(n, e, ENOTSUP,
 				  "the grids of sigma_t and of S must have the same size, to_world, filter_type and "
 				  "wrap_mode");
-	if (is_cube && add_ones(g, area, v->grid, b))
+	if (is_cube && add_ones(g, area, v->grid, build))
 		return node_error(n, e, ENOMEM, "out of memory");
 	if (!is_cube)
 		*g = *v->grid;

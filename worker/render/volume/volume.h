@@ -26,7 +26,7 @@ struct volume_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	struct grid_cache *cache;
-	bool dialect_3;	   /* a scene of 3.x; otherwise grids are placed as in 0.6 */
+	bool is_dialect_3; /* a scene of 3.x; otherwise grids are placed as in 0.6 */
 	vec3 world_center; /* a scene point p is at world_scale (p - world_center) in the rescaled world */
 	double world_scale;
 };

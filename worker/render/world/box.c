@@ -8,13 +8,13 @@ struct box box_empty(void)
 
 void box_grow(struct box *b, vec3 p)
 {
-	b->low = (vec3){fmin(b->low.x, p.x), fmin(b->low.y, p.y), fmin(b->low.z, p.z)};
-	b->high = (vec3){fmax(b->high.x, p.x), fmax(b->high.y, p.y), fmax(b->high.z, p.z)};
+	b->min = (vec3){fmin(b->min.x, p.x), fmin(b->min.y, p.y), fmin(b->min.z, p.z)};
+	b->max = (vec3){fmax(b->max.x, p.x), fmax(b->max.y, p.y), fmax(b->max.z, p.z)};
 }
 
 double box_extent(const struct box *b)
 {
-	return fmax(b->high.x - b->low.x, fmax(b->high.y - b->low.y, b->high.z - b->low.z));
+	return fmax(b->max.x - b->min.x, fmax(b->max.y - b->min.y, b->max.z - b->min.z));
 }
 
 /* Narrows [t[0], t[1]] to the range between two planes perpendicular to an axis. Returns false if nothing is left. */
@@ -31,6 +31,6 @@ static bool clip_to_slab(double low, double high, double p, double d, double t[2
 bool box_is_hit(const struct box *b, vec3 p, vec3 d, double t_max)
 {
 	double t[2] = {0, t_max};
-	return b->low.x <= b->high.x && clip_to_slab(b->low.x, b->high.x, p.x, d.x, t) &&
-	       clip_to_slab(b->low.y, b->high.y, p.y, d.y, t) && clip_to_slab(b->low.z, b->high.z, p.z, d.z, t);
+	return b->min.x <= b->max.x && clip_to_slab(b->min.x, b->max.x, p.x, d.x, t) &&
+	       clip_to_slab(b->min.y, b->max.y, p.y, d.y, t) && clip_to_slab(b->min.z, b->max.z, p.z, d.z, t);
 }

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 
 struct box {
-	vec3 low, high;
+	vec3 min, max;
 };
 
 /* Returns the box of no points, with low above high. */

@@ -2,7 +2,7 @@
 /*
  * Builds a world in the order of build_all_but_accel(): settings; geometry in double, moved into the unit sphere and
  * rounded to float (geometry.c); BSDFs, media and emitters; effects and what they make unnecessary. Last comes Embree's
- * tree, which render_check does not build for large scenes.
+ * tree, which world_check does not build for large scenes.
  *
  * Errors name the object's place in the scene file and leave nothing behind, because the world is one arena. Coinciding
  * surfaces are reported as notes, not errors.
@@ -18,17 +18,17 @@
 #include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/build_media.h"
-#include "worker/render/world/coincident.h"
+#include "worker/render/world/build_coincidence.h"
 #include "worker/render/world/effects_analyse.h"
 #include "worker/render/world/effects_apply.h"
 #include "worker/render/world/effects_text.h"
 #include "worker/render/world/emitter_choice.h"
 #include "worker/render/world/geometry.h"
-#include "worker/render/world/moving.h"
+#include "worker/render/world/build_motion.h"
 #include "worker/render/world/node_table.h"
 #include "worker/render/world/refracting.h"
 #include "worker/render/world/smooth_tangents.h"
-#include "worker/render/world/unseen.h"
+#include "worker/render/world/visibility_notes.h"
 #include "worker/render/world/visibility_bounds.h"
 
 #include <string.h>
@@ -77,7 +77,7 @@ static void set_volumes(struct builder *b)
 	b->volumes = (struct volume_build){.assets = b->assets,
 					   .arena = &b->w->arena,
 					   .cache = &b->grids,
-					   .dialect_3 = b->scene->is_dialect_3,
+					   .is_dialect_3 = b->scene->is_dialect_3,
 					   .world_center = b->w->center,
 					   .world_scale = b->w->scale};
 }
@@ -106,7 +106,7 @@ static int create_bsdfs(struct builder *b)
 	const struct scene_node *null = NULL;
 	struct bsdf_build build = {.assets = b->assets,
 				   .arena = &w->arena,
-				   .dialect_3 = b->scene->is_dialect_3,
+				   .is_dialect_3 = b->scene->is_dialect_3,
 				   .min_roughness = w->accuracy.roughness,
 				   .has_black_backs = backs_are_black(b),
 				   .volumes = &b->volumes,
@@ -165,7 +165,7 @@ static struct emitter_surface make_emitter_surface(const struct geom_shape *g)
 		.unrounded = (const double(*)[3])g->unrounded,
 		.index = (const uint32_t(*)[3])g->index,
 		.uv = (const float(*)[2])g->uv,
-		.motion = surface_moves(g) ? &g->placement->movement->motion : NULL,
+		.motion = surface_is_moving(g) ? &g->placement->movement->motion : NULL,
 	};
 }
 
@@ -179,7 +179,7 @@ static struct emitter_build make_emitter_build(const struct builder *b)
 	struct world *w = b->w;
 	return (struct emitter_build){.assets = b->assets,
 				      .arena = &w->arena,
-				      .dialect_3 = b->scene->is_dialect_3,
+				      .is_dialect_3 = b->scene->is_dialect_3,
 				      .world_center = w->center,
 				      .world_scale = w->scale,
 				      .volumes = &b->volumes,
@@ -193,9 +193,9 @@ static int create_emitters(struct builder *b)
 	const struct scene *s = b->scene;
 	uint32_t limit = w->shape_count + s->object_count;
 	w->emitters = arena_alloc(&w->arena, limit, sizeof *w->emitters);
-	w->emitter_shape = arena_alloc(&w->arena, limit, sizeof *w->emitter_shape);
+	w->emitter_shapes = arena_alloc(&w->arena, limit, sizeof *w->emitter_shapes);
 	b->emitter_nodes = arena_alloc(&b->scratch, limit, sizeof(void *));
-	if (!w->emitters || !w->emitter_shape || !b->emitter_nodes)
+	if (!w->emitters || !w->emitter_shapes || !b->emitter_nodes)
 		return build_out_of_memory(b->e);
 	struct emitter_build build = make_emitter_build(b);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
@@ -212,7 +212,7 @@ static int create_emitters(struct builder *b)
 			rc = power_error(n, b->e);
 		if (rc && (rc = build_record_problem(b, rc)))
 			return rc;
-		w->emitter_shape[w->emitter_count] = i;
+		w->emitter_shapes[w->emitter_count] = i;
 		b->emitter_nodes[w->emitter_count] = n;
 		w->shape_bindings[i].emitter = (int32_t)w->emitter_count++;
 	}
@@ -231,7 +231,7 @@ static int create_emitters(struct builder *b)
 			rc = node_error(n, b->e, EINVAL,
 					"a scene may have one environment only; remove this one or the one before");
 		if (!rc) {
-			rc = moving_emitter(b, em, n);
+			rc = build_motion_set_emitter(b, em, n);
 		}
 		if (em->is_infinite)
 			em->power *= M_PI * w->radius * w->radius;
@@ -242,7 +242,7 @@ static int create_emitters(struct builder *b)
 		if (environment)
 			w->environment = (int32_t)w->emitter_count;
 		b->emitter_nodes[w->emitter_count] = n;
-		w->emitter_shape[w->emitter_count++] = UINT32_MAX;
+		w->emitter_shapes[w->emitter_count++] = UINT32_MAX;
 	}
 	return 0;
 }
@@ -292,7 +292,7 @@ static int build_accel(struct builder *b)
 	/* The meshes as they were read take half of the memory that Embree is about to need, so they are freed
 	 * first. */
 	arena_fini(&b->scratch);
-	struct accel_shape *s = coincident_make_shapes(w, &b->scratch);
+	struct accel_shape *s = build_coincidence_make_shapes(w, &b->scratch);
 	if (!s)
 		return build_out_of_memory(b->e);
 	return accel_new(&w->accel, s, w->shape_count, w->coincidence, b->e);
@@ -300,8 +300,8 @@ static int build_accel(struct builder *b)
 
 static int find_coincidence(struct builder *b)
 {
-	struct accel_shape *s = coincident_make_shapes(b->w, &b->scratch);
-	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
+	struct accel_shape *s = build_coincidence_make_shapes(b->w, &b->scratch);
+	return s ? build_coincidence_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
 }
 
 /* Adds the box of shape i, converted to world lengths. It is slightly enlarged because the shape was rounded to
@@ -312,7 +312,7 @@ static void add_shape_to_box(const struct builder *b, uint32_t i, struct box *bo
 	const double slack = 0x1p-16 * w->radius;
 	for (int side = 0; side < 2; side++) {
 		double offset = side ? slack : -slack;
-		vec3 p = side ? b->shape_boxes[i].high : b->shape_boxes[i].low;
+		vec3 p = side ? b->shape_boxes[i].max : b->shape_boxes[i].min;
 		box_grow(box, vec3_add(vec3_scale(w->scale, vec3_sub(p, w->center)), (vec3){offset, offset, offset}));
 	}
 }
@@ -363,7 +363,7 @@ static int build_all_but_accel(struct builder *b, const struct render_options *o
 	if (!rc)
 		rc = accuracy_settings_read(o ? o->accuracy : NULL, &b->w->accuracy, b->e);
 	if (!rc && b->w->accuracy.colour > 0 &&
-	    (b->forced_effects.state[EFFECT_WAVELENGTH] > 0 || b->forced_effects.state[EFFECT_DISPERSION] > 0))
+	    (b->forced_effects.states[EFFECT_WAVELENGTH] > 0 || b->forced_effects.states[EFFECT_DISPERSION] > 0))
 		rc = error_set(b->e, EINVAL,
 			       "effects: `wavelength` and `dispersion` need spectra, and colours are rgb");
 	if (!rc)
@@ -394,7 +394,7 @@ static int build_all_but_accel(struct builder *b, const struct render_options *o
 		rc = compute_emitter_probabilities(b);
 	if (!rc) {
 		world_note_nothing_visible(b->w, b->shape_boxes);
-		world_note_no_light(b->w, b->dropped_emitter);
+		world_note_no_light(b->w, b->has_dropped_emitter);
 		build_note_endless_medium(b);
 	}
 	if (!rc && !b->w->effects.colour)
@@ -469,8 +469,8 @@ int world_new(struct world **out, const struct scene *s, const struct asset_sour
 	return new_world(out, true, s, assets, o, NULL, e);
 }
 
-int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-		 struct render_summary *out, struct error *e)
+int world_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		struct render_summary *out, struct error *e)
 {
 	struct world *w;
 	int rc = new_world(&w, false, s, assets, o, NULL, e);
@@ -480,8 +480,8 @@ int render_check(const struct scene *s, const struct asset_source *assets, const
 	return rc;
 }
 
-int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-		     struct report *report, struct render_summary *out, struct error *e)
+int world_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		    struct report *report, struct render_summary *out, struct error *e)
 {
 	struct world *w;
 	int rc = new_world(&w, false, s, assets, o, report, e);
@@ -516,7 +516,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 {
 	*out = (struct render_summary){.settings = w->settings,
 				       .useful_depth = w->effects.max_depth,
-				       .line_count = w->effects.line_count,
+				       .effect_line_count = w->effects.effect_line_count,
 				       .shapes = w->shape_count,
 				       .instances = w->instance_count,
 				       .sharing_shapes = w->sharing_shape_count,
@@ -526,7 +526,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .has_rolling_shutter = world_has_rolling_shutter(w),
 				       .coincidence_notes = w->coincidence_notes,
 				       .notes = w->notes};
-	memcpy(out->lines, w->effects.lines, sizeof out->lines);
+	memcpy(out->effect_lines, w->effects.effect_lines, sizeof out->effect_lines);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
 		out->triangles += g->triangle_count;

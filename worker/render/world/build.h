@@ -13,14 +13,14 @@ struct world;
 
 /* Checks a scene: reads every mesh, texture and material and determines the effects, but does not build Embree's tree
  * (except to report black backs in small scenes). Workers can render a scene that passes. */
-int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-		 struct render_summary *out, struct error *e);
+int world_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		struct render_summary *out, struct error *e);
 
-/* Like render_check(), but continues after an error in a shape, a material or an emitter. *report (report_init)
+/* Like world_check(), but continues after an error in a shape, a material or an emitter. *report (report_init)
  * collects these errors, each once; *out is only filled in if there are none. Any other error is returned, as by
- * render_check(). */
-int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-		     struct report *report, struct render_summary *out, struct error *e);
+ * world_check(). */
+int world_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		    struct report *report, struct render_summary *out, struct error *e);
 
 /* Builds a world with Embree's tree; ticks meanwhile (common/base/liveness.h). The scene description
  * may be freed afterwards. */

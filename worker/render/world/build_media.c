@@ -87,7 +87,7 @@ int build_media(struct builder *b)
 static bool is_bounded(const struct world *w, uint32_t medium)
 {
 	const struct medium *m = &w->media[medium - 1];
-	if (volume_varies(&m->first) || !(m->absorbs || m->scatters))
+	if (volume_varies(&m->first) || !(m->is_absorbing || m->is_scattering))
 		return true;
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (w->shape_bindings[i].interior == medium)
@@ -135,7 +135,7 @@ static uint32_t medium_around_emitter(const struct world *w, uint32_t emitter)
 	double pdf;
 	if (!em->ops->sample_point(em, middle, &p, &pdf) || p.is_infinite)
 		return 0;
-	uint32_t shape = w->emitter_shape[emitter];
+	uint32_t shape = w->emitter_shapes[emitter];
 	bool has_surface = shape != UINT32_MAX;
 	struct ray_end from = {p.p, has_surface ? p.n : (vec3){0, 0, 0},
 			       has_surface ? (struct prim_ref){shape, p.texture_point.prim, 0} : PRIM_NONE};
@@ -153,10 +153,10 @@ int build_scattering(struct builder *b)
 			w->shape_bindings[i].emitter < 0;
 		w->has_null_faces = w->has_null_faces || w->shape_bindings[i].is_null_face;
 	}
-	w->emitter_medium = arena_alloc(&w->arena, w->emitter_count, sizeof *w->emitter_medium);
-	if (!w->emitter_medium)
+	w->emitter_media = arena_alloc(&w->arena, w->emitter_count, sizeof *w->emitter_media);
+	if (!w->emitter_media)
 		return build_out_of_memory(b->e);
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		w->emitter_medium[i] = medium_around_emitter(w, i);
+		w->emitter_media[i] = medium_around_emitter(w, i);
 	return 0;
 }

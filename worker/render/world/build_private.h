@@ -11,7 +11,7 @@
 #include "worker/render/texture/attribute_table.h"
 #include "worker/render/volume/grid_file.h"
 #include "worker/render/volume/volume.h"
-#include "worker/render/world/origin.h"
+#include "worker/render/world/world_origin.h"
 #include "worker/render/world/world.h"
 
 #include <string.h>
@@ -38,7 +38,7 @@ struct builder {
 	/* Bounding box of the scene, and one box per shape. */
 	struct box scene_box, *shape_boxes;
 	/* A shape that emits was left out because it has no area. */
-	bool dropped_emitter;
+	bool has_dropped_emitter;
 	/* Collects problems after which building continues; NULL: the first problem ends it. */
 	struct report *report;
 	struct error *e;

@@ -60,7 +60,7 @@ extern const struct effect_decl effect_table[EFFECTS];
 
 /* 1: forced on, -1: forced off, 0: determined by the scene. */
 struct effects_override {
-	signed char state[EFFECTS];
+	signed char states[EFFECTS];
 	bool forces_any_on;
 };
 
@@ -75,22 +75,22 @@ struct effects {
 	bool refracted_shadows;	  /* connections to emitters are refracted at exactly specular surfaces */
 	bool media;		  /* absorption or scattering */
 	/* Any effect that matters when sub-paths are joined: media, dispersion, transparent or refracted shadows. */
-	bool joints;
+	bool has_joint_effects;
 	bool motion;		    /* paths have a time */
 	enum color_kind illuminant; /* spectrum shared by all emitters, if colour is off */
 	/* Edges of the longest path that can carry light, at most the scene's max_depth. */
 	uint32_t max_depth;
-	struct effect_line lines[RENDER_EFFECTS_MAX];
-	size_t line_count;
+	struct effect_line effect_lines[RENDER_EFFECTS_MAX];
+	size_t effect_line_count;
 };
 _Static_assert((int)EFFECTS <= (int)RENDER_EFFECTS_MAX, "each has its line");
 
 /* Whether a path between camera and light can meet a shape, or why it cannot. */
 enum visibility {
-	VISIBILITY_YES,
-	VISIBILITY_ENCLOSED, /* inside a closed opaque shape while the camera is outside */
-	VISIBILITY_DARK,     /* nothing in the scene emits, or all emitters are enclosed */
-	VISIBILITY_DEPTH,    /* paths are too short to scatter */
+	VISIBILITY_VISIBLE,
+	VISIBILITY_ENCLOSED,  /* inside a closed opaque shape while the camera is outside */
+	VISIBILITY_DARK,      /* nothing in the scene emits, or all emitters are enclosed */
+	VISIBILITY_TOO_SHORT, /* paths are too short to scatter */
 };
 
 #endif

@@ -106,10 +106,10 @@ static void add_hidden_material(struct census *c, const struct bsdf *b, const st
 static void find_bsdf_visibility(const struct world *w, const enum visibility *shape, struct bsdf_visibility *out)
 {
 	for (uint32_t k = 0; k < w->bsdf_count; k++)
-		out[k] = (struct bsdf_visibility){VISIBILITY_YES, false};
+		out[k] = (struct bsdf_visibility){VISIBILITY_VISIBLE, false};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		struct bsdf_visibility *r = &out[w->shape_bindings[i].bsdf];
-		if (!r->has_shape || r->visibility != VISIBILITY_YES)
+		if (!r->has_shape || r->visibility != VISIBILITY_VISIBLE)
 			*r = (struct bsdf_visibility){shape[i], true};
 	}
 }
@@ -144,11 +144,11 @@ static void add_medium(struct census *c, const struct world *w, uint32_t number,
 	const struct medium *m = number ? &w->media[number - 1] : NULL;
 	if (!m)
 		return;
-	if (m->absorbs)
+	if (m->is_absorbing)
 		count_object(&c->absorbing, owner, "");
-	if (m->scatters)
+	if (m->is_scattering)
 		count_object(&c->scattering, owner, "");
-	if ((m->absorbs || m->scatters) && medium_is_colored(m))
+	if ((m->is_absorbing || m->is_scattering) && medium_is_colored(m))
 		count_object(&c->coloured, medium, "");
 	if (!m->is_emissive)
 		return;
@@ -160,20 +160,20 @@ static void add_medium(struct census *c, const struct world *w, uint32_t number,
 
 static struct census take_census(const struct world *w, const struct effects_source *src, const enum visibility *shape)
 {
-	struct census c = {.why_hidden = VISIBILITY_YES};
+	struct census c = {.why_hidden = VISIBILITY_VISIBLE};
 	find_bsdf_visibility(w, shape, src->bsdf_visibility);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
 		enum visibility r = src->bsdf_visibility[i].visibility;
-		if (r == VISIBILITY_YES)
+		if (r == VISIBILITY_VISIBLE)
 			add_material(&c, &w->bsdfs[i], src->bsdf_nodes[i]);
 		else
 			add_hidden_material(&c, &w->bsdfs[i], src->bsdf_nodes[i], r);
 	}
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (visibility_bounds_emitter_is_visible(w, shape, i))
+		if (visibility_bounds_see_emitter(w, shape, i))
 			add_emitter(&c, &w->emitters[i], src->emitter_nodes[i]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] == VISIBILITY_YES) {
+		if (shape[i] == VISIBILITY_VISIBLE) {
 			const struct scene_node *n = src->shape_nodes[i];
 			add_medium(&c, w, w->shape_bindings[i].interior, n, node_ref(n, "interior"));
 			add_medium(&c, w, w->shape_bindings[i].exterior, n, node_ref(n, "exterior"));
@@ -196,8 +196,8 @@ __attribute__((format(printf, 4, 5))) static bool add_line(struct effect_report 
 							   const char *why, ...)
 {
 	const struct effect_decl *d = &effect_table[effect];
-	int force = r->forced->state[effect];
-	struct effect_line *l = &r->fx->lines[r->fx->line_count++];
+	int force = r->forced->states[effect];
+	struct effect_line *l = &r->fx->effect_lines[r->fx->effect_line_count++];
 	*l = (struct effect_line){.name = d->name, .is_on = force ? force > 0 : is_needed, .savings = d->savings};
 	l->is_forced = force && l->is_on != is_needed;
 	l->changes_scene = l->is_forced && is_needed && (d->override_flags & EFFECT_CHANGES_SCENE);
@@ -216,9 +216,9 @@ static const char *visibility_reason(enum visibility r)
 		return "it is inside a closed opaque shape";
 	case VISIBILITY_DARK:
 		return "nothing shines";
-	case VISIBILITY_DEPTH:
+	case VISIBILITY_TOO_SHORT:
 		return "paths of one edge do not scatter";
-	case VISIBILITY_YES:
+	case VISIBILITY_VISIBLE:
 		break;
 	}
 	return "";
@@ -248,7 +248,7 @@ static void decide_colour(struct effect_report *r, const struct census *c)
 /* Turns colour on because another effect that is forced on needs it. */
 static void force_colour(struct effect_report *r, const char *by)
 {
-	struct effect_line *l = &r->fx->lines[0];
+	struct effect_line *l = &r->fx->effect_lines[0];
 	if (r->fx->colour)
 		return;
 	r->fx->colour = l->is_on = l->is_forced = true;
@@ -320,7 +320,8 @@ static bool add_material_line(struct effect_report *r, enum effect effect, const
 static void decide_lobes(struct effect_report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
-	struct effect_line *half_vector_line = &fx->lines[fx->line_count++]; /* half vectors: filled in below */
+	struct effect_line *half_vector_line =
+		&fx->effect_lines[fx->effect_line_count++]; /* half vectors: filled in below */
 	if (!c->specular.count && c->hidden_specular.count) {
 		char text[NAMES_MAX];
 		fx->specular = add_line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s",
@@ -332,15 +333,15 @@ static void decide_lobes(struct effect_report *r, const struct census *c)
 	}
 	fx->glossy = add_material_line(r, EFFECT_GLOSSY, &c->glossy, "has rough lobes of finite width",
 				       "have rough lobes of finite width", "has rough lobes of finite width");
-	size_t end = fx->line_count;
-	fx->line_count = (size_t)(half_vector_line - fx->lines);
+	size_t end = fx->effect_line_count;
+	fx->effect_line_count = (size_t)(half_vector_line - fx->effect_lines);
 	bool is_needed = fx->specular || fx->glossy;
 	add_line(r, EFFECT_HALF_VECTORS, is_needed, is_needed ? "lobes are narrow: %s" : "no lobe is narrow: %s",
 		 fx->specular && fx->glossy ? "specular and glossy"
 		 : fx->specular		    ? "specular"
 		 : fx->glossy		    ? "glossy"
 					    : "paths that are traced and joined are as likely to carry light");
-	fx->line_count = end;
+	fx->effect_line_count = end;
 	add_material_line(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
 			  "is diffuse only");
 	add_material_line(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through", "let light through",
@@ -356,10 +357,10 @@ static void decide_motion(struct effect_report *r, const struct world *w, const 
 	char text[NAMES_MAX];
 	struct tally moving = {0};
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (surface_moves(&w->shapes[i]))
+		if (surface_is_moving(&w->shapes[i]))
 			count_object(&moving, src->shape_nodes[i], "");
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (w->emitters[i].motion && w->emitter_shape[i] == UINT32_MAX)
+		if (w->emitters[i].motion && w->emitter_shapes[i] == UINT32_MAX)
 			count_object(&moving, src->emitter_nodes[i], "");
 	if (w->camera.motion)
 		count_object(&moving, src->sensor, "");
@@ -467,7 +468,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 		     enum visibility *shape)
 {
 	struct effects *fx = &w->effects;
-	*fx = (struct effects){.line_count = 0};
+	*fx = (struct effects){.effect_line_count = 0};
 	visibility_bounds_shapes(w, src, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
 	struct census c = take_census(w, src, shape);
 	struct effect_report r = {fx, forced};
@@ -497,6 +498,6 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 					       "where media scatter or shine, connections are not refracted",
 					       "refracts light exactly", "refract light exactly");
 	fx->media = fx->absorption || fx->scattering;
-	fx->joints = fx->media || fx->dispersion || fx->transparent_shadows || fx->refracted_shadows;
+	fx->has_joint_effects = fx->media || fx->dispersion || fx->transparent_shadows || fx->refracted_shadows;
 	decide_depth(&r, w, src, shape);
 }

@@ -9,8 +9,8 @@
 static void remove_emitter(struct world *w, uint32_t i)
 {
 	w->emitters[i].power = 0;
-	if (w->emitter_shape[i] != UINT32_MAX)
-		w->shape_bindings[w->emitter_shape[i]].emitter = -1;
+	if (w->emitter_shapes[i] != UINT32_MAX)
+		w->shape_bindings[w->emitter_shapes[i]].emitter = -1;
 	if (w->environment == (int32_t)i)
 		w->environment = -1;
 }
@@ -20,7 +20,7 @@ static bool is_switched_off(const struct emitter *em, const struct effects_overr
 	enum effect which = em->is_delta      ? EFFECT_DELTA_LIGHT
 			    : em->is_infinite ? EFFECT_ENVIRONMENT
 					      : EFFECT_AREA_LIGHT;
-	return forced->state[which] < 0;
+	return forced->states[which] < 0;
 }
 
 /* Makes shapes that no path can meet black and removes emitters without effect. Not used if an effect is forced on,
@@ -30,21 +30,21 @@ static void remove_invisible(struct world *w, const enum visibility *shape)
 	uint32_t black = w->bsdf_count++; /* there is room for one more than there are shapes */
 	bsdf_make_black(&w->bsdfs[black]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
+		if (shape[i] != VISIBILITY_VISIBLE || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
 			w->shape_bindings[i].bsdf = black;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (!visibility_bounds_emitter_is_visible(w, shape, i))
+		if (!visibility_bounds_see_emitter(w, shape, i))
 			remove_emitter(w, i);
 }
 
 static unsigned switched_off_lobes(const struct bsdf *b, const struct effects_override *forced)
 {
 	unsigned removed = 0;
-	if (forced->state[EFFECT_TRANSMISSION] < 0 && (b->modes & BSDF_TRANSMIT))
+	if (forced->states[EFFECT_TRANSMISSION] < 0 && (b->modes & BSDF_TRANSMIT))
 		removed |= BSDF_WITHOUT_TRANSMISSION;
-	if (forced->state[EFFECT_SPECULAR] < 0 && b->has_delta)
+	if (forced->states[EFFECT_SPECULAR] < 0 && b->has_delta)
 		removed |= BSDF_WITHOUT_DELTA;
-	if (forced->state[isfinite(b->min_alpha) ? EFFECT_GLOSSY : EFFECT_DIFFUSE] < 0 && b->has_smooth)
+	if (forced->states[isfinite(b->min_alpha) ? EFFECT_GLOSSY : EFFECT_DIFFUSE] < 0 && b->has_smooth)
 		removed |= BSDF_WITHOUT_SMOOTH;
 	return removed;
 }
@@ -53,14 +53,14 @@ static unsigned switched_off_lobes(const struct bsdf *b, const struct effects_ov
 static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_override *forced,
 			   struct error *e)
 {
-	m->absorbs = m->absorbs && fx->absorption;
-	m->scatters = m->scatters && fx->scattering && forced->state[EFFECT_SCATTERING] >= 0;
+	m->is_absorbing = m->is_absorbing && fx->absorption;
+	m->is_scattering = m->is_scattering && fx->scattering && forced->states[EFFECT_SCATTERING] >= 0;
 	m->is_emissive = m->is_emissive && fx->medium_light;
-	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
+	if (!volume_varies(&m->second) || m->is_absorbing == m->is_scattering)
 		return 0;
 	/* Either no path reaches the medium, or the user switched one of the effects off. */
-	m->absorbs = m->scatters = false;
-	return forced->state[EFFECT_ABSORPTION] < 0 || forced->state[EFFECT_SCATTERING] < 0
+	m->is_absorbing = m->is_scattering = false;
+	return forced->states[EFFECT_ABSORPTION] < 0 || forced->states[EFFECT_SCATTERING] < 0
 		       ? error_set(
 				 e, EINVAL,
 				 "absorption and scattering can only be switched off together in this scene: it has a "
@@ -77,7 +77,7 @@ int effects_apply(struct world *w, const struct effects_override *forced, const 
 		/* Dispersion that is forced on treats the index as varying with wavelength, by an amount of 0. */
 		if (!w->effects.dispersion)
 			b->is_dispersive = false;
-		else if (forced->state[EFFECT_DISPERSION] > 0 && b->eta != 1)
+		else if (forced->states[EFFECT_DISPERSION] > 0 && b->eta != 1)
 			b->is_dispersive = true;
 		unsigned removed = switched_off_lobes(b, forced);
 		int rc = removed ? bsdf_filter_lobes(b, removed, &w->arena, e) : 0;
@@ -92,7 +92,7 @@ int effects_apply(struct world *w, const struct effects_override *forced, const 
 		if (rc)
 			return rc;
 	}
-	if (forced->state[EFFECT_APERTURE])
+	if (forced->states[EFFECT_APERTURE])
 		camera_force_aperture(&w->camera, w->effects.aperture);
 	return 0;
 }

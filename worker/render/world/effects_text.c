@@ -28,7 +28,7 @@ static int refuse_unknown(const char *name, size_t length, struct error *e)
 {
 	char wanted[64], hint[96], list[384] = "";
 	snprintf(wanted, sizeof wanted, "%.*s", (int)length, name);
-	struct spelling s = {.wanted = wanted};
+	struct spelling s = {.wanted_name = wanted};
 	for (int i = 0; i < EFFECTS; i++) {
 		spelling_offer(&s, effect_table[i].name);
 		spelling_append_to_list(list, sizeof list, effect_table[i].name);
@@ -41,21 +41,21 @@ static int parse_item(const char *item, size_t length, struct effects_override *
 {
 	if (length == 3 && memcmp(item, "all", 3) == 0) {
 		for (int i = 0; i < EFFECTS; i++)
-			if ((effect_table[i].override_flags & EFFECT_MAY_FORCE_ON) && !out->state[i])
-				out->state[i] = 1;
+			if ((effect_table[i].override_flags & EFFECT_MAY_FORCE_ON) && !out->states[i])
+				out->states[i] = 1;
 		return 0;
 	}
 	if (length < 2 || (*item != '+' && *item != '-')) {
 		char wanted[64], hint[96] = "";
 		snprintf(wanted, sizeof wanted, "%.*s", (int)length, item);
-		struct spelling s = {.wanted = wanted};
+		struct spelling s = {.wanted_name = wanted};
 		for (int i = 0; i < EFFECTS; i++)
 			spelling_offer(&s, effect_table[i].name);
 		spelling_offer(&s, "all");
-		if (s.best && strcmp(s.best, "all") == 0)
+		if (s.best_match && strcmp(s.best_match, "all") == 0)
 			spelling_hint(&s, hint, sizeof hint);
-		else if (s.best)
-			snprintf(hint, sizeof hint, "; did you mean `+%s` or `-%s`?", s.best, s.best);
+		else if (s.best_match)
+			snprintf(hint, sizeof hint, "; did you mean `+%s` or `-%s`?", s.best_match, s.best_match);
 		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%s'%s", wanted,
 				 hint);
 	}
@@ -66,7 +66,7 @@ static int parse_item(const char *item, size_t length, struct effects_override *
 	bool is_on = *item == '+';
 	if (!(d->override_flags & (is_on ? EFFECT_MAY_FORCE_ON : EFFECT_MAY_FORCE_OFF)))
 		return error_set(e, EINVAL, "%s cannot be forced %s: %s", d->name, is_on ? "on" : "off", d->refusal);
-	out->state[which] = is_on ? 1 : -1;
+	out->states[which] = is_on ? 1 : -1;
 	return 0;
 }
 
@@ -85,7 +85,7 @@ int effects_parse(const char *text, struct effects_override *out, struct error *
 			break;
 	}
 	for (int i = 0; i < EFFECTS; i++)
-		out->forces_any_on |= out->state[i] > 0;
+		out->forces_any_on |= out->states[i] > 0;
 	return 0;
 }
 
@@ -93,14 +93,15 @@ void effects_print(const struct effects_override *c, char text[PLAN_EFFECTS_MAX]
 {
 	bool is_all = true;
 	for (int i = 0; i < EFFECTS; i++)
-		is_all &= c->state[i] != 0 || !(effect_table[i].override_flags & EFFECT_MAY_FORCE_ON);
+		is_all &= c->states[i] != 0 || !(effect_table[i].override_flags & EFFECT_MAY_FORCE_ON);
 	is_all &= c->forces_any_on;
 	struct text t = {text, PLAN_EFFECTS_MAX};
 	memset(text, 0, PLAN_EFFECTS_MAX);
 	text_appendf(&t, "%s", is_all ? "all" : "");
 	for (int i = 0; i < EFFECTS; i++)
-		if (c->state[i] < 0 || (c->state[i] > 0 && !is_all))
-			text_appendf(&t, "%s%c%s", *text ? "," : "", c->state[i] < 0 ? '-' : '+', effect_table[i].name);
+		if (c->states[i] < 0 || (c->states[i] > 0 && !is_all))
+			text_appendf(&t, "%s%c%s", *text ? "," : "", c->states[i] < 0 ? '-' : '+',
+				     effect_table[i].name);
 }
 
 int render_canonical_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e)
@@ -116,10 +117,10 @@ void render_other_scene_note(const struct render_summary *scene, char *text, siz
 {
 	struct text t = {text, size};
 	*text = 0;
-	for (size_t i = 0; i < scene->line_count; i++)
-		if (scene->lines[i].changes_scene)
+	for (size_t i = 0; i < scene->effect_line_count; i++)
+		if (scene->effect_lines[i].changes_scene)
 			text_appendf(&t, "%s%s", *text ? ", " : "the image is of another scene: without ",
-				     scene->lines[i].name);
+				     scene->effect_lines[i].name);
 }
 
 bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size)
@@ -161,8 +162,8 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 
 bool render_effect_is_on(const struct render_summary *scene, const char *name)
 {
-	for (size_t i = 0; i < scene->line_count; i++)
-		if (strcmp(scene->lines[i].name, name) == 0)
-			return scene->lines[i].is_on;
+	for (size_t i = 0; i < scene->effect_line_count; i++)
+		if (strcmp(scene->effect_lines[i].name, name) == 0)
+			return scene->effect_lines[i].is_on;
 	return false;
 }

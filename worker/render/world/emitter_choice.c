@@ -8,10 +8,10 @@
  * If emitter e is chosen with probability p_e, the second moment of the estimate of a point's direct light is sum c_e^2
  * / p_e, where c_e is the light from e. Relative to all light at the point, and averaged over the points of a cell, it
  * is sum a_e / p_e, where a_e is the mean of the squared shares of e. The minimum is at p_e proportional to sqrt(a_e).
- * Because a cell has few points, a_e includes BORROWED_POINTS points of the enclosing cell, whose a_e in turn includes
+ * Because a cell has few points, a_e includes borrowed_points points of the enclosing cell, whose a_e in turn includes
  * points of the cell around it, up to the whole scene. Light sub-paths choose their emitter by the mean of two
  * probabilities, one by power and one by the shares of the whole scene. Cells use these probabilities in a fraction
- * DEFENSIVE_FRACTION of all cases, so that light that reached none of the points is chosen, too, and weights stay
+ * defensive_fraction of all cases, so that light that reached none of the points is chosen, too, and weights stay
  * bounded.
  *
  * Fails only if out of memory. Where too few points get light along a straight line (as when all lamps shine at
@@ -29,7 +29,7 @@ enum {
 	POINTS_MIN = 1 << 9,
 	CELL_POINTS = 16,
 };
-static const double BORROWED_POINTS = 4, DEFENSIVE_FRACTION = 0.1;
+static const double borrowed_points = 4, defensive_fraction = 0.1;
 
 /* Nodes are numbered as in a heap: 1 is the whole scene, and 2 i and 2 i + 1 are the halves of i. */
 struct emitter_choice {
@@ -74,7 +74,7 @@ bool emitter_choice_pick(const struct world *w, vec3 p, const double u[3], struc
 		return out->emitter >= 0;
 	}
 	const double *cdf = cell_cdf(c, p);
-	uint32_t part = search_cell(cdf, c->part_count, u[2]);
+	uint32_t part = search_find_cell(cdf, c->part_count, u[2]);
 	out->emitter = emitter_of_part(w, part);
 	out->density_ratio = part_probability(cdf, part) * emitter_part_density_ratio(w, part);
 	emitter_part_remap(w, part, u, out->u);
@@ -99,7 +99,7 @@ static void sort_axes(const struct point_tree_node *nodes, size_t count, unsigne
 	struct box box = box_empty();
 	for (size_t i = 0; i < count; i++)
 		box_grow(&box, nodes[i].p);
-	vec3 side = vec3_sub(box.high, box.low);
+	vec3 side = vec3_sub(box.max, box.min);
 	for (unsigned k = 0; k < 3; k++) {
 		unsigned slot = k;
 		for (; slot > 0 && vec3_component(side, axis[slot - 1]) < vec3_component(side, k); slot--)
@@ -165,7 +165,7 @@ static void part_probabilities(const double *a, uint32_t n, const double *light_
 	for (uint32_t e = 0; e < n; e++)
 		sum += sqrt(a[e]);
 	for (uint32_t e = 0; e < n; e++)
-		out[e] = (1 - DEFENSIVE_FRACTION) * (sqrt(a[e]) / sum) + DEFENSIVE_FRACTION * light_probability[e];
+		out[e] = (1 - defensive_fraction) * (sqrt(a[e]) / sum) + defensive_fraction * light_probability[e];
 }
 
 /* Computes the cumulative probabilities. cdf[n] is 1, and parts of probability 0 are never chosen. */
@@ -190,7 +190,7 @@ static void fill_node(const struct choice_builder *m, uint32_t node, size_t coun
 	double *a = node_sums(m, node);
 	const double *parent = node > 1 ? node_sums(m, node / 2) : NULL;
 	for (uint32_t e = 0; e < n; e++)
-		a[e] = parent ? (a[e] + BORROWED_POINTS * parent[e]) / ((double)count + BORROWED_POINTS)
+		a[e] = parent ? (a[e] + borrowed_points * parent[e]) / ((double)count + borrowed_points)
 			      : a[e] / (double)count;
 	if (node >= m->choice->first_cell) {
 		part_probabilities(a, n, m->light_probability, a);

@@ -25,32 +25,32 @@ enum {
 	RAYS_MAX = 1 << 18,  /* most shadow rays for all points */
 	SURFACES_MAX = 8,    /* most surfaces that a shadow ray passes */
 };
-static const double GLOSS_FRACTION = 0.1, /* fraction of the light that glossy reflection may add from any direction */
-	FAINT_FRACTION = 0.01; /* fraction of the light that has arrived, below which an offer is not tested */
+static const double gloss_fraction = 0.1, /* fraction of the light that glossy reflection may add from any direction */
+	faint_fraction = 0.01; /* fraction of the light that has arrived, below which an offer is not tested */
 
 struct scatter_point {
 	/* ng: on the side from which the walk came; 0 in a medium. */
 	vec3 p, ng;
 	struct prim_ref prim;
-	bool opaque;
+	bool is_opaque;
 };
 
 /* The end of a shadow ray. */
 struct shadow_target {
 	struct ray_end end; /* only if not infinite */
-	bool infinite;
+	bool is_infinite;
 	vec3 d; /* unit direction to it */
 };
 
 struct point_finder {
 	const struct world *w;
-	bool any_transmits; /* some surface lets light through */
+	bool has_transmission; /* some surface lets light through */
 	uint32_t ray_count;
 	uint32_t max_points, part_count;
 	struct emitter_points *out;
-	struct offer {
-		double light;
-		bool tested;
+	struct light_offer {
+		double incident_light;
+		bool is_tested;
 	} * offers;		       /* the unoccluded light of each part */
 	struct shadow_target *targets; /* and the point that emits it */
 };
@@ -71,11 +71,11 @@ static bool is_lit(const struct point_finder *f, const struct scatter_point *x, 
 	for (int n = 0; n < SURFACES_MAX; n++) {
 		struct ray_hit hit;
 		struct surface_point at;
-		if (y->infinite ? !accel_occluded_to_infinity(w->accel, &from, y->d)
-				: !accel_occluded(w->accel, &from, &y->end))
+		if (y->is_infinite ? !accel_occluded_to_infinity(w->accel, &from, y->d)
+				   : !accel_occluded(w->accel, &from, &y->end))
 			return true;
-		double end = y->infinite ? INFINITY : vec3_length(vec3_sub(y->end.p, from.p));
-		if (!f->any_transmits || !accel_closest(w->accel, &from, y->d, 0, end, &hit) ||
+		double end = y->is_infinite ? INFINITY : vec3_length(vec3_sub(y->end.p, from.p));
+		if (!f->has_transmission || !accel_closest(w->accel, &from, y->d, 0, end, &hit) ||
 		    !transmits_light(w, hit.prim.shape))
 			return false;
 		surface_from_hit(&w->shapes[hit.prim.shape], from.p, y->d, &hit, &at);
@@ -94,10 +94,10 @@ static bool draw_point(const struct world *w, uint32_t part, const struct emitte
 	if (!emitter_sample_toward(em, x->p, narrowed, y, pdf) || !(*pdf > 0))
 		return false;
 	*pdf *= emitter_part_density_ratio(w, part);
-	*target = (struct shadow_target){.infinite = y->is_infinite, .d = y->p};
+	*target = (struct shadow_target){.is_infinite = y->is_infinite, .d = y->p};
 	if (y->is_infinite)
 		return true;
-	uint32_t shape = w->emitter_shape[part];
+	uint32_t shape = w->emitter_shapes[part];
 	double time = x->prim.time;
 	target->end = (struct ray_end){y->p, y->n,
 				       shape == UINT32_MAX ? prim_none_at(time)
@@ -118,26 +118,27 @@ static double unoccluded_light(const struct world *w, uint32_t part, const struc
 			       const struct wavelengths *wl, struct shadow_target *target)
 {
 	struct emitter_storage storage;
-	const struct emitter *em = world_emitter(w, emitter_of_part(w, part), x->prim.time, &storage);
+	const struct emitter *em = world_emitter_at(w, emitter_of_part(w, part), x->prim.time, &storage);
 	struct emitter_point y;
 	double pdf, sum = 0;
 	if (!emitter_part_emits(w, part) || !draw_point(w, part, em, x, u, &y, target, &pdf))
 		return 0;
 	double cosine = vec3_dot(x->ng, target->d);
-	if (x->opaque && !(cosine > 0))
+	if (x->is_opaque && !(cosine > 0))
 		return 0;
 	spectrum light = em->ops->radiance(em, &y, vec3_neg(target->d), wl);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		sum += light.v[i];
-	double contribution = sum / pdf * (GLOSS_FRACTION + (1 - GLOSS_FRACTION) * fabs(cosine));
+	double contribution = sum / pdf * (gloss_fraction + (1 - gloss_fraction) * fabs(cosine));
 	return isfinite(contribution) ? contribution : 0;
 }
 
-static uint32_t brightest_untested(const struct offer *o, uint32_t n)
+static uint32_t brightest_untested(const struct light_offer *o, uint32_t n)
 {
 	uint32_t best = UINT32_MAX;
 	for (uint32_t i = 0; i < n; i++)
-		if (!o[i].tested && o[i].light > 0 && (best == UINT32_MAX || o[i].light > o[best].light))
+		if (!o[i].is_tested && o[i].incident_light > 0 &&
+		    (best == UINT32_MAX || o[i].incident_light > o[best].incident_light))
 			best = i;
 	return best;
 }
@@ -154,42 +155,42 @@ static void add_point(struct point_finder *f, const struct scatter_point *x, uin
 	const struct world *w = f->w;
 	double u[4], arrived = 0, sum = 0;
 	draw_numbers(walk, step, 1, u);
-	const struct wavelengths wl = world_wavelengths(w, u[2]);
+	const struct wavelengths wl = world_sample_wavelengths(w, u[2]);
 	for (uint32_t i = 0; i < f->part_count; i++)
-		f->offers[i] = (struct offer){unoccluded_light(w, i, x, u, &wl, &f->targets[i]), false};
+		f->offers[i] = (struct light_offer){unoccluded_light(w, i, x, u, &wl, &f->targets[i]), false};
 	for (int n = 0; n < TESTS_MAX; n++) {
 		uint32_t i = brightest_untested(f->offers, f->part_count);
-		if (i == UINT32_MAX || f->offers[i].light < FAINT_FRACTION * arrived)
+		if (i == UINT32_MAX || f->offers[i].incident_light < faint_fraction * arrived)
 			break;
-		f->offers[i].tested = true;
+		f->offers[i].is_tested = true;
 		f->ray_count++;
 		if (is_lit(f, x, &f->targets[i]))
-			arrived += f->offers[i].light;
+			arrived += f->offers[i].incident_light;
 		else
-			f->offers[i].light = 0;
+			f->offers[i].incident_light = 0;
 	}
 	for (uint32_t i = 0; i < f->part_count; i++)
-		sum += f->offers[i].light;
+		sum += f->offers[i].incident_light;
 	if (!(sum > 0) || !isfinite(sum))
 		return;
 	struct emitter_points *out = f->out;
 	float *share = &out->shares[(size_t)out->count * f->part_count];
 	for (uint32_t i = 0; i < f->part_count; i++)
-		share[i] = (float)(f->offers[i].light / sum);
+		share[i] = (float)(f->offers[i].incident_light / sum);
 	out->nodes[out->count] = (struct point_tree_node){x->p, out->count};
 	out->count++;
 }
 
 /* ---- walks ---- */
 
-struct step {
+struct walk_step {
 	struct ray_end origin;
 	vec3 d;
 	double t_min, t_max;
 };
 
 /* Starts a walk at the camera. Returns false if the camera sees nothing at that film point. */
-static bool start_walk(const struct world *w, uint64_t walk, struct step *s)
+static bool start_walk(const struct world *w, uint64_t walk, struct walk_step *s)
 {
 	const struct scene_settings *set = &w->settings;
 	struct camera storage;
@@ -224,7 +225,7 @@ static vec3 scatter_direction(const struct bsdf *b, vec3 d, vec3 n, const double
 }
 
 /* Adds a point on the way to the next surface, which is at `distance`. */
-static void add_point_in_medium(struct point_finder *f, const struct step *s, double distance, uint64_t walk,
+static void add_point_in_medium(struct point_finder *f, const struct walk_step *s, double distance, uint64_t walk,
 				uint64_t step)
 {
 	double u[4];
@@ -236,7 +237,7 @@ static void add_point_in_medium(struct point_finder *f, const struct step *s, do
 
 /* Continues a walk to the next surface and adds a point there if it scatters, which is counted in *points.
  * Returns false if the walk ends. */
-static bool step_to_surface(struct point_finder *f, struct step *s, uint64_t walk, uint64_t number, int *points)
+static bool step_to_surface(struct point_finder *f, struct walk_step *s, uint64_t walk, uint64_t number, int *points)
 {
 	const struct world *w = f->w;
 	struct ray_hit hit;
@@ -275,11 +276,11 @@ int emitter_points_find(const struct world *w, uint32_t max_points, struct arena
 	if (!out->nodes || !out->shares || !f.offers || !f.targets)
 		return -ENOMEM;
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		f.any_transmits |= transmits_light(w, i);
+		f.has_transmission |= transmits_light(w, i);
 	for (uint64_t walk = 0;
 	     walk < (uint64_t)WALKS_PER_POINT * max_points && out->count < max_points && f.ray_count < RAYS_MAX;
 	     walk++) {
-		struct step s;
+		struct walk_step s;
 		int points = 0;
 		if (!start_walk(w, walk, &s))
 			continue;

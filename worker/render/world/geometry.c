@@ -13,7 +13,7 @@
 #include "common/base/liveness.h"
 #include "worker/render/geom/curves.h"
 #include "worker/render/world/displacement.h"
-#include "worker/render/world/moving.h"
+#include "worker/render/world/build_motion.h"
 #include "worker/render/world/place_mesh.h"
 #include "worker/render/world/shared_mesh.h"
 
@@ -125,7 +125,7 @@ static int read_shape(struct builder *b, const struct scene_node *n, bool placed
 	if (!rc && g->kind == SHAPE_CURVE && needs_triangles(b, n, g, placed))
 		rc = shape_curves_to_mesh(g, n, &b->scratch, dropped, b->e);
 	if (rc || g->kind == SHAPE_CURVE || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) ||
-	    b->forced_effects.state[EFFECT_DISPLACEMENT] < 0)
+	    b->forced_effects.states[EFFECT_DISPLACEMENT] < 0)
 		return rc;
 	return displacement_apply(g, n, b->assets, b->scene->is_dialect_3, b->w->accuracy.tessellation, &b->scratch,
 				  b->e);
@@ -192,7 +192,7 @@ static int read_listed_shape(struct builder *b, const struct listed_shape *l, st
 		if (!rc)
 			rc = count_geometry(b, n, g, dropped, counts);
 		if (!rc && g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) {
-			b->dropped_emitter |= n->emits_light;
+			b->has_dropped_emitter |= n->emits_light;
 			return 0;
 		}
 		if (rc)
@@ -200,13 +200,14 @@ static int read_listed_shape(struct builder *b, const struct listed_shape *l, st
 		b->shape_boxes[id] = build_bounding_box(g);
 	}
 	if (!rc && l->animation)
-		rc = moving_begin(b, l, id, b->shared_meshes[id] ? b->shared_meshes[id]->box : b->shape_boxes[id]);
+		rc = build_motion_begin(b, l, id,
+					b->shared_meshes[id] ? b->shared_meshes[id]->box : b->shape_boxes[id]);
 	if (rc)
 		return rc;
 	b->shape_nodes[id] = n;
 	b->instances[id] = l->instance;
-	box_grow(&b->scene_box, b->shape_boxes[id].low);
-	box_grow(&b->scene_box, b->shape_boxes[id].high);
+	box_grow(&b->scene_box, b->shape_boxes[id].min);
+	box_grow(&b->scene_box, b->shape_boxes[id].max);
 	b->w->shape_count++;
 	return 0;
 }
@@ -244,7 +245,7 @@ int build_read_shapes(struct builder *b)
 	note_materials(b->w, &counts);
 	crash_set_context("building the scene", NULL, 0);
 	if (b->w->shape_count == 0)
-		b->scene_box.low = b->scene_box.high = (vec3){0, 0, 0};
+		b->scene_box.min = b->scene_box.max = (vec3){0, 0, 0};
 	return 0;
 }
 
@@ -256,8 +257,8 @@ int build_read_shapes(struct builder *b)
 /* Whether p lies in the box, or not farther than `margin` from it along each axis. */
 static bool is_in_box(const struct box *b, vec3 p, double margin)
 {
-	return p.x >= b->low.x - margin && p.x <= b->high.x + margin && p.y >= b->low.y - margin &&
-	       p.y <= b->high.y + margin && p.z >= b->low.z - margin && p.z <= b->high.z + margin;
+	return p.x >= b->min.x - margin && p.x <= b->max.x + margin && p.y >= b->min.y - margin &&
+	       p.y <= b->max.y + margin && p.z >= b->min.z - margin && p.z <= b->max.z + margin;
 }
 
 static void note_scales(struct builder *b)
@@ -324,17 +325,16 @@ int build_rescale(struct builder *b)
 	struct weighted_value *scratch = arena_alloc(&b->scratch, w->shape_count, sizeof *scratch);
 	if (!scratch)
 		return build_out_of_memory(b->e);
-	if (!isfinite(vec3_length(vec3_sub(b->scene_box.high, b->scene_box.low))))
+	if (!isfinite(vec3_length(vec3_sub(b->scene_box.max, b->scene_box.min))))
 		return error_set(b->e, EINVAL, "the scene's extent is not finite");
 	note_scales(b);
-	int rc = w->settings.is_unplaced
-			 ? scene_settings_place_default_sensor(&w->settings, b->scene->file, b->scene_box.low,
-							       b->scene_box.high, b->e)
-			 : 0;
+	int rc = w->settings.is_unplaced ? scene_settings_place_sensor(&w->settings, b->scene->file, b->scene_box.min,
+								       b->scene_box.max, b->e)
+					 : 0;
 	if (rc)
 		return rc;
-	w->center = origin_choose(&b->scene_box, b->shape_boxes, w->shape_count, scratch);
-	vec3 above = vec3_sub(b->scene_box.high, w->center), below = vec3_sub(w->center, b->scene_box.low);
+	w->center = world_origin_choose(&b->scene_box, b->shape_boxes, w->shape_count, scratch);
+	vec3 above = vec3_sub(b->scene_box.max, w->center), below = vec3_sub(w->center, b->scene_box.min);
 	double r = vec3_length((vec3){fmax(above.x, below.x), fmax(above.y, below.y), fmax(above.z, below.z)});
 	int exponent = 0;
 	if (r > 0)
@@ -350,7 +350,7 @@ int build_rescale(struct builder *b)
 	}
 	if (!rc)
 		note_shapes_near_camera(b);
-	return rc ? rc : moving_camera(b);
+	return rc ? rc : build_motion_set_camera(b);
 }
 
 /* ---- curves: their points are rounded to float, like the vertices of meshes, and shared by the cones on both sides,
@@ -426,7 +426,7 @@ static void place_sphere(struct builder *b, struct geom_shape *g, const struct s
 	g->is_sphere = true;
 	g->center = vec3_scale(w->scale, vec3_sub(s->center, w->center));
 	g->radius = w->scale * s->radius;
-	g->normal_sign = s->flip_normals ? -1 : 1;
+	g->normal_sign = s->flips_normals ? -1 : 1;
 	g->sphere_axes.s = vec3_normalize(mat4_vector(&s->to_world, (vec3){1, 0, 0}));
 	g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
 	g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
@@ -444,7 +444,7 @@ static int place_shape(struct builder *b, uint32_t i, double min_wide_extent, bo
 	g->unit = w->scale;
 	if (geometry->kind == SHAPE_SPHERE) {
 		place_sphere(b, g, &geometry->sphere);
-		return b->motions[i] ? moving_place_sphere(b, i) : 0;
+		return b->motions[i] ? build_motion_place_sphere(b, i) : 0;
 	}
 	if (geometry->kind == SHAPE_CURVE) {
 		int rc = place_curves(b, g, &geometry->curve, b->shape_nodes[i]);
@@ -485,7 +485,7 @@ int build_place_shapes(struct builder *b)
 	w->shape_bindings = arena_alloc(&w->arena, w->shape_count, sizeof *w->shape_bindings);
 	if (!w->shapes || !w->shape_bindings)
 		return build_out_of_memory(b->e);
-	double min_wide_extent = w->scale * origin_min_wide_extent(&b->scene_box, b->shape_boxes, w->shape_count);
+	double min_wide_extent = w->scale * world_origin_min_wide_extent(&b->scene_box, b->shape_boxes, w->shape_count);
 	uint32_t kept = 0;
 	const struct scene_node *first_empty = NULL;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
@@ -499,7 +499,7 @@ int build_place_shapes(struct builder *b)
 			kept++;
 			continue;
 		}
-		b->dropped_emitter |= b->shape_nodes[kept]->emits_light;
+		b->has_dropped_emitter |= b->shape_nodes[kept]->emits_light;
 		first_empty = first_empty ? first_empty : b->shape_nodes[kept];
 		w->shapes[kept] = (struct geom_shape){0};
 	}

@@ -11,7 +11,7 @@ struct box build_bounding_box(const struct shape_geometry *g)
 		return (struct box){vec3_sub(g->sphere.center, r), vec3_add(g->sphere.center, r)};
 	}
 	if (g->kind == SHAPE_CURVE)
-		return (struct box){g->curve.low, g->curve.high};
+		return (struct box){g->curve.box_min, g->curve.box_max};
 	for (uint32_t i = 0; i < g->mesh.vertex_count; i++)
 		box_grow(&b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
 	return b;
@@ -19,7 +19,7 @@ struct box build_bounding_box(const struct shape_geometry *g)
 
 bool build_is_displaced(const struct builder *b, const struct scene_node *shape)
 {
-	return b->forced_effects.state[EFFECT_DISPLACEMENT] >= 0 && displacement_property(shape);
+	return b->forced_effects.states[EFFECT_DISPLACEMENT] >= 0 && displacement_property(shape);
 }
 
 static vec3 load_float3(const float p[3])

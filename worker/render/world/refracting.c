@@ -143,8 +143,8 @@ static double optical_path(const struct refracting_point *q, vec3 z, const struc
 {
 	vec3 d = vec3_sub(q->p, z);
 	double inside = q->eta * vec3_length(d);
-	return light->infinite ? inside - vec3_dot(d, light->position)
-			       : inside + vec3_length(vec3_sub(light->position, q->p));
+	return light->is_infinite ? inside - vec3_dot(d, light->position)
+				  : inside + vec3_length(vec3_sub(light->position, q->p));
 }
 
 uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_light *light,

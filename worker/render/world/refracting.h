@@ -26,7 +26,7 @@ int refracting_points_make(struct world *w);
 /* The origin of light: a point, or, if it is infinitely far away, the unit direction towards it. */
 struct refracting_light {
 	vec3 position;
-	bool infinite;
+	bool is_infinite;
 };
 
 /* Finds the points through which light from `light` has the shortest optical path to z, the shortest first. Returns

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/shared_mesh.h"
 
-#include "worker/render/world/moving.h"
+#include "worker/render/world/build_motion.h"
 #include "worker/render/world/place_mesh.h"
 
 /* Matrices in files have six digits. */
@@ -38,14 +38,14 @@ void shared_mesh_decide(struct shared_mesh *m, bool moves)
 int shared_mesh_box(const struct shared_mesh *m, const struct scene_node *instance, struct box *box, struct error *e)
 {
 	mat4 transform = node_transform(instance, "to_world");
-	vec3 half = vec3_scale(0.5, vec3_sub(m->box.high, m->box.low)),
-	     center = mat4_point(&transform, vec3_add(m->box.low, half)), size;
+	vec3 half = vec3_scale(0.5, vec3_sub(m->box.max, m->box.min)),
+	     center = mat4_point(&transform, vec3_add(m->box.min, half)), size;
 	double *out[3] = {&size.x, &size.y, &size.z};
 	for (int i = 0; i < 3; i++)
 		*out[i] = fabs(transform.m[i][0]) * half.x + fabs(transform.m[i][1]) * half.y +
 			  fabs(transform.m[i][2]) * half.z;
 	*box = (struct box){vec3_sub(center, size), vec3_add(center, size)};
-	double max_norm = fmax(triangle_norm_max(box->low), triangle_norm_max(box->high));
+	double max_norm = fmax(triangle_norm_max(box->min), triangle_norm_max(box->max));
 	return max_norm <= MESH_COORDINATE_MAX
 		       ? 0
 		       : node_error(instance, e, ERANGE, "a vertex lies beyond %g", MESH_COORDINATE_MAX);
@@ -54,10 +54,10 @@ int shared_mesh_box(const struct shared_mesh *m, const struct scene_node *instan
 /* Converts the mesh to floats, in the unit sphere around the middle of its box. */
 static int place_in_own_frame(struct builder *b, struct shared_mesh *m, const struct scene_node *node)
 {
-	vec3 half = vec3_scale(0.5, vec3_sub(m->box.high, m->box.low));
+	vec3 half = vec3_scale(0.5, vec3_sub(m->box.max, m->box.min));
 	int exponent = 0;
 	frexp(vec3_length(half), &exponent);
-	m->center = vec3_add(m->box.low, half);
+	m->center = vec3_add(m->box.min, half);
 	m->scale = ldexp(1, -exponent);
 	m->is_placed = true;
 	int rc = build_place_mesh(b, &m->shape, &m->geometry.mesh, node, m->center, m->scale);
@@ -105,7 +105,7 @@ static int place_unmoving(const struct builder *b, const struct shared_mesh *m, 
 			  struct placement *p)
 {
 	mat4 transform = node_transform(instance, "to_world"), matrix = mesh_to_world(b->w, m, &transform);
-	return placement_make(p, &matrix, m->box.low, m->box.high) ? 0 : -EINVAL;
+	return placement_make(p, &matrix, m->box.min, m->box.max) ? 0 : -EINVAL;
 }
 
 int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct scene_node *instance, uint32_t id)
@@ -122,7 +122,7 @@ int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct sce
 	struct placement *p = arena_alloc(&w->arena, 1, sizeof *p);
 	if (!p)
 		return build_out_of_memory(b->e);
-	int rc = b->motions[id] ? moving_place(b, id, m->center, m->scale, &m->box, p)
+	int rc = b->motions[id] ? build_motion_place(b, id, m->center, m->scale, &m->box, p)
 				: place_unmoving(b, m, instance, p);
 	char place[NODE_PLACE_MAX];
 	if (rc == -EINVAL)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The effects of a scene and the options that a user may override, as displayed by programs. Filled in by render_check
+ * The effects of a scene and the options that a user may override, as displayed by programs. Filled in by world_check
  * and world_summary (build.h). Pure; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_WORLD_SUMMARY_H
@@ -57,8 +57,8 @@ struct render_summary {
 	struct scene_settings settings; /* includes the overrides of the options */
 	/* Edges of the longest path that can carry light, at most what was requested. */
 	uint32_t useful_depth;
-	struct effect_line lines[RENDER_EFFECTS_MAX];
-	size_t line_count;
+	struct effect_line effect_lines[RENDER_EFFECTS_MAX];
+	size_t effect_line_count;
 	uint64_t shapes, triangles; /* including all that instances show */
 	uint64_t instances;	    /* number of instances in the scene */
 	/* Number of shapes that share meshes, number of meshes that they share, and number of triangles in memory. */

@@ -11,7 +11,7 @@
 
 #include "worker/render/geom/curves.h"
 #include "worker/render/world/displacement.h"
-#include "worker/render/world/origin.h"
+#include "worker/render/world/world_origin.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -79,7 +79,7 @@ static bool is_container(const struct world *w, const struct scene_node *node, u
 {
 	const struct geom_shape *g = &w->shapes[shape];
 	bool convex = strcmp(node->type, "cube") == 0 || g->is_sphere;
-	return convex && !surface_moves(g) && !displacement_property(node) &&
+	return convex && !surface_is_moving(g) && !displacement_property(node) &&
 	       !(w->bsdfs[w->shape_bindings[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
@@ -116,8 +116,8 @@ static bool contains(const struct geom_shape *outer, const struct geom_shape *in
 
 static bool box_contains(const struct box *outer, const struct box *inner)
 {
-	return inner->low.x >= outer->low.x && inner->high.x <= outer->high.x && inner->low.y >= outer->low.y &&
-	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
+	return inner->min.x >= outer->min.x && inner->max.x <= outer->max.x && inner->min.y >= outer->min.y &&
+	       inner->max.y <= outer->max.y && inner->min.z >= outer->min.z && inner->max.z <= outer->max.z;
 }
 
 /* Returns the index of the first of n sorted numbers that is not below x. */
@@ -141,26 +141,26 @@ static void find_enclosed(const struct world *w, const struct effects_source *sr
 	struct weighted_value *by_x = src->scratch;
 	uint32_t n = w->shape_count;
 	for (uint32_t i = 0; i < n; i++)
-		by_x[i] = (struct weighted_value){src->boxes[i].low.x, i};
+		by_x[i] = (struct weighted_value){src->boxes[i].min.x, i};
 	if (n > 0)
 		qsort(by_x, n, sizeof *by_x, weighted_value_compare);
 	for (uint32_t o = 0; o < n; o++) {
 		const struct box *outer = &src->boxes[o];
 		if (!is_container(w, src->shape_nodes[o], o) || !camera_is_outside(w, &w->shapes[o]))
 			continue;
-		for (uint32_t k = find_lower_bound(by_x, n, outer->low.x); k < n && by_x[k].value <= outer->high.x;
+		for (uint32_t k = find_lower_bound(by_x, n, outer->min.x); k < n && by_x[k].value <= outer->max.x;
 		     k++) {
 			uint32_t i = (uint32_t)by_x[k].weight;
-			if (i != o && shape[i] == VISIBILITY_YES && !surface_moves(&w->shapes[i]) &&
+			if (i != o && shape[i] == VISIBILITY_VISIBLE && !surface_is_moving(&w->shapes[i]) &&
 			    box_contains(outer, &src->boxes[i]) && contains(&w->shapes[o], &w->shapes[i]))
 				shape[i] = VISIBILITY_ENCLOSED;
 		}
 	}
 }
 
-bool visibility_bounds_emitter_is_visible(const struct world *w, const enum visibility *shape, uint32_t emitter)
+bool visibility_bounds_see_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter)
 {
-	uint32_t surface = w->emitter_shape[emitter];
+	uint32_t surface = w->emitter_shapes[emitter];
 	return w->emitters[emitter].power > 0 && (surface == UINT32_MAX || shape[surface] != VISIBILITY_ENCLOSED);
 }
 
@@ -168,20 +168,20 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 			      enum visibility *shape)
 {
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		shape[i] = VISIBILITY_YES;
+		shape[i] = VISIBILITY_VISIBLE;
 	find_enclosed(w, src, shape);
 	bool dark = true;
 	bool media_scatter = false; /* then faces that are not vertices let light through, whatever the depth */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		dark &= !visibility_bounds_emitter_is_visible(w, shape, i);
+		dark &= !visibility_bounds_see_emitter(w, shape, i);
 	for (uint32_t i = 0; i < w->media_count; i++) {
 		if (w->media[i].is_emissive)
 			return;
-		media_scatter |= w->media[i].scatters;
+		media_scatter |= w->media[i].is_scattering;
 	}
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] == VISIBILITY_YES && (dark || (max_depth <= 1 && !media_scatter)))
-			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;
+		if (shape[i] == VISIBILITY_VISIBLE && (dark || (max_depth <= 1 && !media_scatter)))
+			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_TOO_SHORT;
 }
 
 static struct triangle triangle_at(const struct geom_shape *g, uint32_t i)
@@ -205,9 +205,9 @@ uint32_t visibility_bounds_depth(const struct world *w, const enum visibility *s
 	struct triangle plane;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
-		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
+		if (shape[i] != VISIBILITY_VISIBLE || w->bsdfs[w->shape_bindings[i].bsdf].is_black)
 			continue;
-		if (g->is_sphere || g->curves || surface_moves(g))
+		if (g->is_sphere || g->curves || surface_is_moving(g))
 			return UINT32_MAX;
 		if (!has_plane)
 			plane = triangle_at(g, 0);

@@ -31,7 +31,7 @@ struct effects_source {
 };
 
 /* Whether an emitter has power and is not enclosed. */
-bool visibility_bounds_emitter_is_visible(const struct world *w, const enum visibility *shape, uint32_t emitter);
+bool visibility_bounds_see_emitter(const struct world *w, const enum visibility *shape, uint32_t emitter);
 /* Fills in shape[], one entry per shape of w. max_depth: edges. */
 void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
 			      enum visibility *shape);

@@ -9,7 +9,7 @@ int32_t world_pick_emitter(const struct world *w, double u)
 	if (n == 0 || !(w->emitter_cdf[n] > 0))
 		return -1;
 	u *= w->emitter_cdf[n];
-	uint32_t i = search_cell(w->emitter_cdf, n, u);
+	uint32_t i = search_find_cell(w->emitter_cdf, n, u);
 	while (w->emitter_pdf[i] == 0 && i > 0)
 		i--;
 	return (int32_t)i;

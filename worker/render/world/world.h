@@ -2,7 +2,7 @@
 /*
  * The world that all threads share: built once from a description, then immutable. Lengths are rescaled in double by a
  * power of two so that the scene's radius is in (1/2, 1], and the origin is moved to the centre of the scene's box or,
- * in a scene of mixed scales, among the small things (origin.h). Only then are positions rounded to float.
+ * in a scene of mixed scales, among the small things (world_origin.h). Only then are positions rounded to float.
  */
 #ifndef WORKER_RENDER_WORLD_WORLD_H
 #define WORKER_RENDER_WORLD_WORLD_H
@@ -59,8 +59,8 @@ struct world {
 	struct refracting_point *refracting_points; /* points on these surfaces: refracting.h */
 	uint32_t refracting_point_count;
 	/* The medium around each emitter whose shape states none; only where media scatter. */
-	uint32_t *emitter_medium;
-	uint32_t *emitter_shape;	   /* the shape of each emitter; UINT32_MAX: none */
+	uint32_t *emitter_media;
+	uint32_t *emitter_shapes;	   /* the shape of each emitter; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf; /* density and distribution function of the choice by light sub-paths */
 	/* The choice for next event estimation; NULL: by emitter_pdf everywhere. */
 	struct emitter_choice *emitter_choice;
@@ -82,7 +82,7 @@ struct world {
 #endif
 
 /* Returns what a path carries, chosen by a number in [0,1): wavelengths; R, G and B; or nothing in a grey scene. */
-static inline struct wavelengths world_wavelengths(const struct world *w, double u)
+static inline struct wavelengths world_sample_wavelengths(const struct world *w, double u)
 {
 	if (!EFFECT_IS_ON(w, colour))
 		return (struct wavelengths){.is_grey = true};
@@ -98,15 +98,15 @@ static inline bool world_has_rolling_shutter(const struct world *w)
 }
 
 /* Returns the camera at the time of a path's vertex; `storage` is used if the camera moves. */
-static inline const struct camera *world_camera(const struct world *w, const struct surface_point *x,
-						struct camera *storage)
+static inline const struct camera *world_camera_at(const struct world *w, const struct surface_point *x,
+						   struct camera *storage)
 {
 	return camera_at(&w->camera, x->prim.time, storage);
 }
 
 /* Returns an emitter at the time of a path's vertex; `storage` is used if the emitter moves. */
-static inline const struct emitter *world_emitter(const struct world *w, int32_t emitter, double time,
-						  struct emitter_storage *storage)
+static inline const struct emitter *world_emitter_at(const struct world *w, int32_t emitter, double time,
+						     struct emitter_storage *storage)
 {
 	return emitter_at(&w->emitters[emitter], time, storage);
 }

@@ -107,7 +107,7 @@ static int report_undefined(struct define_table *t, const char *name, size_t len
 			e, ENOENT,
 			"in `$%s` no name follows the $: write $name to insert a parameter, \\$ for the character",
 			wanted);
-	struct spelling s = {.wanted = wanted};
+	struct spelling s = {.wanted_name = wanted};
 	for (size_t i = 0; i < t->count; i++)
 		spelling_offer(&s, t->entries[i].name);
 	return error_set(e, ENOENT,
@@ -170,12 +170,12 @@ int define_substitute(struct define_table *t, const char *text, bool keep_undefi
 int define_check_used(const struct define_table *t, struct error *e)
 {
 	for (size_t i = 0; i < t->count; i++) {
-		if (!t->entries[i].from_command_line || t->entries[i].is_used)
+		if (!t->entries[i].is_from_command_line || t->entries[i].is_used)
 			continue;
 		char hint[128];
-		struct spelling s = {.wanted = t->entries[i].name};
+		struct spelling s = {.wanted_name = t->entries[i].name};
 		for (size_t k = 0; k < t->count; k++)
-			if (!t->entries[k].from_command_line)
+			if (!t->entries[k].is_from_command_line)
 				spelling_offer(&s, t->entries[k].name);
 		return error_set(e, EINVAL, "-D %s: the scene has no such parameter%s", t->entries[i].name,
 				 spelling_hint(&s, hint, sizeof hint));

@@ -17,7 +17,7 @@ enum { DEFINE_MAX = 1024, DEFINE_MISSING_MAX = 64 };
 
 struct define_entry {
 	const char *name, *value;
-	bool from_command_line, is_used;
+	bool is_from_command_line, is_used;
 };
 
 struct define_table {

@@ -69,7 +69,7 @@ static int refuse_attribute(const struct xml_element *el, const char *allowed_at
 			    struct error *e)
 {
 	char hint[128];
-	struct spelling s = {.wanted = wanted};
+	struct spelling s = {.wanted_name = wanted};
 	is_listed(allowed_attributes, wanted, &s);
 	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
 			 spelling_hint(&s, hint, sizeof hint), allowed_attributes);
@@ -77,11 +77,11 @@ static int refuse_attribute(const struct xml_element *el, const char *allowed_at
 
 int element_refuse_missing_attribute(const struct xml_element *el, const char *attribute, struct error *e)
 {
-	struct spelling s = {.wanted = attribute};
+	struct spelling s = {.wanted_name = attribute};
 	for (uint32_t i = 0; i < el->attribute_count; i++)
 		spelling_offer(&s, el->attributes[i].name);
-	return xml_error(el, e, EINVAL, "needs an attribute `%s`%s%s%s", attribute, s.best ? ", but has `" : "",
-			 s.best ? s.best : "", s.best ? "`" : "");
+	return xml_error(el, e, EINVAL, "needs an attribute `%s`%s%s%s", attribute, s.best_match ? ", but has `" : "",
+			 s.best_match ? s.best_match : "", s.best_match ? "`" : "");
 }
 
 int element_check_contents(const struct xml_element *el, const char *allowed_attributes, bool allow_children,

@@ -33,7 +33,7 @@ struct xml_element {
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first_child, *last_child, *next_sibling;
 	const struct scene_node *node;	       /* for the interpreter: the node made from it */
-	const struct scene_node *limited_node; /* for the interpreter: with colours limited to 1 (over_one.h) */
+	const struct scene_node *limited_node; /* for the interpreter: with colours limited to 1 (limit_to_one.h) */
 	struct xml_nesting nesting;	       /* for the interpreter: what that node contains */
 	bool is_in_progress, is_rejected; /* for the interpreter: it is being made into a node; it cannot be made into
 					     one, which has been reported */

@@ -30,15 +30,15 @@ struct reader {
 	struct arena *arena;
 	struct define_table defines;
 	struct error *error;
-	int error_code;		     /* the first error's negative errno */
-	int include_depth;	     /* number of files that include the current one, one inside another */
-	size_t total_bytes;	     /* total size of the files read so far */
-	bool noted_mixed_dialects;   /* noted that the files are of both dialects */
-	bool noted_upgrade;	     /* noted that a file is from before 0.4 */
-	bool noted_text;	     /* noted that text is ignored */
-	bool noted_trailing_content; /* noted that what follows a file's first element is ignored */
-	bool noted_found_by_suffix;  /* noted that a file was found by the end of its path */
-	bool is_malformed;	     /* the last file read is not well formed */
+	int error_code;			 /* the first error's negative errno */
+	int include_depth;		 /* number of files that include the current one, one inside another */
+	size_t total_bytes;		 /* total size of the files read so far */
+	bool has_noted_mixed_dialects;	 /* noted that the files are of both dialects */
+	bool has_noted_upgrade;		 /* noted that a file is from before 0.4 */
+	bool has_noted_text;		 /* noted that text is ignored */
+	bool has_noted_trailing_content; /* noted that what follows a file's first element is ignored */
+	bool has_noted_found_by_suffix;	 /* noted that a file was found by the end of its path */
+	bool is_malformed;		 /* the last file read is not well formed */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
@@ -215,8 +215,9 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	if (!version || !version_parse(version, &major, &minor))
 		return refuse_without_version(r, el);
 	r->upgrade_minor = major == 0 && minor >= 0 && minor < 5 ? (int)minor : -1;
-	if (r->upgrade_minor >= 0 && r->upgrade_minor < 4 && !r->noted_upgrade && r->tree->note_count < XML_NOTES_MAX) {
-		r->noted_upgrade = true;
+	if (r->upgrade_minor >= 0 && r->upgrade_minor < 4 && !r->has_noted_upgrade &&
+	    r->tree->note_count < XML_NOTES_MAX) {
+		r->has_noted_upgrade = true;
 		r->tree->notes[r->tree->note_count++] =
 			"is of a version before 0.4: read as by Mitsuba 0.5, which mirrors the cameras of such files";
 	}
@@ -225,9 +226,9 @@ static int begin_file(struct reader *r, struct xml_element *el)
 		r->tree->notes[r->tree->note_count++] = r->newer_version_note;
 	r->is_camel_case = major < 2;
 	bool dialect_3 = major >= 2;
-	if (el->parent && !r->noted_mixed_dialects && r->tree->is_dialect_3 != dialect_3 &&
+	if (el->parent && !r->has_noted_mixed_dialects && r->tree->is_dialect_3 != dialect_3 &&
 	    r->tree->note_count < XML_NOTES_MAX) {
-		r->noted_mixed_dialects = true;
+		r->has_noted_mixed_dialects = true;
 		r->tree->notes[r->tree->note_count++] =
 			"includes a file of another dialect; everything is read as by Mitsuba 3, with the old names in "
 			"the old files";
@@ -281,7 +282,7 @@ static int read_path(struct reader *r, const struct xml_element *el)
 /* Notes that a file was found by the end of its path, once per scene: there are often hundreds of such paths. */
 static int note_found_by_suffix(struct reader *r, const char *written, const char *name)
 {
-	if (!name || r->noted_found_by_suffix || r->tree->note_count == XML_NOTES_MAX)
+	if (!name || r->has_noted_found_by_suffix || r->tree->note_count == XML_NOTES_MAX)
 		return 0;
 	enum { TEXT = 512 };
 	char *text = arena_alloc(r->arena, TEXT, 1), display_name[160];
@@ -293,7 +294,7 @@ static int note_found_by_suffix(struct reader *r, const char *written, const cha
 		"--path: for example, %.160s is used for %.160s",
 		asset_name_display(name, display_name, sizeof display_name), written);
 	r->tree->notes[r->tree->note_count++] = text;
-	r->noted_found_by_suffix = true;
+	r->has_noted_found_by_suffix = true;
 	return 0;
 }
 
@@ -444,11 +445,11 @@ static int read_include(struct reader *r, struct xml_element *el)
 	if (!c && !in_scene && !is_missing)
 		c = replace_by_included(el, r->error);
 	outer.error_code = r->error_code;
-	outer.noted_mixed_dialects = r->noted_mixed_dialects;
-	outer.noted_upgrade = r->noted_upgrade;
-	outer.noted_found_by_suffix = r->noted_found_by_suffix;
-	outer.noted_text = r->noted_text;
-	outer.noted_trailing_content = r->noted_trailing_content;
+	outer.has_noted_mixed_dialects = r->has_noted_mixed_dialects;
+	outer.has_noted_upgrade = r->has_noted_upgrade;
+	outer.has_noted_found_by_suffix = r->has_noted_found_by_suffix;
+	outer.has_noted_text = r->has_noted_text;
+	outer.has_noted_trailing_content = r->has_noted_trailing_content;
 	outer.total_bytes = r->total_bytes;
 	outer.defines = r->defines;
 	outer.defines.is_incomplete |= is_missing;
@@ -471,7 +472,7 @@ static void on_start(void *user, const char *name, const char **attributes)
 /* Notes text between elements, most often a stray character: once per scene, since Mitsuba ignores it silently. */
 static int note_text(struct reader *r, const struct xml_element *el)
 {
-	if (!el->has_text || el->is_ignored || r->noted_text || r->tree->note_count == XML_NOTES_MAX)
+	if (!el->has_text || el->is_ignored || r->has_noted_text || r->tree->note_count == XML_NOTES_MAX)
 		return 0;
 	enum { TEXT = 160 };
 	char *text = arena_alloc(r->arena, TEXT, 1);
@@ -479,7 +480,7 @@ static int note_text(struct reader *r, const struct xml_element *el)
 		return out_of_memory(r);
 	snprintf(text, TEXT, "text in <%.64s> of line %d is ignored, as by Mitsuba", el->name, el->line);
 	r->tree->notes[r->tree->note_count++] = text;
-	r->noted_text = true;
+	r->has_noted_text = true;
 	return 0;
 }
 
@@ -528,12 +529,13 @@ static bool accept_trailing_content(struct reader *r, enum XML_Error code)
 	if (code != XML_ERROR_JUNK_AFTER_DOC_ELEMENT || r->is_camel_case)
 		return false;
 	enum { TEXT = 256 };
-	char *text = r->noted_trailing_content || r->tree->note_count == XML_NOTES_MAX ? NULL
-										       : arena_alloc(r->arena, TEXT, 1);
+	char *text = r->has_noted_trailing_content || r->tree->note_count == XML_NOTES_MAX
+			     ? NULL
+			     : arena_alloc(r->arena, TEXT, 1);
 	if (text) {
 		snprintf(text, TEXT, "what follows the first element of %.160s is ignored, as by Mitsuba 3", r->file);
 		r->tree->notes[r->tree->note_count++] = text;
-		r->noted_trailing_content = true;
+		r->has_noted_trailing_content = true;
 	}
 	return true;
 }

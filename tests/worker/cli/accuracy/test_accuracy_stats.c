@@ -77,7 +77,7 @@ static void median_and_its_interval_are_order_statistics(void **unused)
 static void front_has_the_settings_that_none_dominates(void **unused)
 {
 	(void)unused;
-	const struct stats_point p[] = {
+	const struct front_point p[] = {
 		{log(10.0), 0.02, 0, 0, 0.01, false},	   /* the default */
 		{log(10.2), 0.02, 0, 0, 0.01, false},	   /* not significantly slower */
 		{log(14.0), 0.02, 0, 0, 0.01, false},	   /* significantly slower, no better */
@@ -93,24 +93,24 @@ static void front_has_the_settings_that_none_dominates(void **unused)
 	assert_int_equal(dominators[4], 3);
 	assert_int_equal(dominators[5], 0);
 	assert_int_equal(dominators[6], 3);
-	const struct stats_point wide[] = {{log(10.0), 0.3, 0, 0, 0.01, false},
+	const struct front_point wide[] = {{log(10.0), 0.3, 0, 0, 0.01, false},
 					   {log(12.0), 0.3, 0, 0, 0.01, false},
 					   {log(5.0), 0.3, 0, 0, 0.5, false}};
 	stats_front(wide, 3, 0.05, dominators);
 	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
 	/* Faster, but suspected of bias, or with too large an uncertainty: neither dominates. */
-	const struct stats_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5, false},
+	const struct front_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5, false},
 					   {log(5.0), 0.02, 0.03, 0, 0.5, false},
 					   {log(5.0), 0.02, 0, 0, 0.9, false}};
 	stats_front(weak, 3, 0.05, dominators);
 	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
 	/* Points known to make another image: they may be dominated, but dominate no other point. */
-	const struct stats_point other[] = {{log(10.0), 0.02, 0.01, 0, 0.05, false},
+	const struct front_point other[] = {{log(10.0), 0.02, 0.01, 0, 0.05, false},
 					    {log(5.0), 0.02, 0, 0, 0.05, true},
 					    {log(20.0), 0.02, 0, 0, 0.05, true}};
 	stats_front(other, 3, 0.05, dominators);
 	assert_true(dominators[0] == 0 && dominators[1] == 1 && dominators[2] == 2);
-	const struct stats_point same[] = {{log(10.0), 0.02, 0, 0, 0.05, false}, {log(20.0), 0.02, 0, 0, 0.05, true}};
+	const struct front_point same[] = {{log(10.0), 0.02, 0, 0, 0.05, false}, {log(20.0), 0.02, 0, 0, 0.05, true}};
 	stats_front(same, 2, 0.05, dominators);
 	assert_true(dominators[0] == 0 && dominators[1] == 0);
 	stats_front(p, 1, 0.05, dominators);

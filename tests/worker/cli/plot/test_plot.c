@@ -139,7 +139,7 @@ static void bars_and_bands_are_drawn(void **unused)
 	struct content c;
 	read_svg(&p, &c);
 	assert_true(plot_axes(&p, &ax, &ay));
-	assert_true(ay.log && !ax.log && ay.low > 0 && ay.low < 2.5 && ay.high > 6 && ay.tic_count >= 3);
+	assert_true(ay.is_log && !ax.is_log && ay.min > 0 && ay.min < 2.5 && ay.max > 6 && ay.tic_count >= 3);
 }
 
 static void empty_plot_is_an_error(void **unused)
@@ -153,7 +153,7 @@ static void empty_plot_is_an_error(void **unused)
 	size_t size;
 	assert_int_equal(plot_svg(&p, &svg, &size, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "None"));
-	p.log_x = false;
+	p.is_log_x = false;
 	assert_int_equal(plot_write(&p, "/nowhere/plot.txt", &e), -EINVAL);
 	assert_non_null(strstr(e.text, "plot.txt"));
 }
@@ -168,9 +168,9 @@ static void axes_have_tick_marks(void **unused)
 			struct plot p = {"", "", "", true, false, 1, &s, NULL, 0};
 			struct plot_axis ax, ay;
 			assert_true(plot_axes(&p, &ax, &ay));
-			assert_true(ax.low < from && ax.high > from * ratio && ay.low < ay.high);
+			assert_true(ax.min < from && ax.max > from * ratio && ay.min < ay.max);
 			if (ax.tic_count < 2 || ax.tic_count > 24)
-				fail_msg("%g to %g: %zu marks", ax.low, ax.high, ax.tic_count);
+				fail_msg("%g to %g: %zu marks", ax.min, ax.max, ax.tic_count);
 		}
 }
 

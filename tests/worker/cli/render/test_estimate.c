@@ -4,7 +4,7 @@
 #include "worker/cli/render/estimate.h"
 
 #include "common/plan/plan.h"
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -81,7 +81,7 @@ static void check_rows(const struct plan_request *request, double speed)
 		struct plan p;
 		one.target_error = json_number_value(json_object_get(row, "error"));
 		assert_int_equal(plan_make(&one, &p, &e), 0);
-		if (plan_wants_speed(&one, &p)) { /* as hslt-submit does */
+		if (plan_needs_speed(&one, &p)) { /* as hslt-submit does */
 			one.speed = speed;
 			assert_int_equal(plan_make(&one, &p, &e), 0);
 		}

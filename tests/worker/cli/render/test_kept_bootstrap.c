@@ -10,7 +10,7 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/render/kept_bootstrap.h"
-#include "worker/cli/render/local.h"
+#include "worker/cli/render/local_run.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -274,7 +274,7 @@ static struct bootstrap *old_bootstrap(bool filled)
 	struct batch b = {.key = {.kind = LEASE_BOOTSTRAP, .part = 1},
 			  .independent_sum = 2,
 			  .independent_square = 2.5,
-			  .beyond_sum = 0.25,
+			  .overlong_sum = 0.25,
 			  .weight_count = 2,
 			  .weights = weights};
 	struct bootstrap *s;

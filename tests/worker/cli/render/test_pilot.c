@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The plan of a pilot: equal to the render's except for its epoch, with enough rounds in its time and a bounded
  * bootstrap. Checked for a range of costs per sample. */
-#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/pilot_request.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -18,23 +18,23 @@
 
 #include <cmocka.h>
 
-static char root[] = "/tmp/hslt-asset-XXXXXX";
-static char folder[128];
+static char root_folder[] = "/tmp/hslt-asset-XXXXXX";
+static char scene_folder[128];
 
 static void write_file(const char *name, const char *text)
 {
 	char path[256];
-	snprintf(path, sizeof path, "%s/%s", root, name);
+	snprintf(path, sizeof path, "%s/%s", root_folder, name);
 	FILE *f = fopen(path, "w");
 	assert_non_null(f);
 	fputs(text, f);
 	fclose(f);
 }
 
-static void link_to(const char *target, const char *name)
+static void make_link(const char *target, const char *name)
 {
 	char path[256];
-	snprintf(path, sizeof path, "%s/%s", folder, name);
+	snprintf(path, sizeof path, "%s/%s", scene_folder, name);
 	assert_int_equal(symlink(target, path), 0);
 }
 
@@ -42,24 +42,24 @@ static int set_up(void **state)
 {
 	(void)state;
 	char path[256];
-	if (!mkdtemp(root))
+	if (!mkdtemp(root_folder))
 		return -1;
-	snprintf(folder, sizeof folder, "%s/scene", root);
-	mkdir(folder, 0755);
-	snprintf(path, sizeof path, "%s/sub", folder);
+	snprintf(scene_folder, sizeof scene_folder, "%s/scene", root_folder);
+	mkdir(scene_folder, 0755);
+	snprintf(path, sizeof path, "%s/sub", scene_folder);
 	mkdir(path, 0755);
-	snprintf(path, sizeof path, "%s/fifo", folder);
+	snprintf(path, sizeof path, "%s/fifo", scene_folder);
 	mkfifo(path, 0600);
 	write_file("secret", "secret");
 	write_file("scene/a.obj", "inside");
 	write_file("scene/sub/b.png", "deeper");
 	write_file("scene/empty", "");
 	write_file("scene/..dots", "dots");
-	link_to("../secret", "out");
-	link_to("..", "up");
-	snprintf(path, sizeof path, "%s/secret", root);
-	link_to(path, "absolute");
-	link_to("circle", "circle");
+	make_link("../secret", "out");
+	make_link("..", "up");
+	snprintf(path, sizeof path, "%s/secret", root_folder);
+	make_link(path, "absolute");
+	make_link("circle", "circle");
 	return 0;
 }
 
@@ -67,13 +67,13 @@ static int tear_down(void **state)
 {
 	(void)state;
 	char command[256];
-	snprintf(command, sizeof command, "rm -rf '%s'", root);
+	snprintf(command, sizeof command, "rm -rf '%s'", root_folder);
 	return system(command);
 }
 
 static void expect_content(const char *name, const char *text)
 {
-	struct asset_source s = asset_source_for_folder(folder);
+	struct asset_source s = asset_source_for_folder(scene_folder);
 	struct asset a;
 	struct error e;
 	if (s.open(s.user, name, &a, &e))
@@ -84,9 +84,9 @@ static void expect_content(const char *name, const char *text)
 	assert_null(a.bytes);
 }
 
-static void refuses(const char *name, const char *text)
+static void expect_refused(const char *name, const char *text)
 {
-	struct asset_source s = asset_source_for_folder(folder);
+	struct asset_source s = asset_source_for_folder(scene_folder);
 	struct asset a;
 	struct error e = {""};
 	int r = s.open(s.user, name, &a, &e);
@@ -95,7 +95,7 @@ static void refuses(const char *name, const char *text)
 	assert_null(a.bytes);
 }
 
-static void test_files_below(void **state)
+static void test_files_below_the_folder_are_opened(void **state)
 {
 	(void)state;
 	expect_content("a.obj", "inside");
@@ -106,27 +106,28 @@ static void test_files_below(void **state)
 	expect_content("..dots", "dots");
 }
 
-static void test_files_elsewhere(void **state)
+static void test_files_outside_the_folder_are_refused(void **state)
 {
 	(void)state;
-	refuses("none", "No such file");
-	refuses("", "must lie below");
-	refuses("../secret", "must lie below");
-	refuses("sub/../../secret", "must lie below");
-	refuses("sub/..", "must lie below");
-	refuses("..", "must lie below");
-	refuses("/etc/passwd", "must lie below"); /* not a canonical name */
-	refuses("%2f/etc/passwd", "/etc/passwd: leads out of the scene's folder; to allow that, give --path /etc");
-	refuses("%2f/etc/../passwd", "%2f/etc/../passwd: files must lie below");
-	refuses("out", "out: ");
-	refuses("up/secret", "up/secret: ");
-	refuses("absolute", "absolute: ");
-	refuses("circle", "circle: ");
-	refuses("sub", "not a regular file");
-	refuses("fifo", "not a regular file");
+	expect_refused("none", "No such file");
+	expect_refused("", "must lie below");
+	expect_refused("../secret", "must lie below");
+	expect_refused("sub/../../secret", "must lie below");
+	expect_refused("sub/..", "must lie below");
+	expect_refused("..", "must lie below");
+	expect_refused("/etc/passwd", "must lie below"); /* not a canonical name */
+	expect_refused("%2f/etc/passwd",
+		       "/etc/passwd: leads out of the scene's folder; to allow that, give --path /etc");
+	expect_refused("%2f/etc/../passwd", "%2f/etc/../passwd: files must lie below");
+	expect_refused("out", "out: ");
+	expect_refused("up/secret", "up/secret: ");
+	expect_refused("absolute", "absolute: ");
+	expect_refused("circle", "circle: ");
+	expect_refused("sub", "not a regular file");
+	expect_refused("fifo", "not a regular file");
 }
 
-static void test_canonical_names(void **state)
+static void test_names_become_canonical(void **state)
 {
 	(void)state;
 	static const struct {
@@ -176,8 +177,8 @@ static void test_canonical_names(void **state)
 }
 
 /* A source that counts calls; its two files have handles that distinguish them. */
-struct counts {
-	int opened, closed;
+struct call_counts {
+	int open_count, close_count;
 };
 
 static int count_open(void *user, const char *name, struct asset *out, struct error *e)
@@ -185,7 +186,7 @@ static int count_open(void *user, const char *name, struct asset *out, struct er
 	static unsigned char bytes[2] = {'a', 'b'};
 	if (strcmp(name, "a") != 0 && strcmp(name, "b") != 0)
 		return error_set(e, ENOENT, "%s: no such file", name);
-	((struct counts *)user)->opened++;
+	((struct call_counts *)user)->open_count++;
 	unsigned char *at = &bytes[*name - 'a'];
 	*out = (struct asset){.bytes = at, .size = 1, .handle = at};
 	return 0;
@@ -194,7 +195,7 @@ static int count_open(void *user, const char *name, struct asset *out, struct er
 static void count_close(void *user, struct asset *a)
 {
 	assert_non_null(a->bytes);
-	((struct counts *)user)->closed++;
+	((struct call_counts *)user)->close_count++;
 	*a = (struct asset){0};
 }
 
@@ -208,13 +209,13 @@ static void open_and_close(const struct asset_source *s, const char *name)
 }
 
 /* The scene's own folder is searched first, then the others in turn; each is as restricted as the first. */
-static void test_search(void **state)
+static void test_folders_are_searched_in_order(void **state)
 {
 	(void)state;
 	char others[2][256];
 	const char *const list[] = {others[0], others[1]};
-	snprintf(others[0], sizeof others[0], "%s/none", root);
-	snprintf(others[1], sizeof others[1], "%s/more", root);
+	snprintf(others[0], sizeof others[0], "%s/none", root_folder);
+	snprintf(others[1], sizeof others[1], "%s/more", root_folder);
 	assert_int_equal(mkdir(others[1], 0700), 0);
 	write_file("scene/both", "own");
 	write_file("more/both", "other");
@@ -223,7 +224,7 @@ static void test_search(void **state)
 	char path[300];
 	snprintf(path, sizeof path, "%s/out", others[1]);
 	assert_int_equal(symlink("../outside", path), 0);
-	struct asset_folders folders = asset_folders_make(folder, list, 2);
+	struct asset_folders folders = asset_folders_make(scene_folder, list, 2);
 	struct asset_source s = asset_source_for_folders(&folders);
 	static const struct {
 		const char *name, *bytes;
@@ -260,42 +261,42 @@ static void test_search(void **state)
 			s.close(s.user, &a);
 		}
 	}
-	assert_int_equal(asset_folders_make(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
+	assert_int_equal(asset_folders_make(scene_folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
 }
 
 /* For a file outside the folder, the error names the folder to pass, and the file as the user wrote it. */
-static void test_outside_is_said(void **state)
+static void test_refusal_names_the_outside_folder(void **state)
 {
 	(void)state;
 	char real[300], wanted[400], deep[64 * 7 + 8] = "";
-	char *base = realpath(root, NULL);
+	char *base = realpath(root_folder, NULL);
 	assert_non_null(base);
 	snprintf(real, sizeof real, "%s", base);
 	free(base);
 	snprintf(wanted, sizeof wanted,
 		 "../common/a.png: leads out of the scene's folder; to allow that, give --path %s", real);
-	refuses("%2e%2e/common/a.png", wanted);
+	expect_refused("%2e%2e/common/a.png", wanted);
 	expect_content("%2e%2e/scene/a.obj", "inside");
-	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
+	expect_refused("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
 	/* a file that is nowhere, for a caller that can add search folders */
-	struct asset_folders f = asset_folders_make(folder, NULL, 0);
+	struct asset_folders f = asset_folders_make(scene_folder, NULL, 0);
 	struct asset_source own = asset_source_for_folders(&f), more;
 	struct asset a;
 	struct error e;
 	assert_int_equal(own.open(own.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder; --path FOLDER searches there, too");
-	const char *const others[] = {root};
-	f = asset_folders_make(folder, others, 1);
+	const char *const others[] = {root_folder};
+	f = asset_folders_make(scene_folder, others, 1);
 	more = asset_source_for_folders(&f);
 	assert_int_equal(more.open(more.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder or those of --path");
 	/* a file in a folder around the scene's, or below the current one */
-	f = asset_folders_make(folder, NULL, 0);
+	f = asset_folders_make(scene_folder, NULL, 0);
 	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
 	snprintf(wanted, sizeof wanted, "more/theirs: no such file in the scene's folder; --path %s finds it", real);
 	assert_string_equal(e.text, wanted);
 	char *before = getcwd(NULL, 0);
-	assert_true(before && chdir(root) == 0);
+	assert_true(before && chdir(root_folder) == 0);
 	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
 	assert_int_equal(chdir(before), 0);
 	free(before);
@@ -303,13 +304,13 @@ static void test_outside_is_said(void **state)
 	for (int i = 0; i < 64; i++)
 		strcat(deep, "%2e%2e/");
 	strcat(deep, "a");
-	refuses(deep, "give --path /");
+	expect_refused(deep, "give --path /");
 }
 
 static void expect_not_found(const char *name, const char *text)
 {
-	const char *const others[] = {root};
-	struct asset_folders f = asset_folders_make(folder, others, 1);
+	const char *const others[] = {root_folder};
+	struct asset_folders f = asset_folders_make(scene_folder, others, 1);
 	struct asset_source own = asset_source_for_folders(&f);
 	struct asset a;
 	struct error e;
@@ -320,7 +321,7 @@ static void expect_not_found(const char *name, const char *text)
 }
 
 /* A file of a similar name, in folders of a similar name. */
-static void test_names_that_are_near(void **state)
+static void test_similar_names_are_suggested(void **state)
 {
 	(void)state;
 	write_file("scene/mesh_1.obj", "");
@@ -342,40 +343,40 @@ static void test_names_that_are_near(void **state)
 
 /* By its absolute name, a file is found below the scene's folder and the search folders, whether these are named
  * directly or by a link, and nowhere else. */
-static void test_absolute_names(void **state)
+static void test_absolute_names_are_found_in_allowed_folders(void **state)
 {
 	(void)state;
 	char link[64], name[400];
-	snprintf(link, sizeof link, "%s-link", root);
-	assert_int_equal(symlink(root, link), 0);
-	snprintf(name, sizeof name, "%%2f%s/scene/sub/b.png", root);
+	snprintf(link, sizeof link, "%s-link", root_folder);
+	assert_int_equal(symlink(root_folder, link), 0);
+	snprintf(name, sizeof name, "%%2f%s/scene/sub/b.png", root_folder);
 	expect_content(name, "deeper");
-	snprintf(name, sizeof name, "%%2f%s/scene/up/secret", root);
-	refuses(name, "up/secret: ");
-	snprintf(name, sizeof name, "%%2f%s/scene/none", root);
-	refuses(name, "/scene/none: No such file");
-	snprintf(name, sizeof name, "%%2f%s/scene2/none", root);
-	refuses(name, "/scene2/none: no such file on this machine");
-	snprintf(name, sizeof name, "%%2f%s/secret", root);
-	refuses(name, "/secret: leads out of the scene's folder; to allow that, give --path /");
-	const struct asset_folders linked = asset_folders_make(folder, (const char *const[]){link}, 1);
+	snprintf(name, sizeof name, "%%2f%s/scene/up/secret", root_folder);
+	expect_refused(name, "up/secret: ");
+	snprintf(name, sizeof name, "%%2f%s/scene/none", root_folder);
+	expect_refused(name, "/scene/none: No such file");
+	snprintf(name, sizeof name, "%%2f%s/scene2/none", root_folder);
+	expect_refused(name, "/scene2/none: no such file on this machine");
+	snprintf(name, sizeof name, "%%2f%s/secret", root_folder);
+	expect_refused(name, "/secret: leads out of the scene's folder; to allow that, give --path /");
+	const struct asset_folders linked = asset_folders_make(scene_folder, (const char *const[]){link}, 1);
 	struct asset_source s = asset_source_for_folders(&linked);
 	struct asset a;
 	struct error e;
 	snprintf(name, sizeof name, "%%2f%s/secret", link);
 	assert_int_equal(s.open(s.user, name, &a, &e), 0);
 	s.close(s.user, &a);
-	snprintf(name, sizeof name, "%%2f%s/secret", root);
+	snprintf(name, sizeof name, "%%2f%s/secret", root_folder);
 	assert_int_equal(s.open(s.user, name, &a, &e), 0);
 	s.close(s.user, &a);
 	assert_int_equal(unlink(link), 0);
 }
 
 /* A file that is opened repeatedly is opened once underneath, and in the end every opened file is closed. */
-static void test_keeper(void **state)
+static void test_keeper_opens_each_file_once(void **state)
 {
 	(void)state;
-	struct counts c = {0, 0};
+	struct call_counts c = {0, 0};
 	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
 	struct asset_keeper keeper = {.inner_source = &inner};
 	struct asset_source s = asset_keeper_source(&keeper);
@@ -383,30 +384,30 @@ static void test_keeper(void **state)
 	struct error e;
 	for (int i = 0; i < 5; i++)
 		open_and_close(&s, "a");
-	assert_true(c.opened == 1 && c.closed == 0);
+	assert_true(c.open_count == 1 && c.close_count == 0);
 	open_and_close(&s, "b");
-	assert_true(c.opened == 2 && c.closed == 1);
+	assert_true(c.open_count == 2 && c.close_count == 1);
 	assert_int_equal(s.open(s.user, "c", &first, &e), -ENOENT);
 	open_and_close(&s, "a");
-	assert_true(c.opened == 3 && c.closed == 2);
+	assert_true(c.open_count == 3 && c.close_count == 2);
 	/* used twice at once, with another file beside it */
 	assert_int_equal(s.open(s.user, "a", &first, &e), 0);
 	assert_int_equal(s.open(s.user, "b", &other, &e), 0);
 	assert_int_equal(s.open(s.user, "a", &second, &e), 0);
-	assert_true(first.bytes == second.bytes && c.opened == 4);
+	assert_true(first.bytes == second.bytes && c.open_count == 4);
 	s.close(s.user, &other);
 	s.close(s.user, &first);
-	assert_true(c.closed == 3 && *second.bytes == 'a');
+	assert_true(c.close_count == 3 && *second.bytes == 'a');
 	s.close(s.user, &second);
 	asset_keeper_fini(&keeper);
-	assert_true(c.opened == 4 && c.closed == 4);
+	assert_true(c.open_count == 4 && c.close_count == 4);
 }
 
 /* The keeper reads a file again only a limited number of times. */
-static void test_keeper_ends(void **state)
+static void test_keeper_rereads_a_limited_number_of_times(void **state)
 {
 	(void)state;
-	struct counts c = {0, 0};
+	struct call_counts c = {0, 0};
 	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
 	struct asset_keeper keeper = {.inner_source = &inner, .bytes_read = ASSET_KEEPER_BYTES_MAX};
 	struct asset_source s = asset_keeper_source(&keeper);
@@ -417,16 +418,19 @@ static void test_keeper_ends(void **state)
 	assert_int_equal(s.open(s.user, "b", &other, &e), -E2BIG);
 	assert_non_null(strstr(e.text, "b: the scene asks for its files again and again; 256 GB"));
 	asset_keeper_fini(&keeper);
-	assert_true(c.opened == 1 && c.closed == 1);
+	assert_true(c.open_count == 1 && c.close_count == 1);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_files_below),	cmocka_unit_test(test_files_elsewhere),
-		cmocka_unit_test(test_canonical_names), cmocka_unit_test(test_search),
-		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_names_that_are_near),
-		cmocka_unit_test(test_absolute_names),	cmocka_unit_test(test_keeper),
-		cmocka_unit_test(test_keeper_ends)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_files_below_the_folder_are_opened),
+					   cmocka_unit_test(test_files_outside_the_folder_are_refused),
+					   cmocka_unit_test(test_names_become_canonical),
+					   cmocka_unit_test(test_folders_are_searched_in_order),
+					   cmocka_unit_test(test_refusal_names_the_outside_folder),
+					   cmocka_unit_test(test_similar_names_are_suggested),
+					   cmocka_unit_test(test_absolute_names_are_found_in_allowed_folders),
+					   cmocka_unit_test(test_keeper_opens_each_file_once),
+					   cmocka_unit_test(test_keeper_rereads_a_limited_number_of_times)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -188,11 +188,11 @@ enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
 {
 	const struct asset_source assets = memory_assets(measured_file_all());
-	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3, .assets = &assets};
+	const struct bsdf_build build = {.arena = a, .is_dialect_3 = dialect_3, .assets = &assets};
 	return bsdf_create(b, node_make_bsdf(a, text), &build, e);
 }
 
-static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)
+static inline void bsdf_make_or_fail(struct arena *a, const char *text, struct bsdf *b)
 {
 	struct error e;
 	if (bsdf_try(a, text, true, b, &e))

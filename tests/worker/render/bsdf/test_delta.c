@@ -26,7 +26,7 @@ static const char *case_text(int k)
 	return k < BSDF_CASES ? bsdf_cases[k] : mirrors[k - BSDF_CASES];
 }
 
-static bool near(double a, double b)
+static bool is_near(double a, double b)
 {
 	return fabs(a - b) <= 8 * DBL_EPSILON * fabs(b);
 }
@@ -39,11 +39,12 @@ static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf
 		double chance = NAN;
 		unsigned mode = with_bit ? s->mode : s->mode & ~(unsigned)BSDF_DELTA;
 		spectrum weight = bsdf_eval_delta(b, p, wo, mode, &wi, &chance);
-		if (!near(wi.x, s->wi.x) || !near(wi.y, s->wi.y) || !near(wi.z, s->wi.z) || !near(chance, s->pdf))
+		if (!is_near(wi.x, s->wi.x) || !is_near(wi.y, s->wi.y) || !is_near(wi.z, s->wi.z) ||
+		    !is_near(chance, s->pdf))
 			fail_msg("%s: from z = %g lobe %x goes to z = %g with chance %g, sample to %g with %g", text,
 				 wo.z, mode, wi.z, chance, s->wi.z, s->pdf);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
-			if (!near(weight.v[l], s->f.v[l] * fabs(s->wi.z)))
+			if (!is_near(weight.v[l], s->f.v[l] * fabs(s->wi.z)))
 				fail_msg("%s: from z = %g lobe %x weighs %.17g, sample %.17g", text, wo.z, mode,
 					 weight.v[l], s->f.v[l] * fabs(s->wi.z));
 	}
@@ -63,7 +64,7 @@ static double sum_of_probabilities(const struct bsdf *b, const struct bsdf_point
 	return sum;
 }
 
-static vec3 any_direction(struct dice *d, int i)
+static vec3 random_direction(struct dice *d, int i)
 {
 	vec3 w = dice_direction(d);
 	if (i % 4)
@@ -81,16 +82,16 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		double excess = 0, variance = 0;
-		bsdf_make(&a, case_text(k), &b);
+		bsdf_make_or_fail(&a, case_text(k), &b);
 		for (int i = 0; i < 2000; i++) {
-			vec3 wo = any_direction(&d, i);
+			vec3 wo = random_direction(&d, i);
 			struct bsdf_point p = {.texture_point = {.u = 0.3, .v = 0.7},
 					       .wavelengths = &wavelengths,
 					       .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
 			double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 			struct bsdf_sample s;
-			bool there = b.ops->sample(&b, &p, wo, u, &s);
-			bool specular = there && (s.mode & BSDF_DELTA);
+			bool is_sampled = b.ops->sample(&b, &p, wo, u, &s);
+			bool specular = is_sampled && (s.mode & BSDF_DELTA);
 			if (specular) {
 				check_lobe(case_text(k), &b, &p, wo, &s);
 				lobes[(s.mode & BSDF_TRANSMIT) != 0]++;
@@ -122,7 +123,7 @@ static void test_a_mirrored_back_is_a_mirror(void **state)
 	vec3 wi, wo = {0.6, 0, -0.8};
 	double chance;
 	const struct bsdf_point p = {.wavelengths = &wavelengths};
-	bsdf_make(&a, "conductor material=none specular_reflectance=0.5", &b);
+	bsdf_make_or_fail(&a, "conductor material=none specular_reflectance=0.5", &b);
 	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance)));
 	assert_int_equal(bsdf_mirror_back(&b, &(struct bsdf_build){.arena = &a}, &e), 0);
 	assert_true(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT | BSDF_DELTA, &wi, &chance).v[2] == 0.5);
@@ -139,12 +140,12 @@ static void test_nothing_passes_beyond_the_critical_angle(void **state)
 	vec3 wi;
 	double chance, critical = sqrt(1 - 1 / 2.25);
 	const struct bsdf_point p = {.wavelengths = &wavelengths};
-	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &b);
+	bsdf_make_or_fail(&a, "dielectric int_ior=1.5 ext_ior=1", &b);
 	for (int i = -100; i <= 100; i++) {
 		double z = critical + 1e-4 * i + 1e-9;
 		vec3 wo = {sqrt(1 - z * z), 0, -z};
-		bool passes = !spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance));
-		assert_int_equal(passes, i >= 0);
+		bool is_transmitted = !spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance));
+		assert_int_equal(is_transmitted, i >= 0);
 		double reflected = bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance).v[0];
 		assert_true(i >= 0 ? reflected < 1 : reflected == 1 && chance == 1);
 	}
@@ -152,7 +153,7 @@ static void test_nothing_passes_beyond_the_critical_angle(void **state)
 }
 
 /* For unpolarised light, polarization filters are like a black sheet with holes. */
-static void test_filters_are_holes(void **state)
+static void polarization_filters_are_black_sheets_with_holes(void **state)
 {
 	(void)state;
 	static const char *const pairs[][2] = {
@@ -168,11 +169,11 @@ static void test_filters_are_holes(void **state)
 	for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
 		struct arena a = {0};
 		struct bsdf filter, sheet;
-		bsdf_make(&a, pairs[i][0], &filter);
-		bsdf_make(&a, pairs[i][1], &sheet);
+		bsdf_make_or_fail(&a, pairs[i][0], &filter);
+		bsdf_make_or_fail(&a, pairs[i][1], &sheet);
 		for (int k = 0; k < 20; k++) {
 			struct bsdf_point p = {.wavelengths = &wavelengths};
-			vec3 wo = any_direction(&d, k), through, also;
+			vec3 wo = random_direction(&d, k), through, also;
 			double chance;
 			spectrum weight = bsdf_eval_delta(&filter, &p, wo, straight, &through, &chance),
 				 expected = bsdf_eval_delta(&sheet, &p, wo, straight, &also, &chance);
@@ -196,10 +197,10 @@ static void test_masked_glass_has_three_lobes(void **state)
 	struct bsdf glass, masked;
 	const struct bsdf_point p = {.wavelengths = &wavelengths};
 	struct dice d = dice_for_test("masked glass");
-	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &glass);
-	bsdf_make(&a, "mask opacity=0.25 | dielectric int_ior=1.5 ext_ior=1", &masked);
+	bsdf_make_or_fail(&a, "dielectric int_ior=1.5 ext_ior=1", &glass);
+	bsdf_make_or_fail(&a, "mask opacity=0.25 | dielectric int_ior=1.5 ext_ior=1", &masked);
 	for (int k = 0; k < 100; k++) {
-		vec3 wo = any_direction(&d, k), wi[2] = {{0, 0, 0}, {0, 0, 0}};
+		vec3 wo = random_direction(&d, k), wi[2] = {{0, 0, 0}, {0, 0, 0}};
 		double chance[2];
 		for (unsigned mode = BSDF_REFLECT; mode <= BSDF_TRANSMIT; mode++) {
 			spectrum whole = bsdf_eval_delta(&glass, &p, wo, mode, &wi[0], &chance[0]),
@@ -216,7 +217,7 @@ static void test_masked_glass_has_three_lobes(void **state)
 	arena_fini(&a);
 }
 
-static void test_mean_roughness(void **state)
+static void mean_roughness_weights_all_lobes(void **state)
 {
 	(void)state;
 	static const struct {
@@ -239,7 +240,7 @@ static void test_mean_roughness(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
-		bsdf_make(&a, expected[k].text, &b);
+		bsdf_make_or_fail(&a, expected[k].text, &b);
 		if (!(fabs(b.mean_alpha - expected[k].mean) < 1e-15))
 			fail_msg("%s: %.17g", expected[k].text, b.mean_alpha);
 	}
@@ -256,9 +257,9 @@ int main(void)
 		cmocka_unit_test(test_specular_lobes_are_those_of_sample),
 		cmocka_unit_test(test_a_mirrored_back_is_a_mirror),
 		cmocka_unit_test(test_nothing_passes_beyond_the_critical_angle),
-		cmocka_unit_test(test_filters_are_holes),
+		cmocka_unit_test(polarization_filters_are_black_sheets_with_holes),
 		cmocka_unit_test(test_masked_glass_has_three_lobes),
-		cmocka_unit_test(test_mean_roughness),
+		cmocka_unit_test(mean_roughness_weights_all_lobes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,7 +9,7 @@
 
 #define PI 3.14159265358979323846
 
-static const double line_f = 486.1327, line_d = 587.5618, line_c = 656.2725;
+static const double fraunhofer_f = 486.1327, fraunhofer_d = 587.5618, fraunhofer_c = 656.2725;
 
 static struct wavelengths wavelength_of(double nm)
 {
@@ -17,12 +17,12 @@ static struct wavelengths wavelength_of(double nm)
 	return (struct wavelengths){.nm = {nm, NAN, NAN, NAN}};
 }
 
-static double index_of(const char *text, double nm)
+static double refractive_index(const char *text, double nm)
 {
 	struct arena a = {0};
 	struct bsdf b;
 	struct wavelengths w = wavelength_of(nm);
-	bsdf_make(&a, text, &b);
+	bsdf_make_or_fail(&a, text, &b);
 	double eta = bsdf_eta(&b, &w);
 	arena_fini(&a);
 	return eta;
@@ -48,20 +48,22 @@ static void test_glasses_have_their_catalogue_values(void **state)
 		 1.52238, 1.51680, 1.51432, 6e-6},
 	};
 	for (size_t k = 0; k < sizeof glass / sizeof *glass; k++) {
-		double f = index_of(glass[k].text, line_f), d = index_of(glass[k].text, line_d),
-		       c = index_of(glass[k].text, line_c);
+		double f = refractive_index(glass[k].text, fraunhofer_f),
+		       d = refractive_index(glass[k].text, fraunhofer_d),
+		       c = refractive_index(glass[k].text, fraunhofer_c);
 		double worst = fmax(fabs(f - glass[k].f), fmax(fabs(d - glass[k].d), fabs(c - glass[k].c)));
 		if (!(worst < glass[k].tolerance))
 			fail_msg("%s: F %.6f, d %.6f, C %.6f", glass[k].text, f, d, c);
 	}
 	const char *bk7 = glass[0].text, *diamond = glass[5].text;
-	double abbe = (index_of(bk7, line_d) - 1) / (index_of(bk7, line_f) - index_of(bk7, line_c));
+	double abbe = (refractive_index(bk7, fraunhofer_d) - 1) /
+		      (refractive_index(bk7, fraunhofer_f) - refractive_index(bk7, fraunhofer_c));
 	assert_true(fabs(abbe - 64.17) < 0.02);
-	assert_true(fabs(index_of(diamond, 430.8) - index_of(diamond, 686.7) - 0.044) < 0.001);
+	assert_true(fabs(refractive_index(diamond, 430.8) - refractive_index(diamond, 686.7) - 0.044) < 0.001);
 }
 
 /* A name alone gives Mitsuba's index; with dispersion, it gives that of the law at 587.6 nm. */
-static void test_names_and_laws(void **state)
+static void material_name_gives_its_index_and_dispersion_law(void **state)
 {
 	(void)state;
 	static const struct {
@@ -75,15 +77,15 @@ static void test_names_and_laws(void **state)
 		struct bsdf b, c;
 		snprintf(plain, sizeof plain, "dielectric ext_ior=1 int_ior=%s", names[i].name);
 		snprintf(law, sizeof law, "%s dispersion=true", plain);
-		bsdf_make(&a, plain, &b);
-		bsdf_make(&a, law, &c);
+		bsdf_make_or_fail(&a, plain, &b);
+		bsdf_make_or_fail(&a, law, &c);
 		assert_true(b.eta == names[i].plain && !b.is_dispersive);
 		assert_true(fabs(c.eta - names[i].law) < 1e-5 && c.is_dispersive);
 		arena_fini(&a);
 	}
 }
 
-static void test_what_is_dispersive_says_so(void **state)
+static void dispersive_bsdfs_are_marked(void **state)
 {
 	(void)state;
 	static const struct {
@@ -108,7 +110,7 @@ static void test_what_is_dispersive_says_so(void **state)
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, expected[k].text, &b);
+		bsdf_make_or_fail(&a, expected[k].text, &b);
 		if (!(fabs(b.eta - expected[k].eta) < 1e-15 && b.is_dispersive == expected[k].dispersive &&
 		      b.has_smooth == expected[k].smooth && b.has_delta != b.has_smooth &&
 		      b.color_kind == expected[k].shape))
@@ -118,17 +120,17 @@ static void test_what_is_dispersive_says_so(void **state)
 	}
 }
 
-static void test_cauchy(void **state)
+static void index_follows_cauchys_law(void **state)
 {
 	(void)state;
 	const char *text = "dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.0042";
 	for (double nm = 360; nm <= 830; nm += 47)
-		assert_true(fabs(index_of(text, nm) - (1.5 + 0.0042 * (1e6 / (nm * nm) - 1 / (0.5876 * 0.5876)))) <
-			    1e-15);
+		assert_true(fabs(refractive_index(text, nm) -
+				 (1.5 + 0.0042 * (1e6 / (nm * nm) - 1 / (0.5876 * 0.5876)))) < 1e-15);
 }
 
 /* Converts v to the frame whose z axis is at `angle` from the world's z in the plane y = 0, and back with -angle. */
-static vec3 turned_by(vec3 v, double angle)
+static vec3 rotate_about_y(vec3 v, double angle)
 {
 	return (vec3){cos(angle) * v.x - sin(angle) * v.z, v.y, sin(angle) * v.x + cos(angle) * v.z};
 }
@@ -141,8 +143,8 @@ static void test_a_prism_spreads_light(void **state)
 	const double apex = PI / 3, incidence = 1.1;
 	struct arena a = {0};
 	struct bsdf b;
-	bsdf_make(&a, "dielectric int_ior=sf11 ext_ior=1 dispersion=true specular_transmittance=0.5", &b);
-	double before = INFINITY, spread = 0;
+	bsdf_make_or_fail(&a, "dielectric int_ior=sf11 ext_ior=1 dispersion=true specular_transmittance=0.5", &b);
+	double previous_deviation = INFINITY, spread = 0;
 	for (double nm = 365; nm < 830; nm += 25) {
 		struct wavelengths w = wavelength_of(nm);
 		struct bsdf_point p = {.wavelengths = &w};
@@ -150,32 +152,32 @@ static void test_a_prism_spreads_light(void **state)
 		double chance, n = 0, l2 = nm * nm * 1e-6;
 		spectrum first = bsdf_eval_delta(&b, &p, in, BSDF_TRANSMIT, &inside, &chance);
 		/* The outward normal of the second face is rotated by pi - apex; light arrives from inside. */
-		vec3 from = turned_by(vec3_neg(inside), PI - apex);
+		vec3 from = rotate_about_y(vec3_neg(inside), PI - apex);
 		if (from.z > 0)
-			from = turned_by(vec3_neg(inside), -(PI - apex));
+			from = rotate_about_y(vec3_neg(inside), -(PI - apex));
 		spectrum second = bsdf_eval_delta(&b, &p, from, BSDF_TRANSMIT, &out, &chance);
 		assert_true(first.v[0] > 0 && first.v[0] < 0.5 && second.v[0] > 0 && out.z > 0);
 		n = sqrt(1 + 1.73759695 * l2 / (l2 - 0.013188707) + 0.313747346 * l2 / (l2 - 0.0623068142) +
 			 1.89878101 * l2 / (l2 - 155.23629));
 		double refracted = asin(sin(incidence) / n), exit = asin(n * sin(apex - refracted));
-		double told = acos(out.z);
-		if (!(fabs(told - exit) < 1e-12))
-			fail_msg("%g nm leaves at %.15g, not %.15g", nm, told, exit);
-		double deviation = incidence + told - apex;
-		assert_true(deviation < before);
+		double actual_deviation = acos(out.z);
+		if (!(fabs(actual_deviation - exit) < 1e-12))
+			fail_msg("%g nm leaves at %.15g, not %.15g", nm, actual_deviation, exit);
+		double deviation = incidence + actual_deviation - apex;
+		assert_true(deviation < previous_deviation);
 		spread = nm == 365 ? deviation : spread;
-		before = deviation;
+		previous_deviation = deviation;
 		/* Fresnel's factor at both faces, from the angles. */
 		double rs = sin(incidence - refracted) / sin(incidence + refracted),
 		       rp = tan(incidence - refracted) / tan(incidence + refracted);
 		assert_true(fabs(first.v[0] * n * n - 0.5 * (1 - (rs * rs + rp * rp) / 2)) < 1e-13);
 	}
-	assert_true(spread - before > 0.1);
+	assert_true(spread - previous_deviation > 0.1);
 	arena_fini(&a);
 }
 
 /* With coefficients of 0, the values are those of plain glass to the bit; and only nm[0] is used. */
-static void test_lanes_and_nothing_left(void **state)
+static void zero_coefficients_are_plain_glass_and_use_one_wavelength(void **state)
 {
 	(void)state;
 	static const char *const pairs[][2] = {
@@ -192,18 +194,20 @@ static void test_lanes_and_nothing_left(void **state)
 		struct bsdf_point p = {.wavelengths = &w}, q = {.wavelengths = &hero};
 		vec3 wo = dice_direction(&d);
 		double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
-		bsdf_make(&a, pairs[i % 2][0], &plain);
-		bsdf_make(&a, pairs[i % 2][1], &zero);
-		bsdf_make(&a,
-			  i % 2 ? "roughdielectric int_ior=bk7 dispersion=true"
-				: "dielectric int_ior=bk7 dispersion=true",
-			  &bent);
-		bool there = plain.ops->sample(&plain, &p, wo, u, &s);
-		assert_int_equal(there, zero.ops->sample(&zero, &p, wo, u, &t));
-		assert_true(!there || (s.pdf == t.pdf && s.f.v[3] == t.f.v[3] && s.wi.x == t.wi.x && s.wi.z == t.wi.z));
-		there = bent.ops->sample(&bent, &p, wo, u, &s);
-		assert_int_equal(there, bent.ops->sample(&bent, &q, wo, u, &t));
-		assert_true(!there || (s.pdf == t.pdf && s.f.v[0] == t.f.v[0] && s.wi.x == t.wi.x && s.eta == t.eta));
+		bsdf_make_or_fail(&a, pairs[i % 2][0], &plain);
+		bsdf_make_or_fail(&a, pairs[i % 2][1], &zero);
+		bsdf_make_or_fail(&a,
+				  i % 2 ? "roughdielectric int_ior=bk7 dispersion=true"
+					: "dielectric int_ior=bk7 dispersion=true",
+				  &bent);
+		bool is_sampled = plain.ops->sample(&plain, &p, wo, u, &s);
+		assert_int_equal(is_sampled, zero.ops->sample(&zero, &p, wo, u, &t));
+		assert_true(!is_sampled ||
+			    (s.pdf == t.pdf && s.f.v[3] == t.f.v[3] && s.wi.x == t.wi.x && s.wi.z == t.wi.z));
+		is_sampled = bent.ops->sample(&bent, &p, wo, u, &s);
+		assert_int_equal(is_sampled, bent.ops->sample(&bent, &q, wo, u, &t));
+		assert_true(!is_sampled ||
+			    (s.pdf == t.pdf && s.f.v[0] == t.f.v[0] && s.wi.x == t.wi.x && s.eta == t.eta));
 		arena_fini(&a);
 	}
 }
@@ -212,11 +216,11 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_glasses_have_their_catalogue_values),
-		cmocka_unit_test(test_names_and_laws),
-		cmocka_unit_test(test_what_is_dispersive_says_so),
-		cmocka_unit_test(test_cauchy),
+		cmocka_unit_test(material_name_gives_its_index_and_dispersion_law),
+		cmocka_unit_test(dispersive_bsdfs_are_marked),
+		cmocka_unit_test(index_follows_cauchys_law),
 		cmocka_unit_test(test_a_prism_spreads_light),
-		cmocka_unit_test(test_lanes_and_nothing_left),
+		cmocka_unit_test(zero_coefficients_are_plain_glass_and_use_one_wavelength),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-static double by_complex_numbers(double c, double eta, double k)
+static double fresnel_by_complex_numbers(double c, double eta, double k)
 {
 	double complex n = eta - k * I, transmitted = csqrt(1 - (1 - c * c) / (n * n));
 	double complex s = (c - n * transmitted) / (c + n * transmitted),
@@ -19,14 +19,14 @@ static double by_complex_numbers(double c, double eta, double k)
 }
 
 /* Aluminium, gold, copper at green wavelengths; silver at blue ones; a weak absorber; an index close to glass. */
-static void test_conductors(void **state)
+static void conductors_agree_with_complex_arithmetic(void **state)
 {
 	(void)state;
 	const double metals[][2] = {{0.96, 6.7}, {0.36, 2.5}, {1.03, 2.59}, {0.15, 2.4}, {2.5, 0.3}, {1.5, 1e-4}};
 	for (size_t m = 0; m < sizeof metals / sizeof *metals; m++)
 		for (int i = 1; i <= 200; i++) {
 			double c = i / 200.0, r = fresnel_conductor(c, metals[m][0], metals[m][1]);
-			assert_true(fabs(r - by_complex_numbers(c, metals[m][0], metals[m][1])) < 1e-12);
+			assert_true(fabs(r - fresnel_by_complex_numbers(c, metals[m][0], metals[m][1])) < 1e-12);
 		}
 	/* Away from normal incidence the value differs from that at normal incidence. */
 	assert_true(fabs(fresnel_conductor(0.3, 0.36, 2.5) - fresnel_conductor(1, 0.36, 2.5)) > 0.005);
@@ -37,11 +37,11 @@ static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
 	(void)state;
 	for (int i = 1; i <= 200; i++)
 		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflectance -
-				 by_complex_numbers(i / 200.0, 1.5, 0)) < 1e-12);
+				 fresnel_by_complex_numbers(i / 200.0, 1.5, 0)) < 1e-12);
 }
 
 /* A mirror, no boundary at all, and the largest numbers that scenes may give. */
-static void test_conductors_at_the_ends(void **state)
+static void extreme_conductors_reflect_as_expected(void **state)
 {
 	(void)state;
 	const double ends[][3] = {{0, 1, 1},   {1, 0, 0},   {0, 0, 1},		 {1e9, 1e9, 1},
@@ -59,8 +59,8 @@ static void test_conductors_at_the_ends(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_conductors),
-		cmocka_unit_test(test_conductors_at_the_ends),
+		cmocka_unit_test(conductors_agree_with_complex_arithmetic),
+		cmocka_unit_test(extreme_conductors_reflect_as_expected),
 		cmocka_unit_test(test_dielectrics_are_conductors_that_absorb_nothing),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

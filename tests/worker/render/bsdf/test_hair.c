@@ -30,12 +30,12 @@ static void assert_near(double a, double b, double tolerance, const char *what)
 		fail_msg("%s: %.17g is not %.17g", what, a, b);
 }
 
-static struct hair_angle at_angle(double theta)
+static struct hair_angle hair_angle_at(double theta)
 {
 	return (struct hair_angle){sin(theta), cos(theta)};
 }
 
-static struct hair_fibre fibre_of(double eta, double along, double around, double tilt)
+static struct hair_fibre make_fibre(double eta, double along, double around, double tilt)
 {
 	struct hair_fibre f;
 	hair_fibre_init(&f, eta, along, around, tilt);
@@ -43,7 +43,7 @@ static struct hair_fibre fibre_of(double eta, double along, double around, doubl
 }
 
 /* I0(x) is the mean of exp(x cos t) over a period, for which the trapezoidal rule converges exponentially. */
-static void test_bessel(void **state)
+static void bessel_function_is_the_mean_of_an_exponential(void **state)
 {
 	(void)state;
 	static const double x[] = {0, 1e-9, 0.3, 2, 7, 14.9999, 15, 15.0001, 33, 400, 1e5, 1e8};
@@ -59,7 +59,7 @@ static void test_bessel(void **state)
 }
 
 /* Simpson's rule. */
-static double along_integral(const struct hair_fibre *f, int p, double theta)
+static double longitudinal_integral(const struct hair_fibre *f, int p, double theta)
 {
 	enum { N = 40000 };
 	double sum = 0;
@@ -68,46 +68,47 @@ static double along_integral(const struct hair_fibre *f, int p, double theta)
 		sum += (i == 0 || i == N ? 1
 			: i % 2		 ? 4
 					 : 2) *
-		       hair_longitudinal_pdf(f, p, at_angle(theta), at_angle(t)) * fabs(cos(t));
+		       hair_longitudinal_pdf(f, p, hair_angle_at(theta), hair_angle_at(t)) * fabs(cos(t));
 	}
 	return sum * PI / N / 3;
 }
 
-static void test_along_is_a_density(void **state)
+static void longitudinal_function_is_a_density(void **state)
 {
 	(void)state;
 	static const double roughness[] = {0.01, 0.1, 0.3, 0.8, 1};
 	for (size_t i = 0; i < sizeof roughness / sizeof *roughness; i++) {
-		struct hair_fibre f = fibre_of(1.55, roughness[i], 0.3, 0.035);
+		struct hair_fibre f = make_fibre(1.55, roughness[i], 0.3, 0.035);
 		for (int p = 0; p < HAIR_LOBES; p++)
 			for (double theta = -PI / 2; theta < 1.58; theta += PI / 8)
-				assert_near(along_integral(&f, p, theta), 1, 1e-9, "along");
+				assert_near(longitudinal_integral(&f, p, theta), 1, 1e-9, "along");
 	}
 }
 
 /* The angle at which each lobe is brightest: turned by twice the tilt of the scales to one side, by once and four times
  * to the other, and by 0 for the last lobe. Sampled angles are distributed around the same angle with the lobe's
  * variance. */
-static void test_along_has_its_place_and_width(void **state)
+static void longitudinal_lobes_have_their_angle_and_width(void **state)
 {
 	(void)state;
 	static const double turns[HAIR_LOBES] = {2, -1, -4, 0}, times[HAIR_LOBES] = {1, 0.25, 4, 4};
 	const double tilt = 0.05, theta = 0.3, b = 0.08;
-	struct hair_fibre f = fibre_of(1.55, b, 0.3, tilt);
+	struct hair_fibre f = make_fibre(1.55, b, 0.3, tilt);
 	struct dice d = dice_for_test(__func__);
 	double root = 0.726 * b + 0.812 * b * b, v = root * root;
 	for (int p = 0; p < HAIR_LOBES; p++) {
 		double ideal = -theta + turns[p] * tilt, sum = 0, square = 0;
-		double there = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal)), s = sqrt(times[p] * v);
+		double peak = hair_longitudinal_pdf(&f, p, hair_angle_at(theta), hair_angle_at(ideal)),
+		       s = sqrt(times[p] * v);
 		/* A narrow lobe is a normal distribution, except for the curvature. */
-		assert_near(there * cos(ideal), 1 / (sqrt(2 * PI) * s), 0.02, "height");
-		double left = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal - s)),
-		       right = hair_longitudinal_pdf(&f, p, at_angle(theta), at_angle(ideal + s));
-		assert_near(sqrt(left * right) / there, exp(-0.5), 0.02, "width");
+		assert_near(peak * cos(ideal), 1 / (sqrt(2 * PI) * s), 0.02, "height");
+		double left = hair_longitudinal_pdf(&f, p, hair_angle_at(theta), hair_angle_at(ideal - s)),
+		       right = hair_longitudinal_pdf(&f, p, hair_angle_at(theta), hair_angle_at(ideal + s));
+		assert_near(sqrt(left * right) / peak, exp(-0.5), 0.02, "width");
 		size_t n = dice_scaled_count(40000);
 		for (size_t i = 0; i < n; i++) {
 			double u[2] = {dice_uniform(&d), dice_uniform(&d)};
-			double t = asin(hair_sample_longitudinal(&f, p, at_angle(theta), u[0], u[1]).sin) - ideal;
+			double t = asin(hair_sample_longitudinal(&f, p, hair_angle_at(theta), u[0], u[1]).sin) - ideal;
 			sum += t;
 			square += t * t;
 		}
@@ -118,12 +119,12 @@ static void test_along_has_its_place_and_width(void **state)
 	}
 }
 
-static void test_around_is_a_density(void **state)
+static void azimuthal_function_is_a_density(void **state)
 {
 	(void)state;
 	static const double roughness[] = {0.01, 0.1, 0.3, 0.8, 1};
 	for (size_t i = 0; i < sizeof roughness / sizeof *roughness; i++) {
-		struct hair_fibre f = fibre_of(1.55, 0.3, roughness[i], 0);
+		struct hair_fibre f = make_fibre(1.55, 0.3, roughness[i], 0);
 		enum { N = 100000 };
 		double sum = 0, next = 0.1;
 		for (int k = 0; k < N; k++) {
@@ -143,7 +144,7 @@ static void test_around_is_a_density(void **state)
 /* ---- rays through a cylinder ---- */
 
 /* A ray in a cylinder of radius 1 around the y axis. */
-struct ray {
+struct cylinder_ray {
 	vec3 p, d; /* on the surface */
 };
 
@@ -165,28 +166,28 @@ static vec3 refracted(vec3 d, vec3 n, double eta)
 }
 
 /* Moves the ray to the other side, inside the cylinder. Returns the length. */
-static double cross(struct ray *r)
+static double cross_cylinder(struct cylinder_ray *r)
 {
 	double t = -2 * (r->p.x * r->d.x + r->p.z * r->d.z) / (r->d.x * r->d.x + r->d.z * r->d.z);
 	r->p = vec3_madd(r->p, t, r->d);
 	return t;
 }
 
-static void test_ideal_rays(void **state)
+static void azimuths_agree_with_rays_through_a_cylinder(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 300; i++) {
 		double eta = dice_between(&d, 1.2, 2), theta = dice_between(&d, -1.4, 1.4),
 		       gamma = dice_between(&d, -1.5, 1.5), phi = gamma + PI / 2;
-		struct hair_fibre f = fibre_of(eta, 0.3, 0.3, 0);
+		struct hair_fibre f = make_fibre(eta, 0.3, 0.3, 0);
 		vec3 camera = {cos(theta) * cos(phi), sin(theta), cos(theta) * sin(phi)};
 		struct hair_entry e = hair_enter(&f, camera.x, camera.z);
-		struct ray r = {{0, 0, 1}, vec3_neg(camera)};
+		struct cylinder_ray r = {{0, 0, 1}, vec3_neg(camera)};
 		vec3 outside[HAIR_LOBES - 1] = {reflected(r.d, normal_at(r.p))};
 		r.d = refracted(r.d, normal_at(r.p), eta);
 		for (int p = 1; p < HAIR_LOBES - 1; p++) {
-			assert_near(cross(&r), e.passage_length, 1e-9, "length of a passage");
+			assert_near(cross_cylinder(&r), e.passage_length, 1e-9, "length of a passage");
 			vec3 n = normal_at(r.p);
 			outside[p] = refracted(r.d, vec3_neg(n), 1 / eta);
 			r.d = reflected(r.d, n);
@@ -204,12 +205,12 @@ static void test_ideal_rays(void **state)
  * absorbed. */
 static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 {
-	struct ray r = {{0, 0, 1}, vec3_neg(camera)};
+	struct cylinder_ray r = {{0, 0, 1}, vec3_neg(camera)};
 	if (dice_uniform(d) < fresnel_dielectric(camera.z, eta).reflectance)
 		return 0;
 	r.d = refracted(r.d, normal_at(r.p), eta);
 	for (int p = 1;; p++) {
-		if (dice_uniform(d) > exp(-sigma * cross(&r)))
+		if (dice_uniform(d) > exp(-sigma * cross_cylinder(&r)))
 			return HAIR_LOBES;
 		vec3 n = normal_at(r.p);
 		if (dice_uniform(d) >= fresnel_dielectric(vec3_dot(r.d, n), 1 / eta).reflectance)
@@ -218,14 +219,14 @@ static int count_passages(vec3 camera, double eta, double sigma, struct dice *d)
 	}
 }
 
-static void test_shares(void **state)
+static void lobe_shares_agree_with_simulated_photons(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 12; i++) {
 		double eta = 1.55, sigma = i % 3 ? dice_between(&d, 0.1, 1) : 0, theta = dice_between(&d, -1.3, 1.3),
 		       gamma = dice_between(&d, -1.5, 1.5);
-		struct hair_fibre f = fibre_of(eta, 0.3, 0.3, 0);
+		struct hair_fibre f = make_fibre(eta, 0.3, 0.3, 0);
 		vec3 camera = {-cos(theta) * sin(gamma), sin(theta), cos(theta) * cos(gamma)};
 		struct hair_entry e = hair_enter(&f, camera.x, camera.z);
 		double share[HAIR_LOBES], sum = 0, t = exp(-sigma * e.passage_length);
@@ -260,11 +261,11 @@ static void test_lobes_lie_along_ideal_rays(void **state)
 	struct bsdf b;
 	const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
 	const double m = 0.02, n = 0.02, sigma = 0.3, eta = 1.6;
-	bsdf_make(
+	bsdf_make_or_fail(
 		&a,
 		"hair sigma_a=0.3 longitudinal_roughness=0.02 azimuthal_roughness=0.02 scale_tilt=0 int_ior=1.6 ext_ior=1",
 		&b);
-	struct hair_fibre f = fibre_of(eta, m, n, 0);
+	struct hair_fibre f = make_fibre(eta, m, n, 0);
 	for (int i = 0; i < 20; i++) {
 		double theta = -1 + 0.1 * i, gamma = 0.3 + 0.03 * i * (i % 2 ? 1 : -1) - (i % 2 ? 0 : 0.6);
 		vec3 camera = {-cos(theta) * sin(gamma), sin(theta), cos(theta) * cos(gamma)};
@@ -286,7 +287,7 @@ static void test_lobes_lie_along_ideal_rays(void **state)
 
 /* The energy that leaves, estimated by sampling, is the closed form, at each offset from the axis and for any
  * roughness. */
-static void test_energy(void **state)
+static void scattered_energy_has_its_closed_form(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {"hair sigma_a=0 longitudinal_roughness=0.01 azimuthal_roughness=0.01",
@@ -294,12 +295,12 @@ static void test_energy(void **state)
 					    "hair sigma_a=0.4 longitudinal_roughness=1 azimuthal_roughness=0.3"};
 	enum { GROUPS = 16 };
 	const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
-	struct hair_fibre f = fibre_of(1.55 / 1.000277, 0.3, 0.3, 0);
+	struct hair_fibre f = make_fibre(1.55 / 1.000277, 0.3, 0.3, 0);
 	struct dice d = dice_for_test(__func__);
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, texts[k], &b);
+		bsdf_make_or_fail(&a, texts[k], &b);
 		for (int i = 0; i < 12; i++) {
 			vec3 camera = dice_direction(&d);
 			double means[GROUPS] = {0}, least = INFINITY;
@@ -330,13 +331,13 @@ static void test_energy(void **state)
 }
 
 /* Integrates over the sphere without sampling: without absorption, the result is 1. */
-static void test_furnace_by_quadrature(void **state)
+static void fibre_that_absorbs_nothing_loses_nothing(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf b;
 	const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
-	bsdf_make(&a, "hair sigma_a=0 longitudinal_roughness=0.3 azimuthal_roughness=0.4", &b);
+	bsdf_make_or_fail(&a, "hair sigma_a=0 longitudinal_roughness=0.3 azimuthal_roughness=0.4", &b);
 	for (int i = 0; i < 4; i++) {
 		vec3 camera = vec3_normalize((vec3){-0.9 + 0.5 * i, 0.7 - 0.3 * i, 0.4});
 		enum { N = 400 };
@@ -354,7 +355,7 @@ static void test_furnace_by_quadrature(void **state)
 
 /* Importance is sampled with its density, never towards the inside, and from outside passes straight on with
  * probability 1/2. If the back is culled, nothing passes straight on, and no light arrives from inside. */
-static void test_importance(void **state)
+static void importance_is_sampled_with_its_density(void **state)
 {
 	(void)state;
 	enum { ROWS = 12, COLUMNS = 12, INNER = 24, CELLS = ROWS * COLUMNS };
@@ -362,7 +363,7 @@ static void test_importance(void **state)
 	struct bsdf b;
 	struct dice d = dice_for_test(__func__);
 	struct bsdf_point at = point_of(TRANSPORT_IMPORTANCE), to_camera = point_of(TRANSPORT_RADIANCE);
-	bsdf_make(&a, "hair longitudinal_roughness=0.5 azimuthal_roughness=0.6", &b);
+	bsdf_make_or_fail(&a, "hair longitudinal_roughness=0.5 azimuthal_roughness=0.6", &b);
 	for (int i = 0; i < 12; i++) {
 		vec3 light = dice_direction(&d), wi;
 		at.culls_backfaces = to_camera.culls_backfaces = i >= 8;
@@ -385,8 +386,8 @@ static void test_importance(void **state)
 		for (uint64_t k = 0; k < n; k++) {
 			double u[3] = {dice_uniform(&d), dice_uniform(&d), dice_uniform(&d)};
 			struct bsdf_sample s;
-			bool there = b.ops->sample(&b, &at, light, u, &s);
-			if (!there || (s.mode & BSDF_DELTA)) {
+			bool is_sampled = b.ops->sample(&b, &at, light, u, &s);
+			if (!is_sampled || (s.mode & BSDF_DELTA)) {
 				seen[CELLS]++;
 				continue;
 			}
@@ -407,18 +408,18 @@ static void test_importance(void **state)
 	arena_fini(&a);
 }
 
-static spectrum value(const char *text, const struct wavelengths *w, vec3 wo, vec3 wi)
+static spectrum eval_value(const char *text, const struct wavelengths *w, vec3 wo, vec3 wi)
 {
 	struct arena a = {0};
 	struct bsdf b;
 	const struct bsdf_point at = {.texture_point = {.u = 0.3, .v = 0.7}, .wavelengths = w};
-	bsdf_make(&a, text, &b);
+	bsdf_make_or_fail(&a, text, &b);
 	spectrum f = b.ops->eval(&b, &at, wo, wi);
 	arena_fini(&a);
 	return f;
 }
 
-static void test_colours(void **state)
+static void hair_colours_follow_their_parameters(void **state)
 {
 	(void)state;
 	static const struct wavelengths rgb = {.is_rgb = true, .nm = {NAN, NAN, NAN, NAN}};
@@ -435,48 +436,48 @@ static void test_colours(void **state)
 		for (int mode = 0; mode < 2; mode++)
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
 				const struct wavelengths *w = mode ? &rgb : &wavelengths;
-				assert_near(value(same[k][0], w, wo, wi).v[l], value(same[k][1], w, wo, wi).v[l], 1e-9,
-					    same[k][0]);
+				assert_near(eval_value(same[k][0], w, wo, wi).v[l],
+					    eval_value(same[k][1], w, wo, wi).v[l], 1e-9, same[k][0]);
 			}
 	/* Melanin is brown: most red light passes, then green, then blue. */
-	spectrum f = value("hair", &rgb, wo, wi);
+	spectrum f = eval_value("hair", &rgb, wo, wi);
 	assert_true(f.v[0] > 1.2 * f.v[1] && f.v[1] > 1.2 * f.v[2]);
-	f = value("hair", &wavelengths, wo, wi);
+	f = eval_value("hair", &wavelengths, wo, wi);
 	assert_true(f.v[3] > f.v[2] && f.v[2] > f.v[1] && f.v[1] > f.v[0]);
 }
 
 /* Mirroring in the plane of normal and fibre changes nothing. */
-static void test_sides_are_equal(void **state)
+static void mirroring_the_fibre_changes_nothing(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test(__func__);
 	for (int i = 0; i < 200; i++) {
 		vec3 wo = dice_direction(&d), wi = dice_direction(&d);
 		wo.z = fabs(wo.z);
-		spectrum f = value("hair", &wavelengths, wo, wi),
-			 g = value("hair", &wavelengths, (vec3){-wo.x, wo.y, wo.z}, (vec3){-wi.x, wi.y, wi.z});
+		spectrum f = eval_value("hair", &wavelengths, wo, wi),
+			 g = eval_value("hair", &wavelengths, (vec3){-wo.x, wo.y, wo.z}, (vec3){-wi.x, wi.y, wi.z});
 		assert_near(f.v[2], g.v[2], 1e-9, "mirrored");
 		assert_true(f.v[2] > 0);
 		wo.z = -wo.z;
-		assert_true(value("hair", &wavelengths, wo, wi).v[2] == 0);
+		assert_true(eval_value("hair", &wavelengths, wo, wi).v[2] == 0);
 	}
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_bessel),
-		cmocka_unit_test(test_along_is_a_density),
-		cmocka_unit_test(test_along_has_its_place_and_width),
-		cmocka_unit_test(test_around_is_a_density),
-		cmocka_unit_test(test_ideal_rays),
-		cmocka_unit_test(test_shares),
+		cmocka_unit_test(bessel_function_is_the_mean_of_an_exponential),
+		cmocka_unit_test(longitudinal_function_is_a_density),
+		cmocka_unit_test(longitudinal_lobes_have_their_angle_and_width),
+		cmocka_unit_test(azimuthal_function_is_a_density),
+		cmocka_unit_test(azimuths_agree_with_rays_through_a_cylinder),
+		cmocka_unit_test(lobe_shares_agree_with_simulated_photons),
 		cmocka_unit_test(test_lobes_lie_along_ideal_rays),
-		cmocka_unit_test(test_energy),
-		cmocka_unit_test(test_furnace_by_quadrature),
-		cmocka_unit_test(test_importance),
-		cmocka_unit_test(test_colours),
-		cmocka_unit_test(test_sides_are_equal),
+		cmocka_unit_test(scattered_energy_has_its_closed_form),
+		cmocka_unit_test(fibre_that_absorbs_nothing_loses_nothing),
+		cmocka_unit_test(importance_is_sampled_with_its_density),
+		cmocka_unit_test(hair_colours_follow_their_parameters),
+		cmocka_unit_test(mirroring_the_fibre_changes_nothing),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -25,7 +25,7 @@ static double henyey_greenstein(double g, double cosine)
 
 /* Light that is scattered at depth z has travelled z / c, and leaves through z / a, or through the rest of the layer.
  * The density of the event per depth is sigma_s over the two cosines in the definition of reflectance. */
-static double by_depth(double sigma_s, double sigma_t, double thickness, double g, vec3 wo, vec3 wi)
+static double depth_integral(double sigma_s, double sigma_t, double thickness, double g, vec3 wo, vec3 wi)
 {
 	static const double node[] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363},
 			    weight[] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
@@ -40,7 +40,7 @@ static double by_depth(double sigma_s, double sigma_t, double thickness, double 
 	return sigma_s * henyey_greenstein(g, -vec3_dot(wo, wi)) * sum / (a * c);
 }
 
-static void test_the_integral_over_the_depth(void **state)
+static void layer_agrees_with_the_integral_over_depth(void **state)
 {
 	(void)state;
 	static const struct {
@@ -54,15 +54,15 @@ static void test_the_integral_over_the_depth(void **state)
 		double s = layers[k].sigma_s, t = s + layers[k].sigma_a, h = layers[k].thickness, g = layers[k].g;
 		snprintf(text, sizeof text, "hk sigma_s=%.17g sigma_a=%.17g thickness=%g | phase hg g=%g", s,
 			 layers[k].sigma_a, h, g);
-		bsdf_make(&a, text, &by_both);
+		bsdf_make_or_fail(&a, text, &by_both);
 		snprintf(text, sizeof text, "hk sigma_t=%.17g albedo=%.17g thickness=%g | phase hg g=%g", t, s / t, h,
 			 g);
-		bsdf_make(&a, text, &by_albedo);
+		bsdf_make_or_fail(&a, text, &by_albedo);
 		for (int i = 0; i < 200; i++) {
 			vec3 wo = dice_direction(&d), wi = dice_direction(&d), straight;
 			if (fmin(fabs(wo.z), fabs(wi.z)) < 0.01)
 				continue;
-			double want = by_depth(s, t, h, g, wo, wi),
+			double want = depth_integral(s, t, h, g, wo, wi),
 			       got = by_both.ops->eval(&by_both, &point, wo, wi).v[1], chance,
 			       direct = bsdf_eval_delta(&by_both, &point, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &straight,
 							&chance)
@@ -80,18 +80,18 @@ static void test_the_integral_over_the_depth(void **state)
 }
 
 /* Both cosines are equal or nearly so, where the closed form is 0 / 0. */
-static void test_equal_cosines(void **state)
+static void equal_cosines_have_their_limit(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf b;
-	bsdf_make(&a, "hk sigma_s=2 sigma_a=1 thickness=0.5", &b);
+	bsdf_make_or_fail(&a, "hk sigma_s=2 sigma_a=1 thickness=0.5", &b);
 	for (double z = 0.05; z < 1; z += 0.05)
 		for (int e = -60; e < -2; e++)
 			for (int sign = -1; sign <= 1; sign++) {
 				double c = z * (1 - sign * ldexp(1, e));
 				vec3 wo = {sqrt((1 - z) * (1 + z)), 0, z}, wi = {0, -sqrt((1 - c) * (1 + c)), -c};
-				double want = by_depth(2, 3, 0.5, 0, wo, wi),
+				double want = depth_integral(2, 3, 0.5, 0, wo, wi),
 				       got = b.ops->eval(&b, &point, wo, wi).v[0];
 				if (fabs(got - want) > 1e-9 * want)
 					fail_msg("%.17g and %.17g: %.17g is not %.17g", z, c, got, want);
@@ -101,19 +101,19 @@ static void test_equal_cosines(void **state)
 
 /* A layer of thickness 0 has no effect; a thick one transmits nothing, and reflects like a half space that scatters
  * once, A p / (a + c). */
-static void test_limits(void **state)
+static void thin_and_thick_layers_have_their_limits(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf none, thick;
 	vec3 wo = {0.6, 0, 0.8}, above = {0, -0.8, 0.6}, below = {0, 0.8, -0.6}, wi;
 	double chance;
-	bsdf_make(&a, "hk sigma_s=3 sigma_a=2 thickness=0", &none);
+	bsdf_make_or_fail(&a, "hk sigma_s=3 sigma_a=2 thickness=0", &none);
 	assert_true(bsdf_eval_delta(&none, &point, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance).v[0] == 1);
 	assert_true(chance == 1 && none.ops->pdf_solid(&none, &point, wo, above) == 0);
 	assert_true(none.ops->eval(&none, &point, wo, above).v[0] == 0 &&
 		    none.ops->eval(&none, &point, wo, below).v[0] == 0);
-	bsdf_make(&a, "hk sigma_t=1e9 albedo=0.5 thickness=1e30", &thick);
+	bsdf_make_or_fail(&a, "hk sigma_t=1e9 albedo=0.5 thickness=1e30", &thick);
 	assert_true(bsdf_eval_delta(&thick, &point, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance).v[0] == 0 &&
 		    chance == 0);
 	assert_true(thick.ops->eval(&thick, &point, wo, below).v[0] == 0);
@@ -122,7 +122,7 @@ static void test_limits(void **state)
 }
 
 /* The measured materials of 0.6, whose coefficients are replaced one by one by those that the file gives. */
-static void test_materials(void **state)
+static void named_materials_have_their_coefficients(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -133,8 +133,8 @@ static void test_materials(void **state)
 	snprintf(text, sizeof text, "hk thickness=0.01 sigma_a=0.4 sigma_s=rgb(%.17g,%.17g,%.17g)",
 		 MEASURED_MEDIUM_SCALE * m->sigma_s[0], MEASURED_MEDIUM_SCALE * m->sigma_s[1],
 		 MEASURED_MEDIUM_SCALE * m->sigma_s[2]);
-	bsdf_make(&a, "hk thickness=0.01 material=ketchup sigma_a=0.4", &named);
-	bsdf_make(&a, text, &stated);
+	bsdf_make_or_fail(&a, "hk thickness=0.01 material=ketchup sigma_a=0.4", &named);
+	bsdf_make_or_fail(&a, text, &stated);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		assert_true(named.ops->eval(&named, &point, wo, wi).v[i] ==
 			    stated.ops->eval(&stated, &point, wo, wi).v[i]);
@@ -142,7 +142,7 @@ static void test_materials(void **state)
 	arena_fini(&a);
 }
 
-static void test_refused(void **state)
+static void invalid_layers_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -176,7 +176,7 @@ static void test_refused(void **state)
 
 /* A plate of the medium of thickness 1, so large that its rim is not seen, with paths of two edges, that is with one
  * scattering event: its faces, which are `null`, are no events, since connections look through them. */
-static void test_a_plate_of_the_medium(void **state)
+static void layer_agrees_with_a_plate_of_its_medium(void **state)
 {
 	(void)state;
 	enum { SIDE = 16 };
@@ -204,12 +204,12 @@ static void test_a_plate_of_the_medium(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_the_integral_over_the_depth),
-		cmocka_unit_test(test_equal_cosines),
-		cmocka_unit_test(test_limits),
-		cmocka_unit_test(test_materials),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_a_plate_of_the_medium),
+		cmocka_unit_test(layer_agrees_with_the_integral_over_depth),
+		cmocka_unit_test(equal_cosines_have_their_limit),
+		cmocka_unit_test(thin_and_thick_layers_have_their_limits),
+		cmocka_unit_test(named_materials_have_their_coefficients),
+		cmocka_unit_test(invalid_layers_are_refused),
+		cmocka_unit_test(layer_agrees_with_a_plate_of_its_medium),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

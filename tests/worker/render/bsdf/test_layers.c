@@ -13,7 +13,7 @@
 #include <math.h>
 
 #define PI 3.14159265358979323846
-#define HIDDEN 0.015
+#define MASKING_TOLERANCE 0.015
 
 enum { BINS = 8, PATHS = 200000 };
 
@@ -21,7 +21,7 @@ static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 static const struct bsdf_point point = {.wavelengths = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
 
 struct bins {
-	double sum[BINS], square[BINS];
+	double sum[BINS], sum_of_squares[BINS];
 };
 
 static vec3 cosine_upwards(struct dice *d)
@@ -31,7 +31,7 @@ static vec3 cosine_upwards(struct dice *d)
 }
 
 /* Scatters v at the boundary, from either side. Returns false if other facets hide it. */
-static bool pass_on(const struct bsdf *boundary, struct dice *d, vec3 v, vec3 *next, double *weight)
+static bool scatter_at_boundary(const struct bsdf *boundary, struct dice *d, vec3 v, vec3 *next, double *weight)
 {
 	struct bsdf_sample s;
 	const double u[3] = {dice_uniform(d), dice_uniform(d), dice_uniform(d)};
@@ -46,11 +46,11 @@ static void trace_photon(const struct bsdf *boundary, double base, vec3 wo, stru
 {
 	double weight = 1;
 	vec3 v = wo;
-	while (pass_on(boundary, d, v, &v, &weight)) {
+	while (scatter_at_boundary(boundary, d, v, &v, &weight)) {
 		if (v.z > 0) { /* the light leaves */
 			int i = (int)fmin(v.z * BINS, BINS - 1);
 			b->sum[i] += weight;
-			b->square[i] += weight * weight;
+			b->sum_of_squares[i] += weight * weight;
 			return;
 		}
 		weight *= base;
@@ -73,12 +73,13 @@ static double integral_over_bin(const struct bsdf *plastic, vec3 wo, int bin)
 }
 
 /* Returns the largest difference, beyond the allowed one, in standard errors. */
-static double compare(const struct bsdf *plastic, const struct bins *b, vec3 wo, double *off)
+static double max_excess_deviation(const struct bsdf *plastic, const struct bins *b, vec3 wo, double *off)
 {
 	double worst = 0;
 	for (int i = 1; i < BINS; i++) {
-		double mean = b->sum[i] / PATHS, error = sqrt((b->square[i] / PATHS - mean * mean) / PATHS);
-		double model = integral_over_bin(plastic, wo, i), beyond = fabs(model - mean) - HIDDEN * model;
+		double mean = b->sum[i] / PATHS, error = sqrt((b->sum_of_squares[i] / PATHS - mean * mean) / PATHS);
+		double model = integral_over_bin(plastic, wo, i),
+		       beyond = fabs(model - mean) - MASKING_TOLERANCE * model;
 		*off = fmax(*off, fabs(model / mean - 1));
 		worst = fmax(worst, beyond / error);
 	}
@@ -93,20 +94,20 @@ static void test_roughplastic_is_its_layers(void **state)
 	struct arena a = {0};
 	struct dice d = dice_for_test("light in layers");
 	struct bsdf boundary, plastic, brighter;
-	bsdf_make(&a, "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.05", &boundary);
-	bsdf_make(&a, COAT "diffuse_reflectance=0.7", &plastic);
-	bsdf_make(&a, COAT "diffuse_reflectance=0.735", &brighter);
+	bsdf_make_or_fail(&a, "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.05", &boundary);
+	bsdf_make_or_fail(&a, COAT "diffuse_reflectance=0.7", &plastic);
+	bsdf_make_or_fail(&a, COAT "diffuse_reflectance=0.735", &brighter);
 	for (int k = 0; k < 3; k++) {
 		double z = (double[]){0.95, 0.6, 0.3}[k], off = 0, ignored = 0;
 		vec3 wo = {sqrt(1 - z * z), 0, z};
 		struct bins b = {{0}, {0}};
 		for (int i = 0; i < PATHS; i++)
 			trace_photon(&boundary, 0.7, wo, &d, &b);
-		double worst = compare(&plastic, &b, wo, &off);
+		double worst = max_excess_deviation(&plastic, &b, wo, &off);
 		print_message("from z = %g: largest difference %.2f %%, %.1f standard errors beyond %g %%\n", z,
-			      100 * off, worst, 100 * HIDDEN);
+			      100 * off, worst, 100 * MASKING_TOLERANCE);
 		assert_true(worst < 5);
-		assert_true(compare(&brighter, &b, wo, &ignored) > 5);
+		assert_true(max_excess_deviation(&brighter, &b, wo, &ignored) > 5);
 	}
 	arena_fini(&a);
 }

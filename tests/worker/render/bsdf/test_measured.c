@@ -24,19 +24,19 @@
 
 #define PI 3.14159265358979323846
 
-static const struct measured_file_material fine = {.name = "fine.bsdf",
-						   .alpha_u = 0.3,
-						   .alpha_v = 0.3,
-						   .azimuths = 1,
-						   .symmetry = 1,
-						   .elevations = 5,
-						   .normal_nodes = 96,
-						   .color_nodes = 24};
+static const struct measured_file_material fine_material = {.name = "fine.bsdf",
+							    .alpha_u = 0.3,
+							    .alpha_v = 0.3,
+							    .azimuths = 1,
+							    .symmetry = 1,
+							    .elevations = 5,
+							    .normal_nodes = 96,
+							    .color_nodes = 24};
 
-static const struct wavelengths nm = {.nm = {380, 550, 600, 790}};
-static const struct wavelengths rgb = {.is_rgb = true};
+static const struct wavelengths spectral_wavelengths = {.nm = {380, 550, 600, 790}};
+static const struct wavelengths rgb_wavelengths = {.is_rgb = true};
 
-struct made {
+struct made_bsdf {
 	struct memory_file files[2];
 	struct asset_source assets;
 	struct arena arena;
@@ -45,15 +45,15 @@ struct made {
 };
 
 /* The caller keeps the bytes. */
-static int try_bytes(struct made *m, const void *bytes, size_t size)
+static int try_bytes(struct made_bsdf *m, const void *bytes, size_t size)
 {
-	*m = (struct made){.files = {{"m.bsdf", bytes, size}, {0}}};
+	*m = (struct made_bsdf){.files = {{"m.bsdf", bytes, size}, {0}}};
 	m->assets = memory_assets(m->files);
-	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &m->assets};
+	const struct bsdf_build build = {.arena = &m->arena, .is_dialect_3 = true, .assets = &m->assets};
 	return bsdf_create(&m->b, node_make_bsdf(&m->arena, "measured filename=m.bsdf"), &build, &m->e);
 }
 
-static void make_or_fail(struct made *m, const struct measured_file_material *k)
+static void make_or_fail(struct made_bsdf *m, const struct measured_file_material *k)
 {
 	size_t size;
 	unsigned char *bytes = measured_file_make(k, &size);
@@ -68,8 +68,8 @@ static vec3 spherical(double theta, double phi)
 }
 
 /* Pairs with wo at elevations and azimuths of the file, and half vectors as samples find them. */
-static double root_mean_square(const struct made *m, const struct measured_file_material *k, double phi, double least,
-			       const struct wavelengths *w, const double tint[SPECTRUM_LANES])
+static double root_mean_square(const struct made_bsdf *m, const struct measured_file_material *k, double phi,
+			       double least, const struct wavelengths *w, const double tint[SPECTRUM_LANES])
 {
 	const struct bsdf_point p = {.wavelengths = w, .transport = TRANSPORT_RADIANCE};
 	double sum = 0;
@@ -105,11 +105,11 @@ static void tints_of(const struct wavelengths *w, double tint[SPECTRUM_LANES])
 static void test_agrees_with_its_formula(void **state)
 {
 	(void)state;
-	struct made m;
+	struct made_bsdf m;
 	double tint[SPECTRUM_LANES];
-	tints_of(&nm, tint);
-	make_or_fail(&m, &fine);
-	double off = root_mean_square(&m, &fine, 0.7, 0.2, &nm, tint);
+	tints_of(&spectral_wavelengths, tint);
+	make_or_fail(&m, &fine_material);
+	double off = root_mean_square(&m, &fine_material, 0.7, 0.2, &spectral_wavelengths, tint);
 	print_message("isotropic: off by %.4f\n", off);
 	assert_true(off < 0.02);
 	arena_fini(&m.arena);
@@ -123,10 +123,10 @@ static void test_anisotropic_symmetries(void **state)
 		int symmetry, azimuths;
 	} ways[] = {{1, 9}, {2, 5}, {4, 3}};
 	double tint[SPECTRUM_LANES];
-	tints_of(&nm, tint);
+	tints_of(&spectral_wavelengths, tint);
 	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-		struct measured_file_material k = fine;
-		struct made m;
+		struct measured_file_material k = fine_material;
+		struct made_bsdf m;
 		k.alpha_v = 0.5;
 		k.azimuths = ways[i].azimuths;
 		k.symmetry = ways[i].symmetry;
@@ -137,7 +137,7 @@ static void test_anisotropic_symmetries(void **state)
 		make_or_fail(&m, &k);
 		assert_true(m.b.uses_tangents);
 		for (int q = -3; q <= 4; q++) {
-			double off = root_mean_square(&m, &k, q * PI / 4 + 1e-9, 0.3, &nm, tint);
+			double off = root_mean_square(&m, &k, q * PI / 4 + 1e-9, 0.3, &spectral_wavelengths, tint);
 			if (!(off < 0.03))
 				fail_msg("symmetry %d, azimuth %d pi/4: off by %g", k.symmetry, q, off);
 		}
@@ -146,12 +146,12 @@ static void test_anisotropic_symmetries(void **state)
 }
 
 /* An isotropic material looks the same from all azimuths, and if rotated by any angle. */
-static void test_isotropic_turns(void **state)
+static void isotropic_material_is_the_same_when_rotated(void **state)
 {
 	(void)state;
-	struct made m;
-	make_or_fail(&m, &fine);
-	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
+	struct made_bsdf m;
+	make_or_fail(&m, &fine_material);
+	const struct bsdf_point p = {.wavelengths = &spectral_wavelengths, .transport = TRANSPORT_RADIANCE};
 	spectrum a = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3), spherical(0.6, 3));
 	for (int i = 1; i < 12; i++) {
 		spectrum b = m.b.ops->eval(&m.b, &p, spherical(0.8, 0.3 + i), spherical(0.6, 3 + i));
@@ -166,12 +166,12 @@ static void test_isotropic_turns(void **state)
 static void test_samples_follow_the_facets(void **state)
 {
 	(void)state;
-	struct measured_file_material k = fine;
-	struct made m;
+	struct measured_file_material k = fine_material;
+	struct made_bsdf m;
 	k.is_white = true;
 	k.alpha_u = k.alpha_v = 0.1;
 	make_or_fail(&m, &k);
-	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = &spectral_wavelengths, .transport = TRANSPORT_RADIANCE};
 	double mean = 0, square = 0;
 	int count = 0;
 	for (uint64_t j = 0; j < 4000; j++) {
@@ -201,17 +201,17 @@ static void test_rgb(void **state)
 {
 	(void)state;
 	enum { SAMPLES = 101 };
-	struct measured_file_material k = fine;
-	struct made spectral, three;
+	struct measured_file_material k = fine_material;
+	struct made_bsdf spectral, three;
 	k.elevations = 3;
 	make_or_fail(&spectral, &k);
 	k.is_rgb = true;
 	make_or_fail(&three, &k);
 	const double tint[SPECTRUM_LANES] = {measured_file_tint(600), measured_file_tint(550), measured_file_tint(450),
 					     measured_file_tint(550)};
-	assert_true(root_mean_square(&three, &k, 0, 0.2, &rgb, tint) < 0.03);
+	assert_true(root_mean_square(&three, &k, 0, 0.2, &rgb_wavelengths, tint) < 0.03);
 	/* Spectra as RGB: as color_from_samples() converts the formula's values. */
-	const struct bsdf_point p = {.wavelengths = &rgb}, q = {.wavelengths = &nm};
+	const struct bsdf_point p = {.wavelengths = &rgb_wavelengths}, q = {.wavelengths = &spectral_wavelengths};
 	vec3 wo = spherical(measured_file_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	double at[SAMPLES], value[SAMPLES];
 	for (int i = 0; i < SAMPLES; i++) {
@@ -220,14 +220,14 @@ static void test_rgb(void **state)
 	}
 	struct color wanted = color_from_samples(SAMPLES, at, value, false, true);
 	spectrum a = spectral.b.ops->eval(&spectral.b, &p, wo, wi), b = three.b.ops->eval(&three.b, &p, wo, wi),
-		 c = three.b.ops->eval(&three.b, &q, wo, wi), d = color_eval(&wanted, &rgb);
+		 c = three.b.ops->eval(&three.b, &q, wo, wi), d = color_eval(&wanted, &rgb_wavelengths);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		if (!(fabs(a.v[l] / d.v[l] - 1) < 0.02))
 			fail_msg("lane %d: %g, wanted %g", l, a.v[l], d.v[l]);
 	/* RGB as spectra: upsampled like images. */
 	double largest = fmax(1, fmax(b.v[0], fmax(b.v[1], b.v[2])));
 	const double unit[3] = {b.v[0] / largest, b.v[1] / largest, b.v[2] / largest};
-	d = color_eval_rgb_reflectance(unit, &nm);
+	d = color_eval_rgb_reflectance(unit, &spectral_wavelengths);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		if (!(fabs(c.v[l] / (d.v[l] * largest) - 1) < 0.1))
 			fail_msg("lane %d: %g, wanted %g", l, c.v[l], d.v[l] * largest);
@@ -239,12 +239,12 @@ static void test_rgb(void **state)
 static void test_white_is_white(void **state)
 {
 	(void)state;
-	struct measured_file_material k = fine;
-	struct made m;
+	struct measured_file_material k = fine_material;
+	struct made_bsdf m;
 	k.elevations = 3;
 	k.is_white = k.is_absolute = true;
 	make_or_fail(&m, &k);
-	const struct bsdf_point p = {.wavelengths = &rgb};
+	const struct bsdf_point p = {.wavelengths = &rgb_wavelengths};
 	vec3 wo = spherical(measured_file_theta(&k, 1), 0), wi = spherical(0.5, 3);
 	spectrum f = m.b.ops->eval(&m.b, &p, wo, wi);
 	double wanted = measured_file_reflected(&k, 1, wo, wi) / wi.z;
@@ -258,8 +258,8 @@ static void test_white_is_white(void **state)
 static void test_roughness(void **state)
 {
 	(void)state;
-	struct made m;
-	make_or_fail(&m, &fine);
+	struct made_bsdf m;
+	make_or_fail(&m, &fine_material);
 	assert_true(fabs(m.b.min_alpha / 0.3 - 1) < 0.02 && m.b.mean_alpha == m.b.min_alpha);
 	arena_fini(&m.arena);
 }
@@ -267,13 +267,13 @@ static void test_roughness(void **state)
 /* ---- broken files ---- */
 
 /* Every truncated file is refused, unless nothing that is used is missing. */
-static void test_truncated(void **state)
+static void truncated_files_are_refused(void **state)
 {
 	(void)state;
 	const struct memory_file *f = measured_file_all();
 	size_t step = 1;
 	for (size_t size = 0; size < f->size; size += step) {
-		struct made m;
+		struct made_bsdf m;
 		unsigned char *copy = malloc(size ? size : 1); /* so that a sanitizer detects reads beyond its end */
 		memcpy(copy, f->bytes, size);
 		struct tensor t; /* the last array */
@@ -286,7 +286,7 @@ static void test_truncated(void **state)
 }
 
 /* Flips each bit of the header: the file is refused with a reason, or read. */
-static void test_mangled(void **state)
+static void damaged_headers_are_refused_or_read(void **state)
 {
 	(void)state;
 	const struct memory_file *f = measured_file_all();
@@ -294,7 +294,7 @@ static void test_mangled(void **state)
 	int refused = 0;
 	for (size_t i = 0; i < 500; i++)
 		for (unsigned bit = 0; bit < 8; bit++) {
-			struct made m;
+			struct made_bsdf m;
 			memcpy(copy, f->bytes, f->size);
 			copy[i] ^= (unsigned char)(1U << bit);
 			int code = try_bytes(&m, copy, f->size);
@@ -306,12 +306,12 @@ static void test_mangled(void **state)
 	free(copy);
 }
 
-static void replace(const char *array, size_t i, const unsigned char number[4], const char *what)
+static void check_replaced_number(const char *array, size_t i, const unsigned char number[4], const char *what)
 {
 	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	struct tensor t;
-	struct made m;
+	struct made_bsdf m;
 	memcpy(copy, f->bytes, f->size);
 	assert_int_equal(tensor_find(copy, f->size, array, &t), 0);
 	memcpy(copy + (t.bytes - copy) + 4 * i, number, 4);
@@ -322,7 +322,7 @@ static void replace(const char *array, size_t i, const unsigned char number[4], 
 	free(copy);
 }
 
-static void test_numbers(void **state)
+static void invalid_numbers_are_refused(void **state)
 {
 	(void)state;
 	static const char *const arrays[] = {"phi_i", "theta_i",   "ndf",     "sigma",
@@ -331,18 +331,18 @@ static void test_numbers(void **state)
 		{0, 0, 0x80, 0x7f}, {1, 0, 0x80, 0x7f}, {0, 0, 0xc0, 0xff}, {0, 0, 0, 0x7f}};
 	for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
 		for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
-			replace(arrays[i], 0, bad[k], "finite");
+			check_replaced_number(arrays[i], 0, bad[k], "finite");
 	static const unsigned char minus[4] = {0, 0, 0x80, 0xbf};
-	replace("ndf", 5, minus, "negative");
-	replace("sigma", 5, minus, "negative");
-	replace("vndf", 5, minus, "negative");
-	replace("luminance", 5, minus, "negative");
-	replace("theta_i", 3, minus, "ascend");
-	replace("wavelengths", 3, minus, "ascend");
+	check_replaced_number("ndf", 5, minus, "negative");
+	check_replaced_number("sigma", 5, minus, "negative");
+	check_replaced_number("vndf", 5, minus, "negative");
+	check_replaced_number("luminance", 5, minus, "negative");
+	check_replaced_number("theta_i", 3, minus, "ascend");
+	check_replaced_number("wavelengths", 3, minus, "ascend");
 }
 
 /* Makes a side shorter by one: the arrays disagree, which the error says, although all of them are within the file. */
-static void test_sizes(void **state)
+static void arrays_of_different_sizes_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -364,7 +364,7 @@ static void test_sizes(void **state)
 	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct made m;
+		struct made_bsdf m;
 		memcpy(copy, f->bytes, f->size);
 		size_t at = 18, length = strlen(cases[i].array);
 		while (memcmp(copy + at, cases[i].array, length) != 0)
@@ -379,12 +379,12 @@ static void test_sizes(void **state)
 }
 
 /* A file that is not a tensor file, one of another version, and one without an array. */
-static void test_other_files(void **state)
+static void files_of_other_formats_are_refused(void **state)
 {
 	(void)state;
 	const struct memory_file *f = measured_file_all();
 	unsigned char *copy = malloc(f->size);
-	struct made m;
+	struct made_bsdf m;
 	assert_int_equal(try_bytes(&m, "ply\n", 4), -EINVAL);
 	assert_non_null(strstr(m.e.text, "this is not a tensor file (.bsdf)"));
 	arena_fini(&m.arena);
@@ -408,16 +408,16 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_agrees_with_its_formula),
 		cmocka_unit_test(test_anisotropic_symmetries),
-		cmocka_unit_test(test_isotropic_turns),
+		cmocka_unit_test(isotropic_material_is_the_same_when_rotated),
 		cmocka_unit_test(test_samples_follow_the_facets),
 		cmocka_unit_test(test_rgb),
 		cmocka_unit_test(test_white_is_white),
 		cmocka_unit_test(test_roughness),
-		cmocka_unit_test(test_truncated),
-		cmocka_unit_test(test_mangled),
-		cmocka_unit_test(test_numbers),
-		cmocka_unit_test(test_sizes),
-		cmocka_unit_test(test_other_files),
+		cmocka_unit_test(truncated_files_are_refused),
+		cmocka_unit_test(damaged_headers_are_refused_or_read),
+		cmocka_unit_test(invalid_numbers_are_refused),
+		cmocka_unit_test(arrays_of_different_sizes_are_refused),
+		cmocka_unit_test(files_of_other_formats_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

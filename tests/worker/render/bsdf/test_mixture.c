@@ -23,7 +23,7 @@ static vec3 direction_above(struct dice *d)
 	return v;
 }
 
-static double value(const struct bsdf *b, vec3 wo, vec3 wi)
+static double eval_value(const struct bsdf *b, vec3 wo, vec3 wi)
 {
 	return b->ops->eval(b, &point, wo, wi).v[0];
 }
@@ -55,12 +55,12 @@ static void test_ward_is_its_formula(void **state)
 		snprintf(text, sizeof text,
 			 "ward variant=%s alpha_u=0.3 alpha_v=0.5 diffuse_reflectance=0.3 specular_reflectance=0.4",
 			 variants[k]);
-		bsdf_make(&a, text, &b);
+		bsdf_make_or_fail(&a, text, &b);
 		for (int i = 0; i < 2000; i++) {
 			vec3 wo = direction_above(&d), wi = direction_above(&d);
 			double want = 0.3 / PI + 0.4 * ward_formula(variants[k], 0.3, 0.5, wo, wi);
-			if (fabs(value(&b, wo, wi) / want - 1) > 1e-11)
-				fail_msg("%s: %.17g is not %.17g", text, value(&b, wo, wi), want);
+			if (fabs(eval_value(&b, wo, wi) / want - 1) > 1e-11)
+				fail_msg("%s: %.17g is not %.17g", text, eval_value(&b, wo, wi), want);
 			seen += want > 0.3 / PI * 1.1;
 		}
 		assert_true(seen > 100);
@@ -74,10 +74,11 @@ static void test_ward_defaults_and_scale(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	const vec3 up = {0, 0, 1};
-	bsdf_make(&a, "ward", &b);
-	assert_true(fabs(value(&b, up, up) / (0.5 / PI + 0.2 / (4 * PI * 0.01)) - 1) < 1e-12 && b.min_alpha == 0.1);
-	bsdf_make(&a, "ward diffuse_reflectance=0.8 specular_reflectance=0.4", &b);
-	assert_true(fabs(value(&b, up, up) / (0.99 / 1.2 * (0.8 / PI + 0.4 / (4 * PI * 0.01))) - 1) < 1e-12);
+	bsdf_make_or_fail(&a, "ward", &b);
+	assert_true(fabs(eval_value(&b, up, up) / (0.5 / PI + 0.2 / (4 * PI * 0.01)) - 1) < 1e-12 &&
+		    b.min_alpha == 0.1);
+	bsdf_make_or_fail(&a, "ward diffuse_reflectance=0.8 specular_reflectance=0.4", &b);
+	assert_true(fabs(eval_value(&b, up, up) / (0.99 / 1.2 * (0.8 / PI + 0.4 / (4 * PI * 0.01))) - 1) < 1e-12);
 	arena_fini(&a);
 }
 
@@ -105,23 +106,23 @@ static void test_a_mixture_is_a_sum(void **state)
 	struct arena a = {0};
 	struct bsdf part[3], b;
 	for (int i = 0; i < 3; i++)
-		bsdf_make(&a, parts[i], &part[i]);
+		bsdf_make_or_fail(&a, parts[i], &part[i]);
 	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
 		struct dice d = dice_for_test(cases[k].text);
-		bsdf_make(&a, cases[k].text, &b);
+		bsdf_make_or_fail(&a, cases[k].text, &b);
 		for (int i = 0; i < 500; i++) {
 			vec3 wo = direction_above(&d), wi = direction_above(&d);
 			double want = 0;
 			for (int j = 0; j < 3; j++)
-				want += cases[k].w[j] * value(&part[j], wo, wi);
-			assert_true(fabs(value(&b, wo, wi) - want) <= 1e-12 * want);
+				want += cases[k].w[j] * eval_value(&part[j], wo, wi);
+			assert_true(fabs(eval_value(&b, wo, wi) - want) <= 1e-12 * want);
 		}
 	}
 	arena_fini(&a);
 }
 
 /* The transmitting specular lobes of a blend all pass straight on, each with its share. */
-static void test_parts_that_let_light_through(void **state)
+static void straight_lobes_of_a_blend_have_their_shares(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -130,13 +131,13 @@ static void test_parts_that_let_light_through(void **state)
 	const unsigned straight = BSDF_TRANSMIT | BSDF_STRAIGHT;
 	vec3 wi;
 	double chance, whole;
-	bsdf_make(&a, "blendbsdf weight=0.25 | diffuse reflectance=0.8 | difftrans transmittance=0.4", &leaf);
+	bsdf_make_or_fail(&a, "blendbsdf weight=0.25 | diffuse reflectance=0.8 | difftrans transmittance=0.4", &leaf);
 	assert_true(leaf.is_two_sided && leaf.modes == (BSDF_REFLECT | BSDF_TRANSMIT) && leaf.eta == 1);
-	assert_true(fabs(value(&leaf, wo, front) - 0.75 * 0.8 / PI) < 1e-15);
-	assert_true(fabs(value(&leaf, wo, back) - 0.25 * 0.4 / PI) < 1e-15);
-	assert_true(value(&leaf, vec3_neg(wo), back) == value(&leaf, wo, front));
-	bsdf_make(&a, "thindielectric", &glass);
-	bsdf_make(&a, "blendbsdf weight=0.25 | thindielectric | null", &pane);
+	assert_true(fabs(eval_value(&leaf, wo, front) - 0.75 * 0.8 / PI) < 1e-15);
+	assert_true(fabs(eval_value(&leaf, wo, back) - 0.25 * 0.4 / PI) < 1e-15);
+	assert_true(eval_value(&leaf, vec3_neg(wo), back) == eval_value(&leaf, wo, front));
+	bsdf_make_or_fail(&a, "thindielectric", &glass);
+	bsdf_make_or_fail(&a, "blendbsdf weight=0.25 | thindielectric | null", &pane);
 	whole = bsdf_eval_delta(&glass, &point, wo, straight, &wi, &chance).v[0];
 	double through = bsdf_eval_delta(&pane, &point, wo, straight, &wi, &chance).v[0];
 	assert_true(fabs(through - (0.75 * whole + 0.25)) < 1e-14 && wi.z == -wo.z);
@@ -144,11 +145,11 @@ static void test_parts_that_let_light_through(void **state)
 }
 
 /* Exporters nest a twosided, or a coating of one, in another: both sides show the front of the innermost BSDF. */
-static void test_two_sides_of_two_sides(void **state)
+static void nested_twosided_shows_the_innermost_front(void **state)
 {
 	(void)state;
 	struct arena a = {0};
-	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	const struct bsdf_build build = {.arena = &a, .is_dialect_3 = true};
 	struct bsdf front, coated, nested, coat;
 	struct error e;
 	struct dice d = dice_for_test("two sides");
@@ -158,19 +159,19 @@ static void test_two_sides_of_two_sides(void **state)
 	node_add_child(&a, outer, node_make_bsdf(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
 	node_add_child(&a, layer, node_make_bsdf(&a, "twosided | roughconductor alpha=0.3"));
 	node_add_child(&a, over, layer);
-	bsdf_make(&a, "twosided | roughconductor alpha=0.3", &front);
-	bsdf_make(&a, "coating int_ior=1.3 | roughconductor alpha=0.3", &coated);
+	bsdf_make_or_fail(&a, "twosided | roughconductor alpha=0.3", &front);
+	bsdf_make_or_fail(&a, "coating int_ior=1.3 | roughconductor alpha=0.3", &coated);
 	assert_int_equal(bsdf_create(&nested, outer, &build, &e), 0);
 	assert_int_equal(bsdf_create(&coat, over, &build, &e), 0);
 	for (int i = 0; i < 500; i++) {
 		vec3 wo = direction_above(&d), wi = direction_above(&d), back_o = {wo.x, wo.y, -wo.z},
 		     back_i = {wi.x, wi.y, -wi.z};
-		double want = value(&front, wo, wi), layered = value(&coated, wo, wi);
+		double want = eval_value(&front, wo, wi), layered = eval_value(&coated, wo, wi);
 		seen += want > 0.01;
-		assert_true(value(&nested, wo, wi) == want && value(&nested, back_o, back_i) == want);
-		assert_true(value(&nested, wo, back_i) == 0 && value(&nested, back_o, wi) == 0);
-		assert_true(fabs(value(&coat, wo, wi) - layered) <= 1e-12 * layered);
-		assert_true(value(&coat, back_o, back_i) == value(&coat, wo, wi));
+		assert_true(eval_value(&nested, wo, wi) == want && eval_value(&nested, back_o, back_i) == want);
+		assert_true(eval_value(&nested, wo, back_i) == 0 && eval_value(&nested, back_o, wi) == 0);
+		assert_true(fabs(eval_value(&coat, wo, wi) - layered) <= 1e-12 * layered);
+		assert_true(eval_value(&coat, back_o, back_i) == eval_value(&coat, wo, wi));
 		double pdf = front.ops->pdf_solid(&front, &point, wo, wi);
 		assert_true(nested.ops->pdf_solid(&nested, &point, back_o, back_i) == pdf);
 	}
@@ -182,7 +183,7 @@ static void test_two_sides_of_two_sides(void **state)
 }
 
 /* 0.6 can be told not to scale weights above 1: then more light would be reflected than arrives. */
-static void test_more_than_all_is_refused(void **state)
+static void unscaled_weights_above_one_are_refused(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {
@@ -197,13 +198,14 @@ static void test_more_than_all_is_refused(void **state)
 		assert_int_equal(bsdf_try(&a, texts[i], false, &b, &e), -ERANGE);
 		assert_non_null(strstr(e.text, "(ensureEnergyConservation is false)"));
 	}
-	bsdf_make(&a, "phong diffuse_reflectance=0.6 specular_reflectance=0.4 ensure_energy_conservation=false", &b);
+	bsdf_make_or_fail(&a, "phong diffuse_reflectance=0.6 specular_reflectance=0.4 ensure_energy_conservation=false",
+			  &b);
 	arena_fini(&a);
 }
 
 /* (0.3, 0.7) is on a square of color1, or for numbers in Mitsuba 3 of color0. Textures that stand for colours do not
  * depend on the dialect: the opacity of 0.6, which may be a colour, and reflectances. */
-static void test_checkerboards_of_numbers(void **state)
+static void checkerboard_order_depends_on_the_dialect_for_numbers(void **state)
 {
 	(void)state;
 	static const struct {
@@ -224,7 +226,7 @@ static void test_checkerboards_of_numbers(void **state)
 		struct error e;
 		if (bsdf_try(&a, cases[i].text, cases[i].dialect_3, &b, &e))
 			fail_msg("%s: %s", cases[i].text, e.text);
-		double share = value(&b, wo, wi) * PI;
+		double share = eval_value(&b, wo, wi) * PI;
 		if (fabs(share - cases[i].expected) > 1e-9)
 			fail_msg("row %zu: %g, not %g", i, share, cases[i].expected);
 		arena_fini(&a);
@@ -232,7 +234,7 @@ static void test_checkerboards_of_numbers(void **state)
 }
 
 /* A red image as opacity is a colour in 0.6, and its luminance in 3.x. */
-static void test_a_coloured_opacity(void **state)
+static void coloured_opacity_depends_on_the_dialect(void **state)
 {
 	(void)state;
 	static const unsigned char red[] = "P6 1 1 255\n\xff\0\0";
@@ -240,7 +242,7 @@ static void test_a_coloured_opacity(void **state)
 	const struct asset_source assets = memory_assets(files);
 	for (int dialect_3 = 0; dialect_3 <= 1; dialect_3++) {
 		struct arena a = {0};
-		const struct bsdf_build build = {.arena = &a, .dialect_3 = dialect_3, .assets = &assets};
+		const struct bsdf_build build = {.arena = &a, .is_dialect_3 = dialect_3, .assets = &assets};
 		struct bsdf b;
 		struct error e;
 		if (bsdf_create(&b,
@@ -258,10 +260,14 @@ static void test_a_coloured_opacity(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ward_is_its_formula),	 cmocka_unit_test(test_ward_defaults_and_scale),
-		cmocka_unit_test(test_a_mixture_is_a_sum),	 cmocka_unit_test(test_parts_that_let_light_through),
-		cmocka_unit_test(test_more_than_all_is_refused), cmocka_unit_test(test_two_sides_of_two_sides),
-		cmocka_unit_test(test_checkerboards_of_numbers), cmocka_unit_test(test_a_coloured_opacity),
+		cmocka_unit_test(test_ward_is_its_formula),
+		cmocka_unit_test(test_ward_defaults_and_scale),
+		cmocka_unit_test(test_a_mixture_is_a_sum),
+		cmocka_unit_test(straight_lobes_of_a_blend_have_their_shares),
+		cmocka_unit_test(unscaled_weights_above_one_are_refused),
+		cmocka_unit_test(nested_twosided_shows_the_innermost_front),
+		cmocka_unit_test(checkerboard_order_depends_on_the_dialect_for_numbers),
+		cmocka_unit_test(coloured_opacity_depends_on_the_dialect),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,14 +7,14 @@
 #include <errno.h>
 #include <math.h>
 
-static struct relief_value value_of(const char *map, struct asset_source *assets, struct arena *a)
+static struct relief_sample value_of(const char *map, struct asset_source *assets, struct arena *a)
 {
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, map);
 	node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, "bitmap filename=p0 raw=true"));
 	node_add_child(a, n, node_make(a, PLUGIN_BSDF, "diffuse"));
-	const struct bsdf_build build = {.assets = assets, .arena = a, .dialect_3 = true};
+	const struct bsdf_build build = {.assets = assets, .arena = a, .is_dialect_3 = true};
 	struct bsdf b;
-	struct relief_value v;
+	struct relief_sample v;
 	struct error e;
 	if (bsdf_create(&b, n, &build, &e))
 		fail_msg("%s", e.text);
@@ -28,15 +28,15 @@ static void assert_vec(vec3 got, double x, double y, double z)
 		fail_msg("(%g %g %g) is not (%g %g %g)", got.x, got.y, got.z, x, y, z);
 }
 
-static void test_scale(void **state)
+static void scaled_map_equals_its_unscaled_equivalent(void **state)
 {
 	(void)state;
 	struct pictures p = {.count = 0};
 	struct arena a = {0};
 	pictures_add(&p, 2, 2, (const double[]){0.5, 0.25, 0.75, 0.75, 0.5, 0.5, 0.25, 0.75, 0.5, 0.5, 0.5, 0.75});
 	struct asset_source source = pictures_source(&p);
-	struct relief_value plain = value_of("normalmap", &source, &a),
-			    steep = value_of("normalmap scale=3", &source, &a);
+	struct relief_sample plain = value_of("normalmap", &source, &a),
+			     steep = value_of("normalmap scale=3", &source, &a);
 	assert_true(fabs(plain.x.y) > 0.01 && fabs(plain.du.y) > 0.01 && fabs(plain.dv.x) > 0.01);
 	assert_vec(steep.x, 3 * plain.x.x, 3 * plain.x.y, plain.x.z);
 	assert_vec(steep.du, 3 * plain.du.x, 3 * plain.du.y, plain.du.z);
@@ -45,7 +45,7 @@ static void test_scale(void **state)
 	pictures_fini(&p);
 }
 
-static struct scene_node *bent(struct arena *a, const char *map, const char *texture, const char *inner)
+static struct scene_node *node_with_normalmap(struct arena *a, const char *map, const char *texture, const char *inner)
 {
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, map);
 	node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, texture));
@@ -53,16 +53,17 @@ static struct scene_node *bent(struct arena *a, const char *map, const char *tex
 	return n;
 }
 
-static void test_one_color(void **state)
+static void map_of_one_color_equals_a_constant_texture(void **state)
 {
 	(void)state;
 	static const char even[] = "checkerboard color0=rgb(0.75,0.5,0.875) color1=rgb(0.75,0.5,0.875)";
 	struct arena a = {0};
-	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	const struct bsdf_build build = {.arena = &a, .is_dialect_3 = true};
 	struct bsdf of_texture, of_color;
-	struct relief_value wanted, got;
+	struct relief_sample wanted, got;
 	struct error e;
-	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap scale=2", even, "diffuse"), &build, &e), 0);
+	assert_int_equal(
+		bsdf_create(&of_texture, node_with_normalmap(&a, "normalmap scale=2", even, "diffuse"), &build, &e), 0);
 	assert_int_equal(bsdf_create(&of_color,
 				     node_make_bsdf(&a, "normalmap normalmap=rgb(0.75,0.5,0.875) scale=2 | diffuse"),
 				     &build, &e),
@@ -74,14 +75,15 @@ static void test_one_color(void **state)
 	assert_vec(got.dv, wanted.dv.x, wanted.dv.y, wanted.dv.z);
 	assert_vec(got.x, 1, 0, 0.75);
 	assert_false(of_texture.relief->uses_handedness);
-	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap handedness=true", even, "diffuse"), &build, &e),
+	assert_int_equal(bsdf_create(&of_texture, node_with_normalmap(&a, "normalmap handedness=true", even, "diffuse"),
+				     &build, &e),
 			 0);
 	assert_true(of_texture.relief->uses_handedness);
 	arena_fini(&a);
 }
 
-static int blend_of(const struct scene_node *first, const struct scene_node *second, struct arena *a, struct bsdf *b,
-		    struct error *e)
+static int make_blend(const struct scene_node *first, const struct scene_node *second, struct arena *a, struct bsdf *b,
+		      struct error *e)
 {
 	struct relief_map *bends = NULL;
 	/* Bump maps of 0.6, which have no shadowing function, because that depends on further frames. */
@@ -92,7 +94,7 @@ static int blend_of(const struct scene_node *first, const struct scene_node *sec
 	return bsdf_create(b, n, &build, e);
 }
 
-static void test_parts_that_bend_alike(void **state)
+static void parts_of_a_material_share_one_relief(void **state)
 {
 	(void)state;
 	static const char map[] = "bumpmap scale=0.5", tiles[] = "checkerboard color0=0.1";
@@ -107,20 +109,22 @@ static void test_parts_that_bend_alike(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	struct error e;
-	struct relief_value v, one;
-	struct scene_node *first = bent(&a, map, tiles, "diffuse");
-	assert_int_equal(blend_of(first, bent(&a, map, tiles, "phong"), &a, &b, &e), 0);
+	struct relief_sample v, one;
+	struct scene_node *first = node_with_normalmap(&a, map, tiles, "diffuse");
+	assert_int_equal(make_blend(first, node_with_normalmap(&a, map, tiles, "phong"), &a, &b, &e), 0);
 	b.relief->eval(b.relief->data, 0.4, 0.55, &v);
-	assert_int_equal(blend_of(first, first, &a, &b, &e), 0);
+	assert_int_equal(make_blend(first, first, &a, &b, &e), 0);
 	b.relief->eval(b.relief->data, 0.4, 0.55, &one);
 	assert_memory_equal(&v, &one, sizeof v);
 	assert_false(b.uses_relief_frames);
-	const struct scene_node *specular = bent(&a, map, tiles, "plastic");
+	const struct scene_node *specular = node_with_normalmap(&a, map, tiles, "plastic");
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-		assert_int_equal(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e), 0);
+		assert_int_equal(make_blend(first, node_with_normalmap(&a, others[i].map, others[i].texture, "phong"),
+					    &a, &b, &e),
+				 0);
 		assert_true(b.uses_relief_frames);
-		assert_true(blend_of(specular, bent(&a, others[i].map, others[i].texture, "conductor"), &a, &b, &e) <
-			    0);
+		assert_true(make_blend(specular, node_with_normalmap(&a, others[i].map, others[i].texture, "conductor"),
+				       &a, &b, &e) < 0);
 		assert_non_null(strstr(e.text, "bend normals differently"));
 	}
 	static const char *const colors[] = {"0.6,0.5,0.9", "0.6,0.5,0.9", "0.6,0.45,0.9"};
@@ -130,21 +134,22 @@ static void test_parts_that_bend_alike(void **state)
 		snprintf(text, sizeof text, "normalmap normalmap=rgb(%s) scale=0.5 | phong", colors[i]);
 		even[i] = node_make_bsdf(&a, text);
 	}
-	assert_int_equal(blend_of(even[0], even[1], &a, &b, &e), 0);
+	assert_int_equal(make_blend(even[0], even[1], &a, &b, &e), 0);
 	assert_false(b.uses_relief_frames);
-	assert_int_equal(blend_of(even[0], even[2], &a, &b, &e), 0);
+	assert_int_equal(make_blend(even[0], even[2], &a, &b, &e), 0);
 	assert_true(b.uses_relief_frames);
-	assert_int_equal(blend_of(even[0], bent(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
+	assert_int_equal(
+		make_blend(even[0], node_with_normalmap(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
 	assert_true(b.uses_relief_frames);
 	/* The surface has the normal of the part with the narrowest lobe; a part that lets light pass straight on needs
 	 * no normal. */
-	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
+	assert_int_equal(make_blend(first, specular, &a, &b, &e), 0);
 	assert_false(b.uses_relief_frames);
-	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);
+	assert_int_equal(make_blend(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);
 	assert_true(b.uses_relief_frames && b.relief);
-	assert_int_equal(blend_of(first, node_make(&a, PLUGIN_BSDF, "conductor"), &a, &b, &e), 0);
+	assert_int_equal(make_blend(first, node_make(&a, PLUGIN_BSDF, "conductor"), &a, &b, &e), 0);
 	assert_true(b.uses_relief_frames && !b.relief);
-	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
+	assert_int_equal(make_blend(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
 	assert_true(!b.uses_relief_frames && b.relief);
 	arena_fini(&a);
 }
@@ -157,7 +162,8 @@ static void test_nesting(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	struct error e;
-	struct scene_node *inner = bent(&a, map, tiles, "conductor"), *both = node_make_bsdf(&a, "twosided");
+	struct scene_node *inner = node_with_normalmap(&a, map, tiles, "conductor"),
+			  *both = node_make_bsdf(&a, "twosided");
 	struct scene_node *outer = node_make(&a, PLUGIN_BSDF, map);
 	node_add_child(&a, both, inner);
 	node_add_child(&a, outer, node_make(&a, PLUGIN_TEXTURE, tiles));
@@ -167,14 +173,14 @@ static void test_nesting(void **state)
 	assert_non_null(b.relief->under);
 	assert_null(b.relief->under->under);
 	assert_true(b.relief->under->flips_invalid_normals && !b.relief->flips_invalid_normals);
-	assert_int_equal(blend_of(inner, outer, &a, &b, &e), -ENOTSUP);
+	assert_int_equal(make_blend(inner, outer, &a, &b, &e), -ENOTSUP);
 	assert_non_null(strstr(e.text, "bend normals differently"));
-	assert_int_equal(blend_of(outer, outer, &a, &b, &e), 0);
+	assert_int_equal(make_blend(outer, outer, &a, &b, &e), 0);
 	assert_false(b.uses_relief_frames);
 	struct scene_node *same = node_make(&a, PLUGIN_BSDF, "bumpmap scale=0.5");
 	node_add_child(&a, same, node_make(&a, PLUGIN_TEXTURE, tiles));
-	node_add_child(&a, same, bent(&a, "bumpmap scale=0.5", tiles, "conductor"));
-	assert_int_equal(blend_of(same, same, &a, &b, &e), 0);
+	node_add_child(&a, same, node_with_normalmap(&a, "bumpmap scale=0.5", tiles, "conductor"));
+	assert_int_equal(make_blend(same, same, &a, &b, &e), 0);
 	assert_non_null(b.relief->under);
 	for (int depth = 2; depth <= 9; depth++) {
 		struct scene_node *around = node_make(&a, PLUGIN_BSDF, map);
@@ -189,8 +195,9 @@ static void test_nesting(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale), cmocka_unit_test(test_one_color),
-					   cmocka_unit_test(test_parts_that_bend_alike),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(scaled_map_equals_its_unscaled_equivalent),
+					   cmocka_unit_test(map_of_one_color_equals_a_constant_texture),
+					   cmocka_unit_test(parts_of_a_material_share_one_relief),
 					   cmocka_unit_test(test_nesting)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,10 +21,10 @@
 
 #include <cmocka.h>
 
-static const struct wavelengths nm = {.nm = {440, 510, 575, 700}};
-static const struct wavelengths rgb = {.is_rgb = true};
+static const struct wavelengths spectral_wavelengths = {.nm = {440, 510, 575, 700}};
+static const struct wavelengths rgb_wavelengths = {.is_rgb = true};
 
-struct made {
+struct made_bsdf {
 	struct memory_file files[2];
 	struct asset_source assets;
 	struct arena arena;
@@ -32,17 +32,17 @@ struct made {
 	struct error e;
 };
 
-static int try_bytes(struct made *m, const void *bytes, size_t size, const char *more)
+static int try_bytes(struct made_bsdf *m, const void *bytes, size_t size, const char *more)
 {
 	char text[100];
-	*m = (struct made){.files = {{"m.pbsdf", bytes, size}, {0}}};
+	*m = (struct made_bsdf){.files = {{"m.pbsdf", bytes, size}, {0}}};
 	m->assets = memory_assets(m->files);
-	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &m->assets};
+	const struct bsdf_build build = {.arena = &m->arena, .is_dialect_3 = true, .assets = &m->assets};
 	snprintf(text, sizeof text, "measured_polarized filename=m.pbsdf%s", more);
 	return bsdf_create(&m->b, node_make_bsdf(&m->arena, text), &build, &m->e);
 }
 
-static void make_or_fail(struct made *m, polarized_function *f, int phis, int thetas, const char *more)
+static void make_or_fail(struct made_bsdf *m, polarized_function *f, int phis, int thetas, const char *more)
 {
 	size_t size;
 	unsigned char *bytes = polarized_file_make(f, phis, thetas, &size);
@@ -51,7 +51,7 @@ static void make_or_fail(struct made *m, polarized_function *f, int phis, int th
 	free(bytes);
 }
 
-static spectrum value_of(const struct made *m, vec3 camera, vec3 light, const struct wavelengths *w)
+static spectrum value_of(const struct made_bsdf *m, vec3 camera, vec3 light, const struct wavelengths *w)
 {
 	const struct bsdf_point p = {.wavelengths = w, .transport = TRANSPORT_RADIANCE};
 	return m->b.ops->eval(&m->b, &p, camera, light);
@@ -66,28 +66,28 @@ static vec3 direction_above(struct dice *d)
 
 /* ---- values ---- */
 
-static double chalk_value(double phi_d, double theta_d, double theta_h, double at)
+static double lambertian_value(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)theta_h, (void)at;
 	return 0.5 / M_PI;
 }
 
-static void test_lambert(void **state)
+static void constant_table_is_lambertian(void **state)
 {
 	(void)state;
-	struct made m;
+	struct made_bsdf m;
 	struct dice d = dice_for_test("a constant table");
-	const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_RADIANCE};
+	const struct bsdf_point p = {.wavelengths = &spectral_wavelengths, .transport = TRANSPORT_RADIANCE};
 	size_t samples = dice_scaled_count(40000);
 	double sum = 0, square = 0;
-	make_or_fail(&m, chalk_value, 3, 3, " alpha_sample=0.3");
+	make_or_fail(&m, lambertian_value, 3, 3, " alpha_sample=0.3");
 	for (int i = 0; i < 1000; i++) {
 		vec3 a = direction_above(&d), b = direction_above(&d);
-		spectrum f = value_of(&m, a, b, &nm), g = value_of(&m, a, b, &rgb);
+		spectrum f = value_of(&m, a, b, &spectral_wavelengths), g = value_of(&m, a, b, &rgb_wavelengths);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			assert_true(fabs(f.v[l] / (0.5 / M_PI) - 1) < 1e-6 && fabs(g.v[l] / (0.5 / M_PI) - 1) < 1e-6);
 		b.z = -b.z;
-		assert_true(spectrum_is_zero(value_of(&m, a, b, &nm)));
+		assert_true(spectrum_is_zero(value_of(&m, a, b, &spectral_wavelengths)));
 	}
 	/* The reflected share of all light. */
 	for (size_t i = 0; i < samples; i++) {
@@ -104,25 +104,25 @@ static void test_lambert(void **state)
 }
 
 /* The values are linear along each axis, so the table is exact. */
-static double by_theta_h(double phi_d, double theta_d, double theta_h, double at)
+static double linear_in_theta_h(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)at;
 	return theta_h;
 }
 
-static double by_theta_d(double phi_d, double theta_d, double theta_h, double at)
+static double linear_in_theta_d(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_h, (void)at;
 	return theta_d;
 }
 
-static double by_phi_d(double phi_d, double theta_d, double theta_h, double at)
+static double linear_in_phi_d(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)theta_d, (void)theta_h, (void)at;
 	return phi_d + 4;
 }
 
-static double by_wavelength(double phi_d, double theta_d, double theta_h, double at)
+static double linear_in_wavelength(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d, (void)theta_h;
 	return at;
@@ -142,12 +142,12 @@ static void rusinkiewicz(vec3 light, vec3 camera, double angle[3])
 	angle[2] = theta;
 }
 
-static void test_angles(void **state)
+static void tables_are_read_at_rusinkiewicz_angles(void **state)
 {
 	(void)state;
-	static polarized_function *const tables[] = {by_phi_d, by_theta_d, by_theta_h};
+	static polarized_function *const tables[] = {linear_in_phi_d, linear_in_theta_d, linear_in_theta_h};
 	for (int k = 0; k < 3; k++) {
-		struct made m;
+		struct made_bsdf m;
 		struct dice d = dice_for_test("angles of a table");
 		make_or_fail(&m, tables[k], 13, 7, "");
 		for (int i = 0; i < 1000; i++) {
@@ -155,29 +155,30 @@ static void test_angles(void **state)
 			double angle[3];
 			rusinkiewicz(light, camera, angle);
 			double wanted = tables[k](angle[0], angle[1], angle[2], 0);
-			spectrum f = value_of(&m, camera, light, &nm);
+			spectrum f = value_of(&m, camera, light, &spectral_wavelengths);
 			assert_true(fabs(f.v[0] - wanted) < 1e-5);
 			/* From a light, with the directions exchanged. */
-			const struct bsdf_point p = {.wavelengths = &nm, .transport = TRANSPORT_IMPORTANCE};
+			const struct bsdf_point p = {.wavelengths = &spectral_wavelengths,
+						     .transport = TRANSPORT_IMPORTANCE};
 			assert_true(m.b.ops->eval(&m.b, &p, light, camera).v[0] == f.v[0]);
 		}
 		/* Directions for which angles are undefined: h along the normal, and the light at the camera. */
 		vec3 up = {0, 0, 1}, aside = {0.6, 0, 0.8};
-		assert_true(isfinite(value_of(&m, up, up, &nm).v[0]));
-		assert_true(isfinite(value_of(&m, aside, aside, &nm).v[0]));
-		assert_true(isfinite(value_of(&m, aside, (vec3){-0.6, 0, 0.8}, &nm).v[0]));
+		assert_true(isfinite(value_of(&m, up, up, &spectral_wavelengths).v[0]));
+		assert_true(isfinite(value_of(&m, aside, aside, &spectral_wavelengths).v[0]));
+		assert_true(isfinite(value_of(&m, aside, (vec3){-0.6, 0, 0.8}, &spectral_wavelengths).v[0]));
 		arena_fini(&m.arena);
 	}
 }
 
-static void test_wavelengths(void **state)
+static void values_are_linear_in_wavelength(void **state)
 {
 	(void)state;
-	struct made m;
+	struct made_bsdf m;
 	vec3 a = {0.6, 0, 0.8}, b = {0, 0.28, 0.96};
 	const double wanted[SPECTRUM_LANES] = {450, 510, 575, 650};
-	make_or_fail(&m, by_wavelength, 3, 3, "");
-	spectrum f = value_of(&m, a, b, &nm), colour = value_of(&m, a, b, &rgb);
+	make_or_fail(&m, linear_in_wavelength, 3, 3, "");
+	spectrum f = value_of(&m, a, b, &spectral_wavelengths), colour = value_of(&m, a, b, &rgb_wavelengths);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		assert_true(fabs(f.v[l] / wanted[l] - 1) < 1e-6);
 	assert_true(colour.v[0] > colour.v[1] && colour.v[1] > colour.v[2]);
@@ -188,9 +189,9 @@ static void test_wavelengths(void **state)
 		double value;
 	} single[] = {{" wavelength=520", 520}, {" wavelength=100", 450}, {" wavelength=5000", 650}};
 	for (size_t i = 0; i < sizeof single / sizeof *single; i++) {
-		make_or_fail(&m, by_wavelength, 3, 3, single[i].more);
-		f = value_of(&m, a, b, &nm);
-		colour = value_of(&m, a, b, &rgb);
+		make_or_fail(&m, linear_in_wavelength, 3, 3, single[i].more);
+		f = value_of(&m, a, b, &spectral_wavelengths);
+		colour = value_of(&m, a, b, &rgb_wavelengths);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			assert_true(fabs(f.v[l] / single[i].value - 1) < 1e-6 && colour.v[l] == f.v[l]);
 		assert_true(m.b.color_kind == COLOR_KIND_CONSTANT);
@@ -199,7 +200,7 @@ static void test_wavelengths(void **state)
 }
 
 /* Negative values among others, and values that were not measured. */
-static double with_holes(double phi_d, double theta_d, double theta_h, double at)
+static double value_with_holes(double phi_d, double theta_d, double theta_h, double at)
 {
 	(void)phi_d, (void)theta_d;
 	return theta_h > 1 ? NAN : at > 600 ? -1 : at > 550 ? 1 : 2;
@@ -211,13 +212,13 @@ static double green_value(double phi_d, double theta_d, double theta_h, double a
 	return at < 480 || at > 620 ? NAN : 1;
 }
 
-static void test_holes(void **state)
+static void negative_and_missing_values_are_black(void **state)
 {
 	(void)state;
-	struct made m;
+	struct made_bsdf m;
 	const struct wavelengths w = {.nm = {500, 600, 620, 640}};
 	vec3 up = {0, 0, 1}, low = {1, 0, 1e-3};
-	make_or_fail(&m, with_holes, 3, 9, "");
+	make_or_fail(&m, value_with_holes, 3, 9, "");
 	spectrum f = value_of(&m, up, up, &w);
 	assert_true(fabs(f.v[0] - 2) < 1e-6 && fabs(f.v[1] - 1) < 1e-6 && fabs(f.v[2] - 0.2) < 1e-6 && f.v[3] == 0);
 	low = vec3_normalize(low);
@@ -233,13 +234,13 @@ static void test_holes(void **state)
 
 /* ---- broken files ---- */
 
-static void test_truncated_and_mangled(void **state)
+static void truncated_or_damaged_files_are_refused(void **state)
 {
 	(void)state;
 	size_t size;
-	unsigned char *bytes = polarized_file_make(chalk_value, 3, 2, &size), *copy = malloc(size);
+	unsigned char *bytes = polarized_file_make(lambertian_value, 3, 2, &size), *copy = malloc(size);
 	for (size_t end = 0; end < size; end += end < 400 ? 1 : 37) {
-		struct made m;
+		struct made_bsdf m;
 		unsigned char *part = malloc(end ? end : 1); /* so that a sanitizer detects reads beyond its end */
 		memcpy(part, bytes, end);
 		assert_int_equal(try_bytes(&m, part, end, ""), -EINVAL);
@@ -249,7 +250,7 @@ static void test_truncated_and_mangled(void **state)
 	int refused = 0;
 	for (size_t i = 0; i < 300; i++)
 		for (unsigned bit = 0; bit < 8; bit++) {
-			struct made m;
+			struct made_bsdf m;
 			memcpy(copy, bytes, size);
 			copy[i] ^= (unsigned char)(1U << bit);
 			int code = try_bytes(&m, copy, size, "");
@@ -263,7 +264,7 @@ static void test_truncated_and_mangled(void **state)
 }
 
 /* A byte of the description of an array, after its name, is changed. */
-static void test_sizes(void **state)
+static void changed_array_descriptions_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -281,9 +282,9 @@ static void test_sizes(void **state)
 		{"theta_d", 11, 0, "theta_d has a side of 0"},
 	};
 	size_t size;
-	unsigned char *bytes = polarized_file_make(chalk_value, 3, 2, &size), *copy = malloc(size);
+	unsigned char *bytes = polarized_file_make(lambertian_value, 3, 2, &size), *copy = malloc(size);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct made m;
+		struct made_bsdf m;
 		memcpy(copy, bytes, size);
 		size_t at = 18, length = strlen(cases[i].array);
 		while (memcmp(copy + at, cases[i].array, length) != 0)
@@ -296,7 +297,7 @@ static void test_sizes(void **state)
 	}
 	/* Three by four numbers instead of matrices. */
 	struct tensor t;
-	struct made m;
+	struct made_bsdf m;
 	memcpy(copy, bytes, size);
 	assert_int_equal(tensor_find(copy, size, "M", &t), 0);
 	size_t at = 18;
@@ -323,12 +324,12 @@ static void test_sizes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lambert),
-		cmocka_unit_test(test_angles),
-		cmocka_unit_test(test_wavelengths),
-		cmocka_unit_test(test_holes),
-		cmocka_unit_test(test_truncated_and_mangled),
-		cmocka_unit_test(test_sizes),
+		cmocka_unit_test(constant_table_is_lambertian),
+		cmocka_unit_test(tables_are_read_at_rusinkiewicz_angles),
+		cmocka_unit_test(values_are_linear_in_wavelength),
+		cmocka_unit_test(negative_and_missing_values_are_black),
+		cmocka_unit_test(truncated_or_damaged_files_are_refused),
+		cmocka_unit_test(changed_array_descriptions_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,8 +22,8 @@ static void expect_equal(const char *a, const char *b, double below, double fact
 {
 	struct arena arena = {0};
 	struct bsdf x, y;
-	bsdf_make(&arena, a, &x);
-	bsdf_make(&arena, b, &y);
+	bsdf_make_or_fail(&arena, a, &x);
+	bsdf_make_or_fail(&arena, b, &y);
 	size_t positive = 0;
 	for (int i = 0; i < 400; i++) {
 		vec3 wo = direction(0.03 + 0.96 * (i % 20) / 20, 0.4),
@@ -57,12 +57,12 @@ static void test_metal_is_schlick_over_ggx(void **state)
 	(void)state;
 	struct arena a = {0};
 	struct bsdf metal, mirror;
-	bsdf_make(&a, "principled base_color=0.3 roughness=0.6 metallic=1 anisotropic=0.5", &metal);
+	bsdf_make_or_fail(&a, "principled base_color=0.3 roughness=0.6 metallic=1 anisotropic=0.5", &metal);
 	double aspect = sqrt(1 - 0.9 * 0.5);
 	char text[128];
 	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha_u=%.17g alpha_v=%.17g",
 		 0.36 / aspect, 0.36 * aspect);
-	bsdf_make(&a, text, &mirror);
+	bsdf_make_or_fail(&a, text, &mirror);
 	for (int i = 0; i < 300; i++) {
 		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
 		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
@@ -81,15 +81,16 @@ static void check_diffuse(const char *parameters, double (*expected)(vec3 wo, ve
 	struct bsdf full, black;
 	char text[128];
 	snprintf(text, sizeof text, "principled base_color=0.6 %s", parameters);
-	bsdf_make(&a, text, &full);
+	bsdf_make_or_fail(&a, text, &full);
 	snprintf(text, sizeof text, "principled base_color=0 %s", parameters);
-	bsdf_make(&a, text, &black);
+	bsdf_make_or_fail(&a, text, &black);
 	for (int i = 0; i < 300; i++) {
 		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
 		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
 		double even = 0.6 / PI * expected(wo, wi);
-		double told = full.ops->eval(&full, &point, wo, wi).v[1] - black.ops->eval(&black, &point, wo, wi).v[1];
-		assert_true(fabs(told - even) <= 1e-9 * even);
+		double actual =
+			full.ops->eval(&full, &point, wo, wi).v[1] - black.ops->eval(&black, &point, wo, wi).v[1];
+		assert_true(fabs(actual - even) <= 1e-9 * even);
 	}
 	arena_fini(&a);
 }
@@ -111,38 +112,38 @@ static double lambert_factor(vec3 wo, vec3 wi)
 }
 
 /* A coloured reflection, with eta 3: Schlick's factor for each wavelength. */
-static double lamberts_below_colour(vec3 wo, vec3 wi)
+static double lambert_below_coloured_reflection(vec3 wo, vec3 wi)
 {
 	double c = sqrt((1 + vec3_dot(wo, wi)) / 2), f0 = 0.5 * 0.25;
 	return 1 - (f0 + (1 - f0) * pow(1 - c, 5));
 }
 
-static void test_diffuse(void **state)
+static void diffuse_lobes_follow_their_formulas(void **state)
 {
 	(void)state;
 	check_diffuse("roughness=0.7", burley_factor);
 	check_diffuse("roughness=0.7 eta=1.5 lambertian=true", lambert_factor);
-	check_diffuse("roughness=0.7 eta=3 lambertian=true specular_color=0.5", lamberts_below_colour);
+	check_diffuse("roughness=0.7 eta=3 lambertian=true specular_color=0.5", lambert_below_coloured_reflection);
 }
 
 /* The half vectors of the clearcoat are a distribution: the integral of D cos over the hemisphere is 1. The value that
  * the clearcoat adds is computed by hand for one pair. */
-static void test_clearcoat(void **state)
+static void clearcoat_is_a_normalised_distribution(void **state)
 {
 	(void)state;
 	enum { STEPS = 200000 };
 	struct arena a = {0};
 	struct bsdf coated, bare;
-	bsdf_make(&a, "principled base_color=0.2 clearcoat=1 clearcoat_gloss=0.5", &coated);
-	bsdf_make(&a, "principled base_color=0.2", &bare);
+	bsdf_make_or_fail(&a, "principled base_color=0.2 clearcoat=1 clearcoat_gloss=0.5", &coated);
+	bsdf_make_or_fail(&a, "principled base_color=0.2", &bare);
 	double alpha = 0.5 * (0.1 + 0.001), sum = 0;
 	for (int i = 0; i < STEPS;
 	     i++) { /* mirrored pairs with half vector h at cosine c: f = F D G1 G1 / 4 with wo = wi = h */
 		double c = (i + 0.5) / STEPS, a2 = alpha * alpha;
 		vec3 h = direction(c, 0.2);
-		double told = coated.ops->eval(&coated, &point, h, h).v[0] - bare.ops->eval(&bare, &point, h, h).v[0];
+		double actual = coated.ops->eval(&coated, &point, h, h).v[0] - bare.ops->eval(&bare, &point, h, h).v[0];
 		double tan2 = (1 - c * c) / (c * c), g1 = 2 / (1 + sqrt(1 + 0.0625 * tan2));
-		double d = told * 4 / (0.04 * g1 * g1);
+		double d = actual * 4 / (0.04 * g1 * g1);
 		double gtr1 = (a2 - 1) / (PI * log(a2)) / (1 + (a2 - 1) * c * c);
 		if (d > 1e-6 && fabs(d / gtr1 - 1) > 1e-4)
 			fail_msg("at cosine %g: D = %g, GTR1 %g", c, d, gtr1);
@@ -154,14 +155,15 @@ static void test_clearcoat(void **state)
 
 /* A coat over a metal, whose lobe is known without the coat: the coat adds GGX with Schlick's factor, as in
  * `roughconductor`, and the metal loses the reflected share on the way in and on the way out. */
-static void test_coat(void **state)
+static void clearcoat_adds_ggx_and_dims_the_metal(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf coated, bare, layer;
-	bsdf_make(&a, "principled base_color=0.3 metallic=1 roughness=0.8 coat=0.6 coat_roughness=0.5", &coated);
-	bsdf_make(&a, "principled base_color=0.3 metallic=1 roughness=0.8", &bare);
-	bsdf_make(&a, "roughconductor material=none distribution=ggx alpha=0.25", &layer);
+	bsdf_make_or_fail(&a, "principled base_color=0.3 metallic=1 roughness=0.8 coat=0.6 coat_roughness=0.5",
+			  &coated);
+	bsdf_make_or_fail(&a, "principled base_color=0.3 metallic=1 roughness=0.8", &bare);
+	bsdf_make_or_fail(&a, "roughconductor material=none distribution=ggx alpha=0.25", &layer);
 	for (int i = 0; i < 300; i++) {
 		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
 		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
@@ -171,21 +173,22 @@ static void test_coat(void **state)
 			reflects[k] = 0.6 * (0.04 + 0.96 * pow(1 - at[k], 5));
 		double expected = (1 - reflects[0]) * (1 - reflects[1]) * bare.ops->eval(&bare, &point, wo, wi).v[0] +
 				  reflects[2] * layer.ops->eval(&layer, &point, wo, wi).v[0];
-		double told = coated.ops->eval(&coated, &point, wo, wi).v[0];
-		assert_true(fabs(told - expected) <= 1e-9 * expected);
+		double actual = coated.ops->eval(&coated, &point, wo, wi).v[0];
+		assert_true(fabs(actual - expected) <= 1e-9 * expected);
 	}
 	arena_fini(&a);
 }
 
 /* Light that enters or leaves glass crosses the coat once, above the surface. */
-static void test_coat_on_glass(void **state)
+static void light_through_glass_crosses_the_coat_once(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf coated, bare;
 	int pass = 0;
-	bsdf_make(&a, "principled base_color=1 spec_trans=1 roughness=0.9 coat=0.6 coat_roughness=0.5", &coated);
-	bsdf_make(&a, "principled base_color=1 spec_trans=1 roughness=0.9", &bare);
+	bsdf_make_or_fail(&a, "principled base_color=1 spec_trans=1 roughness=0.9 coat=0.6 coat_roughness=0.5",
+			  &coated);
+	bsdf_make_or_fail(&a, "principled base_color=1 spec_trans=1 roughness=0.9", &bare);
 	for (int i = 0; i < 100; i++) {
 		vec3 above = direction(0.1 + 0.8 * (i % 10) / 10, 1),
 		     below = vec3_neg(direction(0.15 + 0.08 * (i / 10), 0.7));
@@ -202,7 +205,7 @@ static void test_coat_on_glass(void **state)
 	arena_fini(&a);
 }
 
-static void test_specular_is_an_index(void **state)
+static void specular_parameter_is_an_index(void **state)
 {
 	(void)state;
 	/* 0.08 x 0.5 at normal incidence is an index of 1.5. */
@@ -223,7 +226,7 @@ static void test_specular_color(void **state)
 		     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
 }
 
-static double value(const char *text, vec3 wo, vec3 wi);
+static double eval_value(const char *text, vec3 wo, vec3 wi);
 
 /* Returns F of KHR_materials_specular for an index of 1.6, a strength of 0.4 and a colour of 0.5. */
 static double scaled_schlick(double cosine)
@@ -232,7 +235,7 @@ static double scaled_schlick(double cosine)
 	return 0.4 * (f0 + (1 - f0) * pow(1 - cosine, 5));
 }
 
-static double unscaled(double cosine)
+static double unscaled_reflectance(double cosine)
 {
 	double t = sqrt(1 - (1 - cosine * cosine) / (1.6 * 1.6));
 	double s = (cosine - 1.6 * t) / (cosine + 1.6 * t), p = (t - 1.6 * cosine) / (t + 1.6 * cosine);
@@ -255,7 +258,7 @@ static void test_specular_strength_of_glass(void **state)
 		bool below = i % 2, refracts = i % 3 == 0;
 		wo.z = below ? -wo.z : wo.z;
 		wi.z = below != refracts ? -wi.z : wi.z;
-		double bare = value(glass, wo, wi), got = value(scaled, wo, wi), cosine;
+		double bare = eval_value(glass, wo, wi), got = eval_value(scaled, wo, wi), cosine;
 		if (refracts) {
 			vec3 out = below ? wi : wo, in = below ? wo : wi,
 			     h = vec3_normalize(vec3_madd(vec3_scale(1.6, in), 1, out));
@@ -264,7 +267,8 @@ static void test_specular_strength_of_glass(void **state)
 			double c2 = (1 + vec3_dot(wo, wi)) / 2, s2 = (1 - c2) * (below ? 1.6 * 1.6 : 1);
 			cosine = s2 < 1 ? sqrt(1 - s2) : -1;
 		}
-		double f = cosine < 0 ? 1 : scaled_schlick(cosine), of_glass = cosine < 0 ? 1 : unscaled(cosine);
+		double f = cosine < 0 ? 1 : scaled_schlick(cosine),
+		       of_glass = cosine < 0 ? 1 : unscaled_reflectance(cosine);
 		double want = bare * (refracts ? (1 - f) / (1 - of_glass) : f / of_glass);
 		if (!(fabs(got - want) <= 1e-9 * want))
 			fail_msg("from %g to %g: %.17g is not %.17g", wo.z, wi.z, got, want);
@@ -283,7 +287,7 @@ static void test_total_reflection_is_sampled(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	int seen = 0;
-	bsdf_make(&a, "principled base_color=1 roughness=0.9 spec_trans=1 eta=1.6 specular_strength=0", &b);
+	bsdf_make_or_fail(&a, "principled base_color=1 roughness=0.9 spec_trans=1 eta=1.6 specular_strength=0", &b);
 	for (int i = 0; i < 400; i++) {
 		vec3 wo = direction(-0.81 - 0.009 * (i % 20), 0.4), wi = direction(-0.05 - 0.04 * (i / 20), 3.5);
 		double f = b.ops->eval(&b, &point, wo, wi).v[0], pdf = b.ops->pdf_solid(&b, &point, wo, wi);
@@ -295,7 +299,7 @@ static void test_total_reflection_is_sampled(void **state)
 	arena_fini(&a);
 	/* Mirrored near the critical angle, whose cosine is 0.866: half of the facets or fewer reflect totally. */
 	a = (struct arena){0};
-	bsdf_make(&a, "principled base_color=1 roughness=0.4 spec_trans=1 eta=2 specular_strength=0", &b);
+	bsdf_make_or_fail(&a, "principled base_color=1 roughness=0.4 spec_trans=1 eta=2 specular_strength=0", &b);
 	for (int i = 0; i < 20; i++) {
 		vec3 wo = direction(-0.87 - 0.004 * i, 0.4), wi = direction(-0.83 + 0.02 * i / 20, 0.4 + PI);
 		double f = b.ops->eval(&b, &point, wo, wi).v[0], pdf = b.ops->pdf_solid(&b, &point, wo, wi);
@@ -322,7 +326,7 @@ static void test_specular_strength(void **state)
 }
 
 /* A texture with one value is equivalent to the number, and a varying one to the number at each point. */
-static void test_metallic_texture(void **state)
+static void textured_metallic_equals_its_number(void **state)
 {
 	(void)state;
 	expect_equal(
@@ -352,7 +356,7 @@ static void test_metallic_texture(void **state)
 }
 
 /* A colour in the place of a number is the mean of its components, whatever the wavelengths. */
-static void test_colours_as_numbers(void **state)
+static void colour_in_place_of_a_number_is_its_mean(void **state)
 {
 	(void)state;
 	expect_equal("principled base_color=0.7 roughness=rgb(0.2,0.3,0.7) metallic=rgb(0.6,0.5,0.4)",
@@ -366,11 +370,11 @@ static void test_colours_as_numbers(void **state)
 		     "principled base_color=0.7 roughness=0.4", 0, 1);
 }
 
-static double value(const char *text, vec3 wo, vec3 wi)
+static double eval_value(const char *text, vec3 wo, vec3 wi)
 {
 	struct arena a = {0};
 	struct bsdf b;
-	bsdf_make(&a, text, &b);
+	bsdf_make_or_fail(&a, text, &b);
 	double f = b.ops->eval(&b, &point, wo, wi).v[0];
 	arena_fini(&a);
 	return f;
@@ -378,35 +382,36 @@ static double value(const char *text, vec3 wo, vec3 wi)
 
 /* The thin sheet reflects like the rough boundary, transmits like a boundary of another roughness reflects (with
  * Fresnel's transmittance), and scatters the rest diffusely to both sides; likewise from below. */
-static void test_a_thin_sheet(void **state)
+static void thin_sheet_has_reflection_transmission_and_diffusion(void **state)
 {
 	(void)state;
 	const vec3 wo = direction(0.7, 0.3), wi = direction(0.5, 2.9), through = {wi.x, wi.y, -wi.z};
 	const double narrow = 0.36 * (0.65 * 1.5 - 0.35) * (0.65 * 1.5 - 0.35); /* alpha of roughness 0.6, scaled */
 	char text[160];
-	double mirror = value("roughconductor material=none distribution=ggx alpha=0.36", wo, wi),
-	       boundary = value("roughdielectric int_ior=1.5 ext_ior=1 distribution=ggx alpha=0.36", wo, wi);
+	double mirror = eval_value("roughconductor material=none distribution=ggx alpha=0.36", wo, wi),
+	       boundary = eval_value("roughdielectric int_ior=1.5 ext_ior=1 distribution=ggx alpha=0.36", wo, wi);
 	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha=%.17g", narrow);
-	double turned = value(text, wo, wi);
-	double sheet = value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, wi),
-	       passed = value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, through);
+	double turned = eval_value(text, wo, wi);
+	double sheet = eval_value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, wi),
+	       passed = eval_value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, through);
 	assert_true(fabs(sheet / boundary - 1) < 1e-12);
 	assert_true(fabs(passed / (0.8 * turned * (1 - boundary / mirror)) - 1) < 1e-12);
-	assert_true(fabs(value("principledthin diff_trans=2 base_color=0.8", wo, through) / (0.8 / PI) - 1) < 1e-12);
-	assert_true(value("principledthin diff_trans=2 base_color=0.8", wo, wi) == 0);
-	double all =
-		value("principledthin spec_trans=0.3 diff_trans=0.5 roughness=0.6 base_color=0.8 sheen=0.5", wo, wi);
-	double thick = value("principled roughness=0.6 base_color=0.8 sheen=0.5 eta=1.5", wo, wi) -
-		       value("principled roughness=0.6 base_color=0 eta=1.5", wo, wi);
+	assert_true(fabs(eval_value("principledthin diff_trans=2 base_color=0.8", wo, through) / (0.8 / PI) - 1) <
+		    1e-12);
+	assert_true(eval_value("principledthin diff_trans=2 base_color=0.8", wo, wi) == 0);
+	double all = eval_value("principledthin spec_trans=0.3 diff_trans=0.5 roughness=0.6 base_color=0.8 sheen=0.5",
+				wo, wi);
+	double thick = eval_value("principled roughness=0.6 base_color=0.8 sheen=0.5 eta=1.5", wo, wi) -
+		       eval_value("principled roughness=0.6 base_color=0 eta=1.5", wo, wi);
 	assert_true(fabs(all / (0.3 * boundary + 0.7 * 0.75 * thick) - 1) < 1e-9);
-	assert_true(fabs(value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", vec3_neg(wo),
-			       vec3_neg(through)) /
+	assert_true(fabs(eval_value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", vec3_neg(wo),
+				    vec3_neg(through)) /
 				 passed -
 			 1) < 1e-13);
 }
 
 /* Textures with the same value everywhere are equivalent to numbers. */
-static void test_a_sheet_of_textures(void **state)
+static void constant_textures_of_a_thin_sheet_equal_numbers(void **state)
 {
 	(void)state;
 	expect_equal(
@@ -424,9 +429,10 @@ static void test_a_sheet_of_textures(void **state)
 	arena_fini(&a);
 }
 
-struct recipe {
-	bool thin;
-	double eta, metallic, spec_tint, anisotropic, clearcoat, gloss, sheen, spec_trans, flatness, diff_trans;
+struct principled_parameters {
+	bool is_thin;
+	double eta, metallic, spec_tint, anisotropic, clearcoat, clearcoat_gloss, sheen, spec_trans, flatness,
+		diff_trans;
 };
 
 static double schlick_factor(double c)
@@ -448,7 +454,7 @@ static double ggx_g1(vec3 v, double ax, double ay)
 
 /* Returns f times the cosine of wi for light reflected above the surface, with base_color 0.5 and roughness 0.5,
  * written out from Mitsuba 3's documentation and Burley. wo need not be a unit vector. */
-static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
+static double principled_formula(const struct principled_parameters *r, vec3 wo, vec3 wi)
 {
 	double aspect = sqrt(1 - 0.9 * r->anisotropic), ax = 0.25 / aspect, ay = 0.25 * aspect;
 	vec3 h = vec3_normalize(vec3_add(wo, wi));
@@ -464,9 +470,9 @@ static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 	       flat = 1.25 * (fss * (1 / (wo.z + wi.z) - 0.5) + 0.5), round = (1 - 0.5 * fi) * (1 - 0.5 * fo) + retro;
 	double diffuse = wi.z * 0.5 / PI * (round + r->flatness * (flat - round)),
 	       sheen = r->sheen * schlick_factor(cd) * wi.z;
-	if (r->thin)
+	if (r->is_thin)
 		return r->spec_trans * facets + (1 - r->spec_trans) * (1 - 0.5 * r->diff_trans) * (diffuse + sheen);
-	double a = 0.1 + (0.001 - 0.1) * r->gloss,
+	double a = 0.1 + (0.001 - 0.1) * r->clearcoat_gloss,
 	       gtr1 = (a * a - 1) / (PI * log(a * a) * (1 + (a * a - 1) * h.z * h.z));
 	double far = 0.25 * sqrt(1 - wi.z * wi.z), near = 0.25 * sqrt(fmax(1 - wo.z * wo.z, 0));
 	double coat = 0.25 * r->clearcoat * (0.04 + 0.96 * schlick_factor(c)) * gtr1 *
@@ -476,12 +482,12 @@ static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 
 /* The formula gives the values that Mitsuba 3's tests of these plug-ins expect for wo = (1, 0, 1), which is not
  * normalised there; the plug-ins give the values of the formula. */
-static void test_all_together(void **state)
+static void plugins_agree_with_the_whole_formula(void **state)
 {
 	(void)state;
 	const struct {
 		const char *text;
-		struct recipe r;
+		struct principled_parameters r;
 		double mitsubas[4]; /* for wi at 0, 6, 12 and 18 nineteenths of 90 degrees */
 	} cases[] = {
 		{"principled base_color=0.5 metallic=0.3 spec_tint=0.6 specular=0.4 anisotropic=0.3 clearcoat=0.3 "
@@ -491,14 +497,14 @@ static void test_all_together(void **state)
 		  .spec_tint = 0.6,
 		  .anisotropic = 0.3,
 		  .clearcoat = 0.3,
-		  .gloss = 0.5,
+		  .clearcoat_gloss = 0.5,
 		  .sheen = 0.9,
 		  .spec_trans = 0.5,
 		  .flatness = 0.5},
 		 {0.06804995983839, 0.04951376467943, 0.03173548728228, 0.00609156163409}},
 		{"principledthin base_color=0.5 eta=1.5 anisotropic=0.5 sheen=0.5 sheen_tint=0.2 spec_trans=0.5 flatness=0.5 "
 		 "diff_trans=0.6",
-		 {.thin = true,
+		 {.is_thin = true,
 		  .eta = 1.5,
 		  .anisotropic = 0.5,
 		  .sheen = 0.5,
@@ -510,17 +516,17 @@ static void test_all_together(void **state)
 	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, cases[k].text, &b);
+		bsdf_make_or_fail(&a, cases[k].text, &b);
 		for (int i = 0; i < 4; i++) {
 			double t = 6 * i * PI / 38,
-			       got = written_out(&cases[k].r, (vec3){1, 0, 1}, (vec3){sin(t), 0, cos(t)});
+			       got = principled_formula(&cases[k].r, (vec3){1, 0, 1}, (vec3){sin(t), 0, cos(t)});
 			assert_true(fabs(got / cases[k].mitsubas[i] - 1) < 1e-5);
 		}
 		for (int i = 0; i < 400; i++) {
 			vec3 wo = direction(0.05 + 0.9 * (i % 20) / 20, 0.4),
 			     wi = direction(0.05 + 0.9 * (i / 20) / 20, 0.3 * i);
 			double got = b.ops->eval(&b, &point, wo, wi).v[0] * wi.z,
-			       want = written_out(&cases[k].r, wo, wi);
+			       want = principled_formula(&cases[k].r, wo, wi);
 			if (fabs(got - want) > 1e-9 * want)
 				fail_msg("%s: %.12g is not %.12g", cases[k].text, got, want);
 		}
@@ -533,20 +539,20 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_glass_is_roughdielectric),
 		cmocka_unit_test(test_metal_is_schlick_over_ggx),
-		cmocka_unit_test(test_diffuse),
-		cmocka_unit_test(test_clearcoat),
-		cmocka_unit_test(test_all_together),
+		cmocka_unit_test(diffuse_lobes_follow_their_formulas),
+		cmocka_unit_test(clearcoat_is_a_normalised_distribution),
+		cmocka_unit_test(plugins_agree_with_the_whole_formula),
 		cmocka_unit_test(test_specular_color),
 		cmocka_unit_test(test_specular_strength),
 		cmocka_unit_test(test_total_reflection_is_sampled),
 		cmocka_unit_test(test_specular_strength_of_glass),
-		cmocka_unit_test(test_coat),
-		cmocka_unit_test(test_coat_on_glass),
-		cmocka_unit_test(test_specular_is_an_index),
-		cmocka_unit_test(test_metallic_texture),
-		cmocka_unit_test(test_colours_as_numbers),
-		cmocka_unit_test(test_a_thin_sheet),
-		cmocka_unit_test(test_a_sheet_of_textures),
+		cmocka_unit_test(clearcoat_adds_ggx_and_dims_the_metal),
+		cmocka_unit_test(light_through_glass_crosses_the_coat_once),
+		cmocka_unit_test(specular_parameter_is_an_index),
+		cmocka_unit_test(textured_metallic_equals_its_number),
+		cmocka_unit_test(colour_in_place_of_a_number_is_its_mean),
+		cmocka_unit_test(thin_sheet_has_reflection_transmission_and_diffusion),
+		cmocka_unit_test(constant_textures_of_a_thin_sheet_equal_numbers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

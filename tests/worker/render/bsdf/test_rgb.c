@@ -11,13 +11,13 @@ static const struct wavelengths rgb_lanes = {.is_rgb = true};
 static const struct bsdf_point point = {.wavelengths = &rgb_lanes, .transport = TRANSPORT_RADIANCE};
 
 /* n and k of silver, as others computed them by Mitsuba's rules from its tables. */
-static void test_silver(void **state)
+static void silver_has_its_rgb_indices(void **state)
 {
 	(void)state;
 	static const double eta[3] = {0.155276, 0.116728, 0.138388}, k[3] = {4.828354, 3.122222, 2.146901};
 	struct arena a = {0};
 	struct bsdf b;
-	bsdf_make(&a, "conductor material=Ag", &b);
+	bsdf_make_or_fail(&a, "conductor material=Ag", &b);
 	for (int step = 1; step <= 10; step++) {
 		double z = step / 10.0, chance;
 		const vec3 wo = {sqrt((1 - z) * (1 + z)), 0, z};
@@ -34,7 +34,7 @@ static void test_silver(void **state)
 }
 
 /* Tables with the same wavelengths are looked up together if lanes are wavelengths. */
-static void test_two_tables(void **state)
+static void table_pair_reads_like_two_tables(void **state)
 {
 	(void)state;
 	static const double nm[] = {400, 500, 600, 700}, n[] = {1, 0.5, 0.3, 0.2}, k[] = {2, 3, 4, 5};
@@ -47,7 +47,7 @@ static void test_two_tables(void **state)
 
 /* Indices that vary over the surface: from a pattern, with values above 1, and from an image, whose values are limited
  * to 1. A textured index is relative to the outside like a constant one. */
-static void test_indices_that_vary(void **state)
+static void textured_indices_are_read_at_each_point(void **state)
 {
 	(void)state;
 	static const unsigned char pink[] = "P6 1 1 255\n\xff\0\xff";
@@ -71,7 +71,7 @@ static void test_indices_that_vary(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct arena a = {0};
-		const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .assets = &assets};
+		const struct bsdf_build build = {.arena = &a, .is_dialect_3 = true, .assets = &assets};
 		struct bsdf_point at = point;
 		struct bsdf b;
 		struct error e;
@@ -94,16 +94,16 @@ static void test_indices_that_vary(void **state)
 
 /* A tint is the base colour over its luminance, here 0.39186. It scales the reflectance of 0.04 of an index of 1.5, and
  * a quarter of it scales the 0.16 of an index of 7/3. */
-static void test_tint(void **state)
+static void tint_is_base_colour_over_luminance(void **state)
 {
 	(void)state;
 	struct arena a = {0};
 	struct bsdf tinted, coloured;
-	bsdf_make(&a, "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=1.5 spec_tint=1", &tinted);
-	bsdf_make(&a,
-		  "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=2.3333333333333335 "
-		  "specular_color=rgb(0.5103864,0.1913949,0.0637983)",
-		  &coloured);
+	bsdf_make_or_fail(&a, "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=1.5 spec_tint=1", &tinted);
+	bsdf_make_or_fail(&a,
+			  "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=2.3333333333333335 "
+			  "specular_color=rgb(0.5103864,0.1913949,0.0637983)",
+			  &coloured);
 	const vec3 wo = {0.28, 0, 0.96}, wi = {-0.6, 0, 0.8};
 	spectrum f = tinted.ops->eval(&tinted, &point, wo, wi), g = coloured.ops->eval(&coloured, &point, wo, wi);
 	for (int c = 0; c < SPECTRUM_LANES; c++)
@@ -114,7 +114,9 @@ static void test_tint(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_silver), cmocka_unit_test(test_two_tables),
-					   cmocka_unit_test(test_tint), cmocka_unit_test(test_indices_that_vary)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(silver_has_its_rgb_indices),
+					   cmocka_unit_test(table_pair_reads_like_two_tables),
+					   cmocka_unit_test(tint_is_base_colour_over_luminance),
+					   cmocka_unit_test(textured_indices_are_read_at_each_point)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,14 +38,14 @@ static void assert_near(double a, double b, double tolerance, const char *what)
 
 /* Deterministic: f(wo,wi) n_wi^2 = f(wi,wo) n_wo^2 for radiance, unless it is directed, and importance is radiance with
  * the directions exchanged. Cosines to a facet seen edge-on keep few digits, hence 1e-6. */
-static void test_reciprocity(void **state)
+static void bsdfs_are_reciprocal(void **state)
 {
 	(void)state;
 	int positive = 0;
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, bsdf_cases[k], &b);
+		bsdf_make_or_fail(&a, bsdf_cases[k], &b);
 		const struct bsdf_point r = point_of(TRANSPORT_RADIANCE), m = point_of(TRANSPORT_IMPORTANCE);
 		for (uint64_t i = 0; i < 2000; i++) {
 			double u[4];
@@ -55,18 +55,18 @@ static void test_reciprocity(void **state)
 			/* Half of the pairs lie within the lobes. */
 			if (i % 2 && b.ops->sample(&b, &r, wo, u, &s))
 				wi = s.wi;
-			spectrum there = b.ops->eval(&b, &r, wo, wi), back = b.ops->eval(&b, &r, wi, wo);
+			spectrum forward = b.ops->eval(&b, &r, wo, wi), reverse = b.ops->eval(&b, &r, wi, wo);
 			spectrum importance = b.ops->eval(&b, &m, wo, wi);
 			double no = index_on(&b, wo), ni = index_on(&b, wi);
 			for (int l = 0; l < SPECTRUM_LANES; l++) {
 				if (b.is_nonreciprocal) {
-					assert_near(back.v[l], importance.v[l], 1e-12, bsdf_cases[k]);
+					assert_near(reverse.v[l], importance.v[l], 1e-12, bsdf_cases[k]);
 					continue;
 				}
-				assert_near(there.v[l] * ni * ni, back.v[l] * no * no, 1e-6, bsdf_cases[k]);
-				assert_near(there.v[l] * ni * ni, importance.v[l] * no * no, 1e-12, bsdf_cases[k]);
+				assert_near(forward.v[l] * ni * ni, reverse.v[l] * no * no, 1e-6, bsdf_cases[k]);
+				assert_near(forward.v[l] * ni * ni, importance.v[l] * no * no, 1e-12, bsdf_cases[k]);
 			}
-			positive += spectrum_max(there) > 0;
+			positive += spectrum_max(forward) > 0;
 		}
 		arena_fini(&a);
 	}
@@ -92,7 +92,7 @@ static struct stats_mean albedo(const struct bsdf *b, vec3 wo, enum transport t,
 }
 
 /* Level: 8 standard errors with 15 degrees of freedom, below 1e-6 per test. A gain of 5 % anywhere would be found. */
-static vec3 turned_by(vec3 w, double angle)
+static vec3 rotate_about_z(vec3 w, double angle)
 {
 	double c = cos(angle), s = sin(angle);
 	return (vec3){c * w.x - s * w.y, s * w.x + c * w.y, w.z};
@@ -100,14 +100,14 @@ static vec3 turned_by(vec3 w, double angle)
 
 /* A BSDF without uses_tangents does not depend on the rotation of the frame about the normal, so it gets no
  * tangents. */
-static void test_tangents(void **state)
+static void bsdfs_without_tangents_ignore_rotation(void **state)
 {
 	(void)state;
 	int without = 0;
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, bsdf_cases[k], &b);
+		bsdf_make_or_fail(&a, bsdf_cases[k], &b);
 		const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
 		for (uint64_t i = 0; i < 400 && !b.uses_tangents; i++) {
 			double u[4];
@@ -117,7 +117,7 @@ static void test_tangents(void **state)
 			if (i % 2 && b.ops->sample(&b, &at, wo, u, &s))
 				wi = s.wi;
 			spectrum f = b.ops->eval(&b, &at, wo, wi),
-				 g = b.ops->eval(&b, &at, turned_by(wo, 1 + u[0]), turned_by(wi, 1 + u[0]));
+				 g = b.ops->eval(&b, &at, rotate_about_z(wo, 1 + u[0]), rotate_about_z(wi, 1 + u[0]));
 			assert_near(f.v[0], g.v[0], 1e-6, bsdf_cases[k]);
 		}
 		without += !b.uses_tangents;
@@ -133,7 +133,7 @@ static void test_no_energy_is_gained(void **state)
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, bsdf_cases[k], &b);
+		bsdf_make_or_fail(&a, bsdf_cases[k], &b);
 		for (int i = 0; i < 16; i += test_is_scaled() ? 5 : 1) {
 			double z = (1 - 2 * (i & 1)) * (0.05 + 0.95 * (i / 2) / 7.0);
 			vec3 wo = {sqrt(1 - fmin(z * z, 1)), 0, z};
@@ -166,7 +166,7 @@ static void test_smooth_boundaries_lose_nothing(void **state)
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, texts[k], &b);
+		bsdf_make_or_fail(&a, texts[k], &b);
 		unsigned passes = BSDF_TRANSMIT | (b.modes & BSDF_STRAIGHT);
 		for (int i = 0; i < 40; i++) {
 			double z = -0.975 + 0.05 * i, chance[2];
@@ -183,7 +183,7 @@ static void test_smooth_boundaries_lose_nothing(void **state)
 }
 
 /* White materials lose only what microfacets mask. */
-static void test_white_furnace(void **state)
+static void white_materials_lose_only_masked_light(void **state)
 {
 	(void)state;
 	static const struct {
@@ -205,7 +205,7 @@ static void test_white_furnace(void **state)
 	for (size_t k = 0; k < sizeof white / sizeof *white; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, white[k].text, &b);
+		bsdf_make_or_fail(&a, white[k].text, &b);
 		for (int i = 0; i < 6; i++) {
 			double z = -0.95 + 0.38 * i;
 			if (z < 0 && !b.is_two_sided)
@@ -218,7 +218,7 @@ static void test_white_furnace(void **state)
 	}
 }
 
-static struct bsdf_sample sample_of(const char *text, bool dialect_3, vec3 wo, double u2)
+static struct bsdf_sample draw_sample(const char *text, bool dialect_3, vec3 wo, double u2)
 {
 	struct arena a = {0};
 	struct bsdf b;
@@ -237,53 +237,53 @@ static double fresnel_at_normal(double n, double k)
 	return ((n - 1) * (n - 1) + k * k) / ((n + 1) * (n + 1) + k * k);
 }
 
-static void test_closed_forms(void **state)
+static void values_have_their_closed_forms(void **state)
 {
 	(void)state;
 	const vec3 up = {0, 0, 1}, slant = {0.6, 0, 0.8};
 	/* A check of the data itself: Au at 550 nm. */
-	struct bsdf_sample s = sample_of("conductor material=Au", true, up, 0);
+	struct bsdf_sample s = draw_sample("conductor material=Au", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(0.350, 2.714), 1e-3, "Au");
 	/* Others there by laws of their own: diamond's (Peter 1923), rutile's for the extraordinary ray (Devore 1951).
 	 */
 	const double l2 = 0.55 * 0.55;
 	double diamond = sqrt(1 + 0.3306 * l2 / (l2 - 0.030625) + 4.3356 * l2 / (l2 - 0.011236));
-	s = sample_of("conductor material=d-C", true, up, 0);
+	s = draw_sample("conductor material=d-C", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(diamond, 0), 2e-4, "d-C");
-	s = sample_of("conductor material=TiO2", true, up, 0);
+	s = draw_sample("conductor material=TiO2", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(sqrt(7.197 + 0.3322 / (l2 - 0.0843)), 0), 2e-3, "TiO2");
-	s = sample_of("conductor material=MgO", true, up, 0);
+	s = draw_sample("conductor material=MgO", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(1.7405, 0), 2e-4, "MgO");
 	/* The default is copper in 0.6, and a perfect mirror in 3.x. */
-	s = sample_of("conductor", false, up, 0);
+	s = draw_sample("conductor", false, up, 0);
 	assert_true(s.f.v[0] < 0.7 && s.f.v[3] > 0.9);
-	s = sample_of("conductor", true, up, 0);
+	s = draw_sample("conductor", true, up, 0);
 	assert_true(s.f.v[0] == 1);
-	s = sample_of("conductor eta=1.5 k=2 ext_eta=1.25", true, up, 0);
+	s = draw_sample("conductor eta=1.5 k=2 ext_eta=1.25", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(1.2, 1.6), 1e-14, "ext_eta");
-	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, up, 0);
+	s = draw_sample("dielectric int_ior=1.5 ext_ior=1", true, up, 0);
 	assert_near(s.f.v[0], 0.04, 1e-14, "normal incidence");
 	assert_near(s.pdf, 0.1, 1e-14, "more often than light");
 	/* Snell's law, and the scaling of radiance. */
-	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, slant, 0.99);
+	s = draw_sample("dielectric int_ior=1.5 ext_ior=1", true, slant, 0.99);
 	assert_near(s.wi.x, -0.4, 1e-14, "Snell");
 	double below = sqrt(0.84), rs = (0.8 - 1.5 * below) / (0.8 + 1.5 * below), rp = (1.2 - below) / (1.2 + below);
 	assert_near(s.f.v[0] * -s.wi.z, (1 - (rs * rs + rp * rp) / 2) / 2.25, 1e-14, "radiance");
 	assert_near(s.eta, 1.5, 1e-14, "eta");
 	/* Total reflection from inside. */
-	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, (vec3){0.8, 0, -0.6}, 0.999999);
+	s = draw_sample("dielectric int_ior=1.5 ext_ior=1", true, (vec3){0.8, 0, -0.6}, 0.999999);
 	assert_true(s.pdf == 1 && s.wi.z < 0);
 	/* Brewster's angle: only half of the light, s-polarised, is reflected. */
-	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, (vec3){1.5, 0, 1}, 0);
+	s = draw_sample("dielectric int_ior=1.5 ext_ior=1", true, (vec3){1.5, 0, 1}, 0);
 	assert_near(s.f.v[0] * s.wi.z, 0.5 * pow((2.25 - 1) / (2.25 + 1), 2), 1e-13, "Brewster");
 	/* With equal indices, light passes straight on. */
-	s = sample_of("roughdielectric int_ior=1.3 ext_ior=1.3", true, slant, 0);
+	s = draw_sample("roughdielectric int_ior=1.3 ext_ior=1.3", true, slant, 0);
 	assert_near(s.pdf, 1, 1e-15, "straight on");
 	assert_true(s.mode == (BSDF_TRANSMIT | BSDF_DELTA) && s.wi.x == -0.6);
 }
 
 /* The separable Smith term of GGX: D and G at one pair by hand. */
-static void test_microfacet_values(void **state)
+static void microfacet_value_is_that_computed_by_hand(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -291,10 +291,10 @@ static void test_microfacet_values(void **state)
 	const struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
 	const double alpha = 0.5, z = 0.6, tan2 = (1 - z * z) / (z * z);
 	vec3 wo = {0.8, 0, z}, wi = {-0.8, 0, z}; /* h = n */
-	bsdf_make(&a, "roughconductor material=none alpha=0.5 distribution=ggx", &b);
+	bsdf_make_or_fail(&a, "roughconductor material=none alpha=0.5 distribution=ggx", &b);
 	double g1 = 2 / (1 + sqrt(1 + alpha * alpha * tan2)), d = 1 / (PI * alpha * alpha);
 	assert_near(b.ops->eval(&b, &p, wo, wi).v[0], d * g1 * g1 / (4 * z * z), 1e-14, "ggx");
-	bsdf_make(&a, "roughconductor material=none alpha=0.5", &b);
+	bsdf_make_or_fail(&a, "roughconductor material=none alpha=0.5", &b);
 	double x = 1 / (alpha * sqrt(tan2));
 	g1 = 2 / (1 + erf(x) + exp(-x * x) / (x * sqrt(PI)));
 	assert_near(b.ops->eval(&b, &p, wo, wi).v[0], d * g1 * g1 / (4 * z * z), 1e-14, "beckmann");
@@ -308,15 +308,15 @@ static void test_phong_is_scaled_like_mitsuba(void **state)
 	struct bsdf b;
 	const struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
 	const vec3 up = {0, 0, 1};
-	bsdf_make(&a, "phong exponent=2 diffuse_reflectance=0.8 specular_reflectance=0.4", &b);
+	bsdf_make_or_fail(&a, "phong exponent=2 diffuse_reflectance=0.8 specular_reflectance=0.4", &b);
 	double scale = 0.99 / 1.2;
 	assert_near(b.ops->eval(&b, &p, up, up).v[0], scale * (0.8 / PI + 0.4 * 4 / (2 * PI)), 1e-14, "scaled");
-	bsdf_make(&a, "phong", &b);
+	bsdf_make_or_fail(&a, "phong", &b);
 	assert_near(b.ops->eval(&b, &p, up, up).v[0], 0.5 / PI + 0.2 * 32 / (2 * PI), 1e-14, "defaults");
 	arena_fini(&a);
 }
 
-static void test_flags(void **state)
+static void flags_describe_the_bsdf(void **state)
 {
 	(void)state;
 	static const struct {
@@ -357,7 +357,7 @@ static void test_flags(void **state)
 	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, expected[k].text, &b);
+		bsdf_make_or_fail(&a, expected[k].text, &b);
 		bool same = b.modes == expected[k].modes && b.min_alpha == expected[k].alpha &&
 			    b.eta == expected[k].eta && b.has_smooth == expected[k].smooth &&
 			    b.has_delta == expected[k].delta && b.is_two_sided == expected[k].two_sided &&
@@ -378,7 +378,7 @@ static void test_grey_is_the_same_without_wavelengths(void **state)
 	for (int k = 0; k < BSDF_CASES; k++) {
 		struct arena a = {0};
 		struct bsdf b;
-		bsdf_make(&a, bsdf_cases[k], &b);
+		bsdf_make_or_fail(&a, bsdf_cases[k], &b);
 		for (uint64_t i = 0; i < 50 && b.color_kind == COLOR_KIND_CONSTANT; i++) {
 			double u[4];
 			struct bsdf_sample s, t;
@@ -460,7 +460,7 @@ static void test_refusals_say_why(void **state)
 }
 
 /* A texture with the same value everywhere is equivalent to the number; a varying one to the number at each point. */
-static void test_textured_roughness(void **state)
+static void textured_roughness_equals_its_number(void **state)
 {
 	(void)state;
 	static const char *const same[][2] = {
@@ -475,8 +475,8 @@ static void test_textured_roughness(void **state)
 	for (size_t k = 0; k < sizeof same / sizeof *same; k++) {
 		struct arena a = {0};
 		struct bsdf number, map;
-		bsdf_make(&a, same[k][0], &number);
-		bsdf_make(&a, same[k][1], &map);
+		bsdf_make_or_fail(&a, same[k][0], &number);
+		bsdf_make_or_fail(&a, same[k][1], &map);
 		struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
 		p.texture_point.u = 0.75;
 		p.texture_point.v = 0.25;
@@ -495,7 +495,7 @@ static void test_textured_roughness(void **state)
 	}
 }
 
-static void test_out_of_memory_is_an_answer(void **state)
+static void lack_of_memory_is_reported(void **state)
 {
 	(void)state;
 	struct arena nodes = {0};
@@ -505,7 +505,7 @@ static void test_out_of_memory_is_an_answer(void **state)
 		int code = -ENOMEM;
 		for (size_t limit = 1; code; limit += 64 + limit / 64) {
 			struct arena a = {.limit = limit};
-			const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .assets = &assets};
+			const struct bsdf_build build = {.arena = &a, .is_dialect_3 = true, .assets = &assets};
 			struct bsdf b;
 			struct error e;
 			code = bsdf_create(&b, n, &build, &e);
@@ -516,7 +516,7 @@ static void test_out_of_memory_is_an_answer(void **state)
 	arena_fini(&nodes);
 }
 
-static void test_black_and_default(void **state)
+static void black_bsdf_and_default_bsdf_are_as_documented(void **state)
 {
 	(void)state;
 	const struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
@@ -534,20 +534,20 @@ static void test_black_and_default(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_reciprocity),
-		cmocka_unit_test(test_tangents),
+		cmocka_unit_test(bsdfs_are_reciprocal),
+		cmocka_unit_test(bsdfs_without_tangents_ignore_rotation),
 		cmocka_unit_test(test_no_energy_is_gained),
 		cmocka_unit_test(test_smooth_boundaries_lose_nothing),
-		cmocka_unit_test(test_white_furnace),
-		cmocka_unit_test(test_closed_forms),
-		cmocka_unit_test(test_microfacet_values),
+		cmocka_unit_test(white_materials_lose_only_masked_light),
+		cmocka_unit_test(values_have_their_closed_forms),
+		cmocka_unit_test(microfacet_value_is_that_computed_by_hand),
 		cmocka_unit_test(test_phong_is_scaled_like_mitsuba),
-		cmocka_unit_test(test_flags),
+		cmocka_unit_test(flags_describe_the_bsdf),
 		cmocka_unit_test(test_grey_is_the_same_without_wavelengths),
 		cmocka_unit_test(test_refusals_say_why),
-		cmocka_unit_test(test_textured_roughness),
-		cmocka_unit_test(test_out_of_memory_is_an_answer),
-		cmocka_unit_test(test_black_and_default),
+		cmocka_unit_test(textured_roughness_equals_its_number),
+		cmocka_unit_test(lack_of_memory_is_reported),
+		cmocka_unit_test(black_bsdf_and_default_bsdf_are_as_documented),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,9 +11,9 @@ static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
 
 /* BSDFs as text, with %s in place of the quantity, and values as text and as texture for which the lobes differ. */
 static const struct {
-	const char *before, *name, *after;
+	const char *prefix, *name, *suffix;
 	double low, high;
-	bool number; /* not a spectrum: Mitsuba 3 exchanges the colours of checkerboards */
+	bool is_number; /* not a spectrum: Mitsuba 3 exchanges the colours of checkerboards */
 } quantities[] = {
 	{"phong specular_reflectance=0.6", "exponent", "", 3, 200, true},
 	{"principledthin spec_trans=0.7 spec_tint=0.3 roughness=0.5", "eta", "", 1.2, 2.5, true},
@@ -23,7 +23,7 @@ static const struct {
 };
 enum { QUANTITIES = sizeof quantities / sizeof *quantities };
 
-static void expect_same(const char *text, const struct bsdf *got, const struct bsdf *want, double u)
+static void assert_same_bsdf(const char *text, const struct bsdf *got, const struct bsdf *want, double u)
 {
 	struct dice d = dice_for_test(text);
 	const struct bsdf_point p = {
@@ -56,19 +56,19 @@ static void test_a_texture_is_its_value_at_each_point(void **state)
 				struct arena a = {0};
 				struct bsdf constant, textured;
 				char text[256];
-				bool exchanged = quantities[q].number && place == 0;
-				bool second = quantities[q].number ? exchanged : place == 1;
+				bool exchanged = quantities[q].is_number && place == 0;
+				bool second = quantities[q].is_number ? exchanged : place == 1;
 				double value = second ? quantities[q].high : quantities[q].low;
-				snprintf(text, sizeof text, "%s %s=%g %s", quantities[q].before, quantities[q].name,
-					 value, quantities[q].after);
-				bsdf_make(&a, text, &constant);
+				snprintf(text, sizeof text, "%s %s=%g %s", quantities[q].prefix, quantities[q].name,
+					 value, quantities[q].suffix);
+				bsdf_make_or_fail(&a, text, &constant);
 				snprintf(text, sizeof text, "%s %s | @%s checkerboard color0=%g color1=%g",
-					 quantities[q].before, quantities[q].after, quantities[q].name,
+					 quantities[q].prefix, quantities[q].suffix, quantities[q].name,
 					 varies ? quantities[q].low : value, varies ? quantities[q].high : value);
-				bsdf_make(&a, text, &textured);
+				bsdf_make_or_fail(&a, text, &textured);
 				assert_true(textured.is_textured);
 				assert_int_equal(textured.modes, constant.modes);
-				expect_same(text, &textured, &constant, place ? 0.7 : 0.2);
+				assert_same_bsdf(text, &textured, &constant, place ? 0.7 : 0.2);
 				if (!varies && textured.min_alpha != constant.min_alpha)
 					fail_msg("%s: alpha is %g, not %g", text, textured.min_alpha,
 						 constant.min_alpha);
@@ -91,15 +91,15 @@ static void test_the_narrowest_lobe_counts(void **state)
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		struct arena a = {0};
 		struct bsdf got, want;
-		bsdf_make(&a, of[i][0], &got);
-		bsdf_make(&a, of[i][1], &want);
+		bsdf_make_or_fail(&a, of[i][0], &got);
+		bsdf_make_or_fail(&a, of[i][1], &want);
 		if (got.min_alpha != want.min_alpha)
 			fail_msg("%s: %g is not %g", of[i][0], got.min_alpha, want.min_alpha);
 		arena_fini(&a);
 	}
 }
 
-static void test_out_of_range(void **state)
+static void textured_quantities_out_of_range_are_refused(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {
@@ -122,7 +122,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_a_texture_is_its_value_at_each_point),
 		cmocka_unit_test(test_the_narrowest_lobe_counts),
-		cmocka_unit_test(test_out_of_range),
+		cmocka_unit_test(textured_quantities_out_of_range_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,7 @@ static int free_table(void **state)
 	return 0;
 }
 
-static void test_mixes(void **state)
+static void mixture_weights_interpolate_slices(void **state)
 {
 	(void)state;
 	static const struct {
@@ -66,31 +66,31 @@ static void test_mixes(void **state)
 	assert_true(m.count == 1 && m.slice[0] == 0 && m.weight[0] == 1);
 }
 
-static void test_inverse_and_jacobian(void **state)
+static void inverse_is_exact_and_its_jacobian_is_the_density(void **state)
 {
 	(void)state;
 	int compared = 0;
 	for (uint64_t i = 0; i < 2000; i++) {
-		double u[4], p[4], where[2], back[2], right[2], up[2], step = 1e-6;
+		double u[4], p[4], warped[2], back[2], right[2], up[2], step = 1e-6;
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 1, 0, p);
 		struct warp_mix m = warp_mix_at(&axes, (const double[2]){4 * p[0] - 1.5, 1.4 * p[1] - 0.2});
-		double density = warp_table_sample(&table, &m, u, where);
-		assert_true(where[0] >= 0 && where[0] <= 1 && where[1] >= 0 && where[1] <= 1);
-		double same = warp_table_invert(&table, &m, where, back);
+		double density = warp_table_sample(&table, &m, u, warped);
+		assert_true(warped[0] >= 0 && warped[0] <= 1 && warped[1] >= 0 && warped[1] <= 1);
+		double same = warp_table_invert(&table, &m, warped, back);
 		assert_true(fabs(same - density) <= 1e-9 * (1 + density));
-		assert_true(fabs(warp_table_density(&table, &m, where) - same) <= 1e-12 * (1 + density));
+		assert_true(fabs(warp_table_density(&table, &m, warped) - same) <= 1e-12 * (1 + density));
 		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
 		/* Inside a cell, where the inverse is smooth. */
-		double x = fmod(where[0] * (WIDTH - 1), 1), y = fmod(where[1] * (HEIGHT - 1), 1);
+		double x = fmod(warped[0] * (WIDTH - 1), 1), y = fmod(warped[1] * (HEIGHT - 1), 1);
 		if (fmin(fmin(x, 1 - x), fmin(y, 1 - y)) < 1e-3 || density < 1e-2)
 			continue;
-		warp_table_invert(&table, &m, (const double[2]){where[0] + step, where[1]}, right);
-		warp_table_invert(&table, &m, (const double[2]){where[0], where[1] + step}, up);
+		warp_table_invert(&table, &m, (const double[2]){warped[0] + step, warped[1]}, right);
+		warp_table_invert(&table, &m, (const double[2]){warped[0], warped[1] + step}, up);
 		double area = ((right[0] - back[0]) * (up[1] - back[1]) - (right[1] - back[1]) * (up[0] - back[0])) /
 			      (step * step);
 		if (!(fabs(area / density - 1) < 1e-3))
-			fail_msg("at (%g, %g): %g, density %g", where[0], where[1], area, density);
+			fail_msg("at (%g, %g): %g, density %g", warped[0], warped[1], area, density);
 		compared++;
 	}
 	assert_true(compared > 1500);
@@ -98,7 +98,7 @@ static void test_inverse_and_jacobian(void **state)
 
 /* The integral over the square is 1 for every mixture, by the midpoint rule on cells cut into 8 x 8, which is exact for
  * functions linear in each direction. */
-static void test_integral(void **state)
+static void every_mixture_integrates_to_one(void **state)
 {
 	(void)state;
 	enum { CUT = 8, X = CUT * (WIDTH - 1), Y = CUT * (HEIGHT - 1) };
@@ -112,21 +112,21 @@ static void test_integral(void **state)
 	}
 }
 
-static void test_corners(void **state)
+static void corners_of_the_square_are_mapped(void **state)
 {
 	(void)state;
 	struct warp_mix m = warp_mix_at(&axes, (const double[2]){0, 0.5});
 	for (int i = 0; i < 4; i++) {
 		const double u[2] = {i % 2, i / 2};
-		double where[2], back[2];
-		warp_table_sample(&table, &m, u, where);
-		assert_true(fabs(where[1] - u[1]) < 1e-6);
+		double warped[2], back[2];
+		warp_table_sample(&table, &m, u, warped);
+		assert_true(fabs(warped[1] - u[1]) < 1e-6);
 		warp_table_invert(&table, &m, u, back);
 		assert_true(fabs(back[0] - u[0]) < 1e-12 && fabs(back[1] - u[1]) < 1e-12);
 	}
 }
 
-static void test_refused(void **state)
+static void invalid_tables_are_refused(void **state)
 {
 	(void)state;
 	struct arena a = {.limit = 0};
@@ -142,9 +142,11 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_mixes),	 cmocka_unit_test(test_inverse_and_jacobian),
-		cmocka_unit_test(test_integral), cmocka_unit_test(test_corners),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(mixture_weights_interpolate_slices),
+		cmocka_unit_test(inverse_is_exact_and_its_jacobian_is_the_density),
+		cmocka_unit_test(every_mixture_integrates_to_one),
+		cmocka_unit_test(corners_of_the_square_are_mapped),
+		cmocka_unit_test(invalid_tables_are_refused),
 	};
 	return cmocka_run_group_tests_name("warp_table", tests, make_table, free_table);
 }

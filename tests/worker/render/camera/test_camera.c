@@ -13,7 +13,8 @@
 
 #include <cmocka.h>
 
-static struct camera camera_of(uint32_t width, uint32_t height, double fov, const char *axis, vec3 origin, vec3 target)
+static struct camera make_camera(uint32_t width, uint32_t height, double fov, const char *axis, vec3 origin,
+				 vec3 target)
 {
 	struct scene_settings s = {.width = width, .height = height, .fov = fov, .near_clip = 1e-3, .far_clip = 1e4};
 	strcpy(s.fov_axis, axis);
@@ -25,14 +26,14 @@ static struct camera camera_of(uint32_t width, uint32_t height, double fov, cons
 	return c;
 }
 
-static void test_project_direction(void **state)
+static void test_projection_inverts_ray_directions(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("project direction");
 	const double fovs[] = {1e-3, 20, 90, 150, 179};
 	for (int i = 0; i < 20000; i++) {
 		vec3 o = vec3_scale(3, dice_direction(&d)), t = dice_direction(&d);
-		struct camera c = camera_of(320, 200, fovs[i % 5], "x", o, t);
+		struct camera c = make_camera(320, 200, fovs[i % 5], "x", o, t);
 		double x = dice_between(&d, -20, 340), y = dice_between(&d, -20, 220), px, py;
 		vec3 w = camera_direction(&c, c.position, x, y);
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15);
@@ -45,7 +46,7 @@ static void test_project_direction(void **state)
 }
 
 /* Mitsuba 3: the film point (x, y) sees what (x + offset_x width, y + offset_y height) would see without an offset. */
-static void test_principal_point(void **state)
+static void test_principal_point_shifts_the_film(void **state)
 {
 	(void)state;
 	struct scene_settings s = {
@@ -66,13 +67,13 @@ static void test_principal_point(void **state)
 }
 
 /* The solid angle of a small square of the film, from its two tangents. */
-static void test_jacobian(void **state)
+static void test_solid_angle_matches_the_tangents(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("camera jacobian");
 	for (int i = 0; i < 5000; i++) {
-		struct camera c = camera_of(64, 48, dice_between(&d, 5, 150), "smaller",
-					    vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
+		struct camera c = make_camera(64, 48, dice_between(&d, 5, 150), "smaller",
+					      vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
 		double x = dice_between(&d, 0, 64), y = dice_between(&d, 0, 48), h = 1e-4;
 		vec3 dx = vec3_sub(camera_direction(&c, c.position, x + h, y),
 				   camera_direction(&c, c.position, x - h, y));
@@ -87,7 +88,7 @@ static void test_jacobian(void **state)
 }
 
 /* The angle between the outermost film points along the side that fov_axis names. */
-static void test_fov_axes(void **state)
+static void test_fov_applies_to_its_axis(void **state)
 {
 	(void)state;
 	static const struct {
@@ -102,8 +103,8 @@ static void test_fov_axes(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
 		for (double fov = 10; fov < 180; fov += 30) {
-			struct camera c = camera_of(cases[i].width, cases[i].height, fov, cases[i].axis,
-						    (vec3){1, 2, 3}, (vec3){0, 0, 0});
+			struct camera c = make_camera(cases[i].width, cases[i].height, fov, cases[i].axis,
+						      (vec3){1, 2, 3}, (vec3){0, 0, 0});
 			vec3 a = camera_direction(&c, c.position, cases[i].x0, cases[i].y0),
 			     b = camera_direction(&c, c.position, cases[i].x1, cases[i].y1);
 			assert_true(fabs(acos(vec3_dot(a, b)) * 180 / M_PI - fov) < 1e-6);
@@ -111,7 +112,7 @@ static void test_fov_axes(void **state)
 }
 
 /* Mitsuba's camera looks along +z, with +x to the LEFT of the image; rows are counted from the top. */
-static void test_orientation(void **state)
+static void test_camera_looks_along_z_with_x_left(void **state)
 {
 	(void)state;
 	struct scene_settings s = {.width = 100,
@@ -129,7 +130,7 @@ static void test_orientation(void **state)
 	assert_true(camera_project(&c, c.position, vec3_normalize((vec3){0, 0.5, 1}), 1, &x, &y));
 	assert_true(fabs(x - 50) < 1e-12 && fabs(y - 25) < 1e-12);
 	/* From +z towards the origin, y up: world +x is on the right. */
-	c = camera_of(100, 100, 90, "x", (vec3){0, 0, 5}, (vec3){0, 0, 0});
+	c = make_camera(100, 100, 90, "x", (vec3){0, 0, 5}, (vec3){0, 0, 0});
 	assert_true(camera_project(&c, c.position, vec3_normalize((vec3){1, 1, -5}), sqrt(27), &x, &y));
 	assert_true(fabs(x - 60) < 1e-12 && fabs(y - 40) < 1e-12);
 	/* A mirrored transform mirrors the picture. */
@@ -140,7 +141,7 @@ static void test_orientation(void **state)
 }
 
 /* Near and far are planes across the axis, in scene units, whatever the scale of the world. */
-static void test_clip(void **state)
+static void test_clip_planes_are_in_scene_units(void **state)
 {
 	(void)state;
 	struct scene_settings s = {.width = 100,
@@ -164,7 +165,7 @@ static void test_clip(void **state)
 }
 
 /* A lens of random radius and focus, and a point of its aperture. */
-static struct camera lens_of(struct dice *d, vec3 *x_k)
+static struct camera make_lens(struct dice *d, vec3 *x_k)
 {
 	struct scene_settings s = {.width = 64,
 				   .height = 48,
@@ -184,13 +185,13 @@ static struct camera lens_of(struct dice *d, vec3 *x_k)
 	return c;
 }
 
-static void test_aperture(void **state)
+static void test_aperture_is_sampled_evenly(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("aperture");
 	for (int i = 0; i < 20000; i++) {
 		vec3 p;
-		struct camera c = lens_of(&d, &p);
+		struct camera c = make_lens(&d, &p);
 		double u[2] = {dice_uniform(&d), dice_uniform(&d)}, back[2], h = 1e-5;
 		/* Not near the diagonals, where the map has a crease. */
 		if (fabs(fabs(u[0] - 0.5) - fabs(u[1] - 0.5)) < 2 * h)
@@ -211,7 +212,7 @@ static void test_aperture(void **state)
 	}
 	/* Corners and centre stay within [0,1). */
 	vec3 p;
-	struct camera c = lens_of(&d, &p);
+	struct camera c = make_lens(&d, &p);
 	const double ends[] = {0, 0.5, 1 - 0x1p-53};
 	for (int i = 0; i < 9; i++) {
 		double u[2];
@@ -223,13 +224,13 @@ static void test_aperture(void **state)
 
 /* The rays of a film point meet in the plane of focus, and the rays of a point in that plane are projected to one film
  * point. */
-static void test_lens(void **state)
+static void test_rays_meet_in_the_plane_of_focus(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("lens");
 	for (int i = 0; i < 20000; i++) {
 		vec3 x_k;
-		struct camera c = lens_of(&d, &x_k);
+		struct camera c = make_lens(&d, &x_k);
 		double x = dice_between(&d, -5, 70), y = dice_between(&d, -5, 50), px, py, h = 1e-4;
 		vec3 w = camera_direction(&c, x_k, x, y), through = camera_direction(&c, c.position, x, y);
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15 && vec3_dot(w, c.axes.n) > 0);
@@ -252,7 +253,7 @@ static void test_lens(void **state)
 }
 
 /* A lens with radius 0 is the pinhole, bit for bit, wherever it is focused. */
-static void test_closed_lens(void **state)
+static void test_closed_lens_equals_a_pinhole(void **state)
 {
 	(void)state;
 	struct scene_settings s = {
@@ -279,7 +280,7 @@ static void test_closed_lens(void **state)
 	}
 }
 
-static void test_refused(void **state)
+static void test_invalid_cameras_are_refused(void **state)
 {
 	(void)state;
 	struct scene_settings s = {
@@ -305,16 +306,16 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_project_direction),
-		cmocka_unit_test(test_principal_point),
-		cmocka_unit_test(test_jacobian),
-		cmocka_unit_test(test_fov_axes),
-		cmocka_unit_test(test_orientation),
-		cmocka_unit_test(test_clip),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_aperture),
-		cmocka_unit_test(test_lens),
-		cmocka_unit_test(test_closed_lens),
+		cmocka_unit_test(test_projection_inverts_ray_directions),
+		cmocka_unit_test(test_principal_point_shifts_the_film),
+		cmocka_unit_test(test_solid_angle_matches_the_tangents),
+		cmocka_unit_test(test_fov_applies_to_its_axis),
+		cmocka_unit_test(test_camera_looks_along_z_with_x_left),
+		cmocka_unit_test(test_clip_planes_are_in_scene_units),
+		cmocka_unit_test(test_invalid_cameras_are_refused),
+		cmocka_unit_test(test_aperture_is_sampled_evenly),
+		cmocka_unit_test(test_rays_meet_in_the_plane_of_focus),
+		cmocka_unit_test(test_closed_lens_equals_a_pinhole),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,30 +27,30 @@
 #define chain_path (*integrator_find("hslt")->chain)
 
 enum { SIDE = 32, EDGES = 8 };
-static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
+static const char mutation_mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
 
 static struct path_context context;
 static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 
-static void begin(struct chain *c, struct film_sums *film)
+static void init_chain(struct chain *c, struct film_sums *film)
 {
 	*c = (struct chain){.context = &context,
 			    .film = film,
-			    .mixture = mixture,
+			    .mixture = mutation_mixture,
 			    .strategy_counters = strategies,
 			    .seed = 7,
 			    .id = 3};
 }
 
 /* Starts the chain at the first bootstrap sample that carries light. */
-static void start(struct chain *c)
+static void start_chain(struct chain *c)
 {
 	uint64_t index = 0;
 	while (!chain_path.start(c, index))
 		assert_true(++index < 100000);
 }
 
-static void steps(struct chain *c, int n)
+static void step_chain(struct chain *c, int n)
 {
 	struct chain_sums sums = {0, 0};
 	for (int i = 0; i < n; i++)
@@ -77,14 +77,14 @@ static void check_resume(struct chain *c, struct chain *d)
 	assert_int_equal(chain_path.save(c, &s), 0);
 	assert_true(s.size <= CHAIN_STATE_MAX);
 	memset(d + 1, 0xa5, chain_path.size - sizeof *d);
-	d->rejected_run = 99;
+	d->rejected_in_a_row = 99;
 	d->step = c->step + 1; /* of another epoch */
 	assert_false(chain_path.resume(d, &s));
 	d->step = c->step;
 	assert_true(chain_path.resume(d, &s) && chain_path.resume(c, &s));
 	put64(s.bytes + 16, c->step + 1); /* more rejections than steps */
 	assert_false(chain_path.resume(d, &s));
-	put64(s.bytes + 16, c->rejected_run);
+	put64(s.bytes + 16, c->rejected_in_a_row);
 	assert_int_equal(c->step, d->step);
 	assert_true(path_read(&context, s.bytes + CHAIN_STATE_HEADER_BYTES, s.size - CHAIN_STATE_HEADER_BYTES, &x));
 	if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded"))
@@ -120,18 +120,18 @@ static double bad_number(struct dice *dice)
 
 static void damage_state(struct chain_state *s, struct dice *dice, int i)
 {
-	uint32_t head = CHAIN_STATE_HEADER_BYTES, left = s->size - head;
+	uint32_t header_bytes = CHAIN_STATE_HEADER_BYTES, body_bytes = s->size - header_bytes;
 	if (i % 7 == 0)
 		s->size -= 1 + (uint32_t)dice_below(dice, 40);
 	else if (i % 3 == 0)
-		put_double(s->bytes + head + 8 * dice_below(dice, left / 8), bad_number(dice));
+		put_double(s->bytes + header_bytes + 8 * dice_below(dice, body_bytes / 8), bad_number(dice));
 	else
 		for (int k = 0; k <= i % 3; k++)
-			s->bytes[head + dice_below(dice, left)] ^= (uint8_t)(1u << dice_below(dice, 8));
+			s->bytes[header_bytes + dice_below(dice, body_bytes)] ^= (uint8_t)(1u << dice_below(dice, 8));
 }
 
 /* Every byte may have any value: the state is refused, unless only the last bits of a number changed. */
-static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
+static size_t check_changed_bytes(struct chain *c, struct chain *d, struct dice *dice)
 {
 	static struct full_path x;
 	struct chain_state s;
@@ -154,7 +154,7 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 			if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded") &&
 			    !strstr(text, "specular"))
 				fail_msg("changed: %s", text);
-			steps(d, 3);
+			step_chain(d, 3);
 		}
 		mem_free(changed.bytes);
 	}
@@ -175,20 +175,20 @@ static void check_room(const struct room *room)
 	assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
 	assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
 	assert_int_equal(film_sums_init(&waste, &plan, &settings, NULL), 0);
-	begin(c, &a);
-	begin(d, &b);
-	start(c);
-	steps(c, 50);
+	init_chain(c, &a);
+	init_chain(d, &b);
+	start_chain(c);
+	step_chain(c, 50);
 	counters[COUNT_STATES_LOST] = 0;
 	memset(a.xyz, 0, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
 	size_t refused = 0;
 	for (int epoch = 0; epoch < 20; epoch++) {
 		check_resume(c, d);
-		steps(c, 40);
-		steps(d, 40);
+		step_chain(c, 40);
+		step_chain(d, 40);
 		assert_true(same_state(c, d));
 		d->film = &waste;
-		refused += check_changed(c, d, &dice);
+		refused += check_changed_bytes(c, d, &dice);
 		d->film = &b;
 	}
 	assert_memory_equal(a.xyz, b.xyz, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
@@ -202,7 +202,7 @@ static void check_room(const struct room *room)
 	world_free(w);
 }
 
-static void test_states(void **state)
+static void saved_states_resume_with_equal_bits(void **state)
 {
 	(void)state;
 	for (const struct room *r = rooms; r->name; r++)
@@ -210,7 +210,7 @@ static void test_states(void **state)
 }
 
 /* A chain without a start: it searches for light, and its state has the minimal size. */
-static void test_black(void **state)
+static void chain_without_light_has_a_minimal_state(void **state)
 {
 	(void)state;
 	struct chain *c = test_malloc(chain_path.size);
@@ -221,13 +221,13 @@ static void test_black(void **state)
 	struct world *w = rooms[0].build();
 	starts_init_context(&context, w, 1, EDGES, counters);
 	assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
-	begin(c, &film);
+	init_chain(c, &film);
 	assert_true(chain_path.start(c, UINT64_MAX));
 	assert_int_equal(chain_path.save(c, &s), 0);
 	assert_int_equal(s.size, CHAIN_STATE_HEADER_BYTES + 8);
 	assert_true(chain_path.resume(c, &s));
 	mem_free(s.bytes);
-	steps(c, 200);
+	step_chain(c, 200);
 	assert_int_equal(chain_path.save(c, &s), 0);
 	/* A wavelength and a point on the aperture only if the scene has them. */
 	uint32_t without =
@@ -240,7 +240,7 @@ static void test_black(void **state)
 }
 
 /* Glass of size 1 on a floor with half side `floor`. */
-static struct world *on_floor(double floor)
+static struct world *glass_on_floor_world(double floor)
 {
 	/* clang-format off */
 	return world_from_text(SIDE, SIDE,
@@ -285,7 +285,7 @@ static void check_same_path(const struct full_path *x, const struct full_path *y
 	assert_int_equal(x->edges, y->edges);
 	for (unsigned j = 1; j < x->edges; j++) {
 		const struct path_vertex *v = &x->v[j], *w = &y->v[j];
-		assert_true(v->mode == w->mode && v->delta == w->delta && v->bsdf == w->bsdf);
+		assert_true(v->mode == w->mode && v->is_delta == w->is_delta && v->bsdf == w->bsdf);
 		assert_memory_equal(&v->x.p, &w->x.p, sizeof v->x.p);
 		assert_memory_equal(&v->x.ng, &w->x.ng, sizeof v->x.ng);
 		assert_memory_equal(&v->x.sh, &w->x.sh, sizeof v->x.sh);
@@ -302,7 +302,7 @@ static void check_scale(double floor)
 	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
 	struct film_sums film;
-	struct world *w = on_floor(floor);
+	struct world *w = glass_on_floor_world(floor);
 	uint8_t bytes[PATH_BYTES_MAX];
 	unsigned paths = 0, unwritten = 0;
 	starts_init_context(&context, w, 1, EDGES, counters);
@@ -317,12 +317,12 @@ static void check_scale(double floor)
 		assert_true(size == 0 || path_read(&context, bytes, size, &y));
 	}
 	assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
-	begin(c, &film);
-	start(c);
+	init_chain(c, &film);
+	start_chain(c);
 	counters[COUNT_STATES_LOST] = 0;
 	for (int epoch = 0; epoch < 200; epoch++) {
 		struct chain_state s;
-		steps(c, 10);
+		step_chain(c, 10);
 		assert_int_equal(chain_path.save(c, &s), 0);
 		assert_true(chain_path.resume(c, &s));
 		mem_free(s.bytes);
@@ -337,7 +337,7 @@ static void check_scale(double floor)
 	world_free(w);
 }
 
-static void test_scales(void **state)
+static void saved_paths_are_read_back_at_all_scales(void **state)
 {
 	const double floors[] = {10, 1e2, 1e4, 1e6, 1e8};
 	(void)state;
@@ -347,7 +347,8 @@ static void test_scales(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_states), cmocka_unit_test(test_black),
-					   cmocka_unit_test(test_scales)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(saved_states_resume_with_equal_bits),
+					   cmocka_unit_test(chain_without_light_has_a_minimal_state),
+					   cmocka_unit_test(saved_paths_are_read_back_at_all_scales)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

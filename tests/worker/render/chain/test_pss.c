@@ -26,7 +26,7 @@
 
 /* A small step goes from u to u +- s, with s between 1/1024 and 1/64 at a density proportional to 1/s: the same on
  * both sides, wrapped around. */
-static void test_small_step(void **state)
+static void small_steps_are_symmetric_with_their_density(void **state)
 {
 	(void)state;
 	enum { CELLS = 32 };
@@ -57,7 +57,7 @@ static void test_small_step(void **state)
 }
 
 /* Steps in both directions: from uniform points, as many go from one cell to another as return. */
-static void test_both_ways(void **state)
+static void as_many_steps_go_as_return(void **state)
 {
 	(void)state;
 	enum { CELLS = 64 };
@@ -71,17 +71,17 @@ static void test_both_ways(void **state)
 	double chi2 = 0, degrees = 0;
 	for (int i = 0; i < CELLS; i++)
 		for (int j = 0; j < i; j++) {
-			double there = (double)moves[i][j], back = (double)moves[j][i];
-			if (there + back < 10)
+			double forward = (double)moves[i][j], reverse = (double)moves[j][i];
+			if (forward + reverse < 10)
 				continue;
-			chi2 += (there - back) * (there - back) / (there + back);
+			chi2 += (forward - reverse) * (forward - reverse) / (forward + reverse);
 			degrees++;
 		}
 	assert_true(degrees >= CELLS - 1);
 	assert_true(stats_chi2_p(chi2, degrees) > LEVEL);
 }
 
-static void fill(struct pss_point *p, unsigned camera, unsigned light, struct dice *d)
+static void fill_point(struct pss_point *p, unsigned camera, unsigned light, struct dice *d)
 {
 	memset(p, 0, sizeof *p);
 	p->block_count[0] = camera;
@@ -92,7 +92,7 @@ static void fill(struct pss_point *p, unsigned camera, unsigned light, struct di
 				p->u[s][v][i] = dice_uniform(d);
 }
 
-static void test_bytes(void **state)
+static void point_survives_saving(void **state)
 {
 	(void)state;
 	static uint8_t bytes[CHAIN_STATE_MAX];
@@ -100,7 +100,7 @@ static void test_bytes(void **state)
 	struct dice d = dice_for_test("bytes");
 	for (unsigned i = 0; i < 200; i++) {
 		unsigned camera = i == 0 ? 0 : i == 1 ? PSS_VERTICES_MAX : dice_below(&d, PSS_VERTICES_MAX + 1);
-		fill(&p, camera, i == 1 ? PSS_VERTICES_MAX : dice_below(&d, PSS_VERTICES_MAX + 1), &d);
+		fill_point(&p, camera, i == 1 ? PSS_VERTICES_MAX : dice_below(&d, PSS_VERTICES_MAX + 1), &d);
 		size_t n = pss_write(&p, bytes, sizeof bytes);
 		assert_int_equal(n, 8 + 64 * (p.block_count[0] + p.block_count[1]));
 		assert_int_equal(pss_write(&p, bytes, n), n);
@@ -117,7 +117,7 @@ static void test_bytes(void **state)
 	}
 	const double bad[] = {-0x1p-60, 1, 1.5, -1, NAN, INFINITY, -INFINITY, 1e300};
 	for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-		fill(&p, 3, 2, &d);
+		fill_point(&p, 3, 2, &d);
 		p.u[i % 2][1][i] = bad[i];
 		size_t n = pss_write(&p, bytes, sizeof bytes);
 		assert_int_equal(pss_read(&q, bytes, n), 0);
@@ -126,7 +126,7 @@ static void test_bytes(void **state)
 	const uint32_t counts[] = {PSS_VERTICES_MAX + 1, 1000, 1u << 26, 1u << 31, UINT32_MAX};
 	for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
 		for (int side = 0; side < 2; side++) {
-			fill(&p, 3, 2, &d);
+			fill_point(&p, 3, 2, &d);
 			pss_write(&p, bytes, sizeof bytes);
 			for (int k = 0; k < 4; k++)
 				bytes[4 * side + k] = (uint8_t)(counts[i] >> (8 * k));
@@ -149,22 +149,22 @@ static void test_bytes(void **state)
 
 /* The state with one vertex of the camera and none of a light: its bytes are the same on every machine, and must
  * never change. */
-static void test_bytes_stay(void **state)
+static void bytes_of_a_state_never_change(void **state)
 {
 	(void)state;
 	static const double u[SAMPLER_BLOCK_SIZE] = {0.5, 0.25, 0x1p-53, 0, 0.75, 0, 0, 1 - 0x1p-53};
-	static const uint8_t want[8 + 64] = {
+	static const uint8_t expected[8 + 64] = {
 		1, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0,	  0,	0,    0,    0xe0, 0x3f, 0,    0,
 		0, 0, 0, 0, 0xd0, 0x3f, 0, 0, 0, 0, 0,	  0,	0xa0, 0x3c, 0,	  0,	0,    0,
 		0, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0xe8, 0x3f, 0,    0,    0,	  0,	0,    0,
 		0, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xef, 0x3f};
 	static struct pss_point p, q;
-	uint8_t bytes[sizeof want];
+	uint8_t bytes[sizeof expected];
 	p.block_count[SIDE_CAMERA] = 1;
 	memcpy(p.u[SIDE_CAMERA][0], u, sizeof u);
 	assert_int_equal(pss_write(&p, bytes, sizeof bytes), sizeof bytes);
-	assert_memory_equal(bytes, want, sizeof want);
-	assert_int_equal(pss_read(&q, want, sizeof want), sizeof want);
+	assert_memory_equal(bytes, expected, sizeof expected);
+	assert_int_equal(pss_read(&q, expected, sizeof expected), sizeof expected);
 	assert_memory_equal(&p, &q, sizeof p);
 }
 
@@ -173,7 +173,7 @@ static void test_bytes_stay(void **state)
  * and regions of value 0. */
 enum { SIDE = 16 };
 
-static double profile(double x, double y)
+static double density_profile(double x, double y)
 {
 	return 0.2 + pow(x, 3) + 2 * exp(-60 * ((x - 0.25) * (x - 0.25) + (y - 0.7) * (y - 0.7)));
 }
@@ -185,14 +185,14 @@ static void add_splat(struct path_sample *out, double x, double y, double value)
 	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
 }
 
-static void evaluate_plain(struct path_context *c, struct sampler *s, struct path_sample *out)
+static void evaluate_fixed_length(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
 	out->splat_count = 0;
 	out->intensity = 0;
 	out->class_mask = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
-	add_splat(out, u[0], u[1], profile(u[0], u[1]));
+	add_splat(out, u[0], u[1], density_profile(u[0], u[1]));
 }
 
 static void evaluate_lengths(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -202,7 +202,7 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 	out->intensity = 0;
 	out->class_mask = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
-	double x = u[0], y = u[1], value = profile(x, y);
+	double x = u[0], y = u[1], value = density_profile(x, y);
 	for (unsigned v = 1; v < 12; v++) {
 		u = s->block(s, v % 3 ? SIDE_CAMERA : SIDE_LIGHT, v % 3 ? v : v / 3 - 1);
 		if (u[2] < 0.3)
@@ -213,7 +213,7 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 	add_splat(out, x, y, value);
 }
 
-static void evaluate_holes(struct path_context *c, struct sampler *s, struct path_sample *out)
+static void evaluate_with_holes(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	(void)c;
 	out->splat_count = 0;
@@ -223,9 +223,9 @@ static void evaluate_holes(struct path_context *c, struct sampler *s, struct pat
 	double x = u[0], y = u[1], w = u[5];
 	if (w < 0.4)
 		return;
-	add_splat(out, x, y, profile(x, y) * (w < 0.7 ? 1 / 0.3 : 0));
+	add_splat(out, x, y, density_profile(x, y) * (w < 0.7 ? 1 / 0.3 : 0));
 	const double *l = s->block(s, SIDE_LIGHT, 0);
-	add_splat(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
+	add_splat(out, l[0], l[1], density_profile(l[0], l[1]) / 0.6);
 }
 
 /* Runs groups of chains; each group estimates its own b from its large steps, like the groups of a job. The mean of
@@ -249,8 +249,8 @@ static void check_target(const char *name,
 		exact[k] = 0;
 		for (int i = 0; i < SUB * SUB; i++)
 			exact[k] += times *
-				    profile((k % CELLS + (i % SUB + 0.5) / SUB) / CELLS,
-					    (k / CELLS + (i / SUB + 0.5) / SUB) / CELLS) /
+				    density_profile((k % CELLS + (i % SUB + 0.5) / SUB) / CELLS,
+						    (k / CELLS + (i / SUB + 0.5) / SUB) / CELLS) /
 				    (SUB * SUB) / (CELLS * CELLS);
 	}
 	for (int g = 0; g < GROUPS; g++) {
@@ -300,12 +300,12 @@ static void check_target(const char *name,
 	test_free(c);
 }
 
-static void test_targets(void **state)
+static void chain_histograms_follow_closed_form_targets(void **state)
 {
 	(void)state;
-	check_target("plain target", evaluate_plain, 1);
+	check_target("plain target", evaluate_fixed_length, 1);
 	check_target("target of many lengths", evaluate_lengths, 1);
-	check_target("target with holes", evaluate_holes, 2);
+	check_target("target with holes", evaluate_with_holes, 2);
 }
 
 /* Intensities at the limits of double: most points have one of two magnitudes, so that a chain stays at each for a
@@ -343,7 +343,7 @@ static void check_finite(const struct film_sums *film, double weight)
 
 /* No intensity makes a film, a moment or a sum infinite. Each mutation adds a weight of 1 to the film, whatever the
  * intensity. */
-static void test_extreme_intensities(void **state)
+static void extreme_intensities_keep_sums_finite(void **state)
 {
 	(void)state;
 	const double pairs[][2] = {{0x1p-1074, 0x1p-1074}, {0x1p-1074, 1e-310}, {0x1p-1074, 0},
@@ -379,7 +379,7 @@ static void test_extreme_intensities(void **state)
 }
 
 /* A chain that is saved and resumed between epochs continues with the same bits. */
-static void test_resume(void **state)
+static void resumed_chain_continues_with_the_same_bits(void **state)
 {
 	(void)state;
 	struct chain *whole = test_malloc(chain_pss.size), *parts = test_malloc(chain_pss.size);
@@ -410,7 +410,7 @@ static void test_resume(void **state)
 			chain_pss.flush(parts);
 			assert_int_equal(chain_pss.save(parts, &s), 0);
 			memset(parts + 1, 0xa5, chain_pss.size - sizeof *parts);
-			parts->rejected_run = 99;
+			parts->rejected_in_a_row = 99;
 			parts->step = whole->step + 1; /* of another epoch */
 			assert_false(chain_pss.resume(parts, &s));
 			parts->step = whole->step;
@@ -444,7 +444,7 @@ static void test_resume(void **state)
 		assert_memory_equal(a.xyz, b.xyz, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
 		assert_memory_equal(&sa, &sb, sizeof sa);
 		assert_int_equal(whole->step, parts->step);
-		assert_int_equal(whole->rejected_run, parts->rejected_run);
+		assert_int_equal(whole->rejected_in_a_row, parts->rejected_in_a_row);
 		film_sums_fini(&a);
 		film_sums_fini(&b);
 	}
@@ -455,13 +455,13 @@ static void test_resume(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_small_step),
-		cmocka_unit_test(test_both_ways),
-		cmocka_unit_test(test_bytes),
-		cmocka_unit_test(test_bytes_stay),
-		cmocka_unit_test(test_targets),
-		cmocka_unit_test(test_resume),
-		cmocka_unit_test(test_extreme_intensities),
+		cmocka_unit_test(small_steps_are_symmetric_with_their_density),
+		cmocka_unit_test(as_many_steps_go_as_return),
+		cmocka_unit_test(point_survives_saving),
+		cmocka_unit_test(bytes_of_a_state_never_change),
+		cmocka_unit_test(chain_histograms_follow_closed_form_targets),
+		cmocka_unit_test(resumed_chain_continues_with_the_same_bits),
+		cmocka_unit_test(extreme_intensities_keep_sums_finite),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -65,10 +65,10 @@ struct trial {
 	struct path_sample sample;
 	struct brightness map;
 	struct film_sums film, unspread;
-	struct redistribution *r;
+	struct redistribution *redistribution;
 	uint64_t counters[BATCH_COUNTERS];
 	double intensity; /* of all samples, including the part taken for chains */
-	double taken, classes[PATH_CLASSES];
+	double redistributed, classes[PATH_CLASSES];
 };
 
 static void trial_begin(struct trial *t, const struct world *w, const struct redistribution_rule *rule,
@@ -92,14 +92,15 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	assert_int_equal(film_sums_init(&t->film, &t->plan, &w->settings, &e), 0);
 	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
 	memset(t->counters, 0, sizeof t->counters);
-	t->context.light_every = light_every;
-	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film.target, t->classes, &e),
+	t->context.light_subpath_interval = light_every;
+	assert_int_equal(redistribution_new(&t->redistribution, rule, &t->context, &t->map, seed, &t->film.target,
+					    t->classes, &e),
 			 0);
 }
 
 static void trial_end(struct trial *t)
 {
-	redistribution_free(t->r);
+	redistribution_free(t->redistribution);
 	film_sums_fini(&t->film);
 	film_sums_fini(&t->unspread);
 	brightness_fini(&t->map);
@@ -117,20 +118,20 @@ static void evaluate(struct trial *t, uint64_t seed, uint64_t index, struct path
 
 static void trial_sample(struct trial *t, uint64_t seed, uint64_t index)
 {
-	evaluate(t, seed, index, redistribution_begin(t->r, index, 0), &t->film);
-	t->intensity += t->sample.intensity + redistribution_spread_intensity(t->r);
-	t->taken += redistribution_spread_intensity(t->r);
+	evaluate(t, seed, index, redistribution_begin(t->redistribution, index, 0), &t->film);
+	t->intensity += t->sample.intensity + redistribution_taken_intensity(t->redistribution);
+	t->redistributed += redistribution_taken_intensity(t->redistribution);
 }
 
 /* Evaluates the same sample as bdpt does, and returns its intensity. */
-static double unspread_sample(struct trial *t, uint64_t seed, uint64_t index)
+static double trial_sample_unspread(struct trial *t, uint64_t seed, uint64_t index)
 {
 	evaluate(t, seed, index, NULL, &t->unspread);
 	return t->sample.intensity;
 }
 
 /* Stores the means of the blocks of the film and of the whole film. */
-static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREEMENT_CELLS + 1])
+static void store_block_means(const struct film_sums *f, uint64_t spp, double mean[AGREEMENT_CELLS + 1])
 {
 	double sum[AGREEMENT_CELLS + 1] = {0};
 	for (unsigned y = 0; y < SIDE; y++)
@@ -146,8 +147,8 @@ static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGRE
 
 /* Stores for each group and cell 1 + the difference of the two images, divided by bdpt's mean in the cell. Returns
  * the number of mutations per sample. */
-static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule,
-		      uint32_t light_every, uint64_t spp, struct agreement_image *out)
+static double compare_with_bdpt(const char *test, const struct world *w, const struct redistribution_rule *rule,
+				uint32_t light_every, uint64_t spp, struct agreement_image *out)
 {
 	static struct trial t;
 	double mutations = 0, unspread[GROUPS][AGREEMENT_CELLS + 1], all[AGREEMENT_CELLS + 1] = {0};
@@ -158,13 +159,13 @@ static double compare(const char *test, const struct world *w, const struct redi
 		trial_begin(&t, w, rule, light_every, seed);
 		for (uint64_t i = 0; i < spp * SIDE * SIDE; i++) {
 			trial_sample(&t, seed, i);
-			unspread_sample(&t, seed, i);
+			trial_sample_unspread(&t, seed, i);
 		}
-		take_means(&t.film, spp, out->mean[g]);
-		take_means(&t.unspread, spp, unspread[g]);
+		store_block_means(&t.film, spp, out->mean[g]);
+		store_block_means(&t.unspread, spp, unspread[g]);
 		for (int c = 0; c <= AGREEMENT_CELLS; c++)
 			all[c] += unspread[g][c] / GROUPS;
-		mutations += (double)t.counters[COUNT_SPREAD_MUTATIONS] / (double)(spp * SIDE * SIDE * GROUPS);
+		mutations += (double)t.counters[COUNT_REDISTRIBUTION_MUTATIONS] / (double)(spp * SIDE * SIDE * GROUPS);
 		trial_end(&t);
 	}
 	for (uint32_t g = 0; g < GROUPS; g++)
@@ -173,11 +174,11 @@ static double compare(const char *test, const struct world *w, const struct redi
 	return mutations;
 }
 
-static void expect_the_same(const char *test, struct world *w, const struct redistribution_rule *rule,
-			    uint32_t light_every, uint64_t spp)
+static void assert_same_image(const char *test, struct world *w, const struct redistribution_rule *rule,
+			      uint32_t light_every, uint64_t spp)
 {
 	static struct agreement_image image;
-	assert_true(compare(test, w, rule, light_every, test_is_scaled() ? spp / 8 : spp, &image) > 1);
+	assert_true(compare_with_bdpt(test, w, rule, light_every, test_is_scaled() ? spp / 8 : spp, &image) > 1);
 	agreement_check_constant(test, &image, 1);
 	world_free(w);
 }
@@ -186,23 +187,23 @@ static void all_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
 	const struct redistribution_rule all = {.threshold = 1e-6, .mutations_per_unit = 8, .chain_length = 2};
-	expect_the_same(__func__, lamp_over_ground(), &all, 1, 16);
+	assert_same_image(__func__, lamp_over_ground(), &all, 1, 16);
 }
 
-static const struct redistribution_rule some = {.threshold = 0.5, .mutations_per_unit = 8, .chain_length = 2};
+static const struct redistribution_rule threshold_rule = {.threshold = 0.5, .mutations_per_unit = 8, .chain_length = 2};
 
 /* Most paths lie near the threshold, where the number of chains varies. */
 static void some_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
-	expect_the_same(__func__, room_of_balls(), &some, 1, 8);
+	assert_same_image(__func__, room_of_balls(), &threshold_rule, 1, 8);
 }
 
 /* Contributions that need a light sub-path are weighted by four, so more of them lie above the threshold. */
 static void a_light_sub_path_in_one_of_four_samples_is_the_same_image(void **state)
 {
 	(void)state;
-	expect_the_same(__func__, room_of_balls(), &some, 4, 12);
+	assert_same_image(__func__, room_of_balls(), &threshold_rule, 4, 12);
 }
 
 /* Without roulette, the contribution of a light sub-path to the film is at most T times the brightness at its
@@ -214,26 +215,26 @@ static void no_splat_is_brighter_than_the_threshold(void **state)
 	static struct trial t;
 	struct world *w = room_of_balls();
 	for (uint32_t light_every = 1; light_every <= 4; light_every *= 4) {
-		double most = 0;
+		double max_ratio = 0;
 		trial_begin(&t, w, &rule, light_every, stats_seed(__func__));
 		t.context.max_survival = 0;
 		for (uint64_t i = 0; i < 4096; i++) {
 			trial_sample(&t, stats_seed(__func__), i);
 			for (uint32_t k = 1; k < t.sample.splat_count; k++) {
 				const struct splat *s = &t.sample.splats[k];
-				most = fmax(most,
-					    (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&t.map, s->x, s->y));
+				max_ratio = fmax(max_ratio, (s->xyz[0] + s->xyz[1] + s->xyz[2]) *
+								    brightness_inverse_at(&t.map, s->x, s->y));
 			}
 		}
-		print_message("a light sub-path in one of %u: %.9f\n", light_every, most);
-		assert_true(fabs(most - 0.5) < 1e-6);
+		print_message("a light sub-path in one of %u: %.9f\n", light_every, max_ratio);
+		assert_true(fabs(max_ratio - 0.5) < 1e-6);
 		trial_end(&t);
 	}
 	world_free(w);
 }
 
 /* Chains from a bright path are as long as any others; only their number grows, up to a bound. */
-static void the_brightest_begin_no_more_than_so_many_chains(void **state)
+static void chains_of_the_brightest_paths_are_bounded(void **state)
 {
 	(void)state;
 	const struct redistribution_rule endless = {.threshold = 0.5, .mutations_per_unit = 1e12, .chain_length = 3};
@@ -242,8 +243,9 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 	trial_begin(&t, w, &endless, 1, stats_seed(__func__));
 	for (uint64_t i = 0; i < 256; i++)
 		trial_sample(&t, stats_seed(__func__), i);
-	assert_true(t.counters[COUNT_SPREAD] > 16);
-	assert_int_equal(t.counters[COUNT_SPREAD_MUTATIONS], t.counters[COUNT_SPREAD] * 3 * REDISTRIBUTION_CHAINS_MAX);
+	assert_true(t.counters[COUNT_REDISTRIBUTED] > 16);
+	assert_int_equal(t.counters[COUNT_REDISTRIBUTION_MUTATIONS],
+			 t.counters[COUNT_REDISTRIBUTED] * 3 * REDISTRIBUTION_CHAINS_MAX);
 	trial_end(&t);
 	world_free(w);
 }
@@ -251,7 +253,7 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 /* The sum from which b is estimated is that of bdpt with the same random numbers. The part of it taken for chains is
  * divided into classes, from full paths; no class may have more than in bdpt's samples, where classes are found from
  * sub-paths. */
-static void nothing_is_lost_of_the_sum(void **state)
+static void redistribution_keeps_the_sum_of_intensities(void **state)
 {
 	(void)state;
 	const struct redistribution_rule half = {.threshold = 0.1, .mutations_per_unit = 0.1, .chain_length = 2};
@@ -264,7 +266,7 @@ static void nothing_is_lost_of_the_sum(void **state)
 	for (uint64_t i = 0; i < 512; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
 		rays += batch_ray_count(t.counters);
-		whole += unspread_sample(&t, stats_seed(__func__), i);
+		whole += trial_sample_unspread(&t, stats_seed(__func__), i);
 		for (int k = 0; k < PATH_CLASSES; k++)
 			of_class[k] += t.sample.class_intensity[k];
 	}
@@ -272,9 +274,9 @@ static void nothing_is_lost_of_the_sum(void **state)
 		assert_true(t.classes[k] <= of_class[k] * (1 + 1e-9));
 		taken += t.classes[k];
 	}
-	assert_true(taken > 0.5 * whole && fabs(taken - t.taken) < 1e-9 * taken);
-	assert_true(t.counters[COUNT_SPREAD_RAYS] > 100 && t.counters[COUNT_SPREAD_RAYS] < rays);
-	assert_true(t.counters[COUNT_SPREAD] > 100);
+	assert_true(taken > 0.5 * whole && fabs(taken - t.redistributed) < 1e-9 * taken);
+	assert_true(t.counters[COUNT_REDISTRIBUTION_RAYS] > 100 && t.counters[COUNT_REDISTRIBUTION_RAYS] < rays);
+	assert_true(t.counters[COUNT_REDISTRIBUTED] > 100);
 	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
 	trial_end(&t);
 	world_free(w);
@@ -298,7 +300,7 @@ static void what_is_seen_directly_is_not_spread(void **state)
 	for (uint64_t i = 0; i < 4096; i++)
 		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.intensity > 0);
-	assert_int_equal(t.counters[COUNT_SPREAD], 0);
+	assert_int_equal(t.counters[COUNT_REDISTRIBUTED], 0);
 	trial_end(&t);
 	world_free(w);
 }
@@ -310,8 +312,8 @@ int main(void)
 		cmocka_unit_test(some_light_by_chains_is_the_same_image),
 		cmocka_unit_test(a_light_sub_path_in_one_of_four_samples_is_the_same_image),
 		cmocka_unit_test(no_splat_is_brighter_than_the_threshold),
-		cmocka_unit_test(the_brightest_begin_no_more_than_so_many_chains),
-		cmocka_unit_test(nothing_is_lost_of_the_sum),
+		cmocka_unit_test(chains_of_the_brightest_paths_are_bounded),
+		cmocka_unit_test(redistribution_keeps_the_sum_of_intensities),
 		cmocka_unit_test(what_is_seen_directly_is_not_spread),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

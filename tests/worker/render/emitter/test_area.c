@@ -68,7 +68,7 @@ static vec3 cell_direction(double i, double j)
 
 /* Computes the expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points per
  * cell; returns their sum. */
-static double expect(double (*density)(const void *, vec3), const void *arg, double n, double *expected)
+static double expect_counts(double (*density)(const void *, vec3), const void *arg, double n, double *expected)
 {
 	enum { SUB = 16 };
 	double sum = 0;
@@ -90,24 +90,24 @@ struct seen {
 	vec3 ref;
 };
 
-static struct emitter_point on_sphere(const struct seen *s, vec3 w)
+static struct emitter_point sphere_point(const struct seen *s, vec3 w)
 {
 	return (struct emitter_point){.p = vec3_madd(s->shape->center, s->shape->radius, w),
 				      .n = vec3_scale(s->shape->normal_sign, w)};
 }
 
 /* The density per solid angle of directions from the centre. */
-static double toward_density(const void *arg, vec3 w)
+static double directional_density(const void *arg, vec3 w)
 {
 	const struct seen *s = arg;
-	struct emitter_point x = on_sphere(s, w);
+	struct emitter_point x = sphere_point(s, w);
 	return emitter_pdf_toward(s->em, s->ref, &x) * s->shape->radius * s->shape->radius;
 }
 
 static double point_density(const void *arg, vec3 w)
 {
 	const struct seen *s = arg;
-	struct emitter_point x = on_sphere(s, w);
+	struct emitter_point x = sphere_point(s, w);
 	return s->em->ops->pdf_point(s->em, &x) * s->shape->radius * s->shape->radius;
 }
 
@@ -135,7 +135,7 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 	}
 	/* Only the silhouette itself, a set of measure zero, may be refused. */
 	assert_true(n - taken <= n / 10000);
-	double sum = expect(toward ? toward_density : point_density, s, (double)taken, expected);
+	double sum = expect_counts(toward ? directional_density : point_density, s, (double)taken, expected);
 	print_message("%s: integral %.6f\n", what, sum);
 	/* The midpoint rule is inexact at the border of the cap. */
 	assert_true(fabs(sum - 1) < tolerance);
@@ -143,7 +143,7 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 		check_counts(what, counts, expected, CELLS * CELLS);
 }
 
-static void test_sphere(void **state)
+static void test_points_on_a_sphere_follow_the_density(void **state)
 {
 	(void)state;
 	for (int flip = 0; flip < 2; flip++) {
@@ -197,7 +197,7 @@ static void check_cone(const char *what, const struct seen *s)
 			double h = (i + (k + 0.5) / SUB) / RINGS * (1 - r / distance), c = 1 - h,
 			       sine = sqrt(h * (2 - h));
 			vec3 w = frame_to_world(&f, (vec3){sine, 0, c});
-			struct emitter_point x = on_sphere(s, w);
+			struct emitter_point x = sphere_point(s, w);
 			sum += emitter_pdf_toward(s->em, s->ref, &x) / SUB;
 		}
 		double share = sum * 2 * M_PI * r * r * (1 - r / distance) / RINGS;
@@ -213,7 +213,7 @@ static void check_cone(const char *what, const struct seen *s)
 	check_counts(what, counts, expected, RINGS);
 }
 
-static void test_cone(void **state)
+static void test_visible_cap_is_sampled_evenly(void **state)
 {
 	(void)state;
 	struct world *w = sphere_light("false");
@@ -236,8 +236,8 @@ static double cosine_density(const void *arg, vec3 w)
 	return s->em->ops->pdf_direction(s->em, &x, w);
 }
 
-/* back: the share of directions against the normal; unless it is 0, both sides emit alike. */
-static void check_direction(const char *what, struct world *w, double back)
+/* back_share: the share of directions against the normal; unless it is 0, both sides emit alike. */
+static void check_direction(const char *what, struct world *w, double back_share)
 {
 	static uint64_t counts[CELLS * CELLS];
 	static double expected[CELLS * CELLS];
@@ -256,14 +256,14 @@ static void check_direction(const char *what, struct world *w, double back)
 		assert_true(fabs(pdf - s.em->ops->pdf_direction(s.em, &x, dir)) < 1e-12);
 		double ahead = s.em->ops->radiance(s.em, &x, dir, &wl).v[0],
 		       opposite = s.em->ops->radiance(s.em, &x, vec3_neg(dir), &wl).v[0];
-		assert_true(ahead > 0 && opposite == (back > 0 ? ahead : 0));
+		assert_true(ahead > 0 && opposite == (back_share > 0 ? ahead : 0));
 		counts[sphere_cell(dir)]++;
 		behind += vec3_dot(dir, x.n) < 0;
 	}
-	double sum = expect(cosine_density, &s, (double)n, expected);
+	double sum = expect_counts(cosine_density, &s, (double)n, expected);
 	assert_true(fabs(sum - 1) < 1e-4);
 	check_counts(what, counts, expected, CELLS * CELLS);
-	assert_true(fabs(behind / (double)n - back) <= 6 * sqrt(back * (1 - back) / (double)n));
+	assert_true(fabs(behind / (double)n - back_share) <= 6 * sqrt(back_share * (1 - back_share) / (double)n));
 	world_free(w);
 }
 
@@ -274,7 +274,7 @@ static void check_direction(const char *what, struct world *w, double back)
 
 /* If the surface encloses a body smaller than the scene, few directions are sampled against the normal; otherwise half
  * of them. The power is that of two sides. */
-static void test_direction(void **state)
+static void test_directions_follow_the_cosine(void **state)
 {
 	(void)state;
 	check_direction("direction", sphere_light("false"), 0);
@@ -301,7 +301,7 @@ static void test_direction(void **state)
 
 /* Triangles are chosen by area, and points evenly within each: the four parts of a triangle, cut at its midpoints, get
  * equal counts. */
-static void test_mesh(void **state)
+static void test_triangles_are_sampled_by_area(void **state)
 {
 	(void)state;
 	struct world *w = mesh_light();
@@ -350,7 +350,7 @@ static void test_mesh(void **state)
 }
 
 /* Random numbers on the border of the unit square give points, too. */
-static void test_corners(void **state)
+static void test_border_numbers_give_points(void **state)
 {
 	(void)state;
 	struct world *w[2] = {sphere_light("false"), mesh_light()};
@@ -374,7 +374,7 @@ static void test_corners(void **state)
 
 /* A texture on the light has the same value whether a point is sampled, sampled towards another point, or hit by a
  * ray. */
-static void test_texture_coordinates(void **state)
+static void test_texture_coordinates_agree_with_rays(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -384,7 +384,7 @@ static void test_texture_coordinates(void **state)
 				"<rotate x='1' y='2' z='.5' angle='70'/><translate x='.25' y='-.5'/></transform>"
 				"<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>");
 	const struct emitter *em = &w->emitters[0];
-	const struct geom_shape *s = &w->shapes[w->emitter_shape[0]];
+	const struct geom_shape *s = &w->shapes[w->emitter_shapes[0]];
 	for (int i = 0; i < 64; i++) {
 		const double u[2] = {(i % 8 + 0.3) / 8, (i / 8 + 0.6) / 8};
 		struct emitter_point x[2];
@@ -405,9 +405,12 @@ static void test_texture_coordinates(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sphere),	  cmocka_unit_test(test_cone),
-		cmocka_unit_test(test_direction), cmocka_unit_test(test_mesh),
-		cmocka_unit_test(test_corners),	  cmocka_unit_test(test_texture_coordinates),
+		cmocka_unit_test(test_points_on_a_sphere_follow_the_density),
+		cmocka_unit_test(test_visible_cap_is_sampled_evenly),
+		cmocka_unit_test(test_directions_follow_the_cosine),
+		cmocka_unit_test(test_triangles_are_sampled_by_area),
+		cmocka_unit_test(test_border_numbers_give_points),
+		cmocka_unit_test(test_texture_coordinates_agree_with_rays),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

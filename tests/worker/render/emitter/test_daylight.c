@@ -26,7 +26,7 @@ static double luminance(const double rgb[3])
 
 /* Solstices and equinoxes: at noon the sun is at an elevation of 90 - latitude +- 23.4 degrees, in the south; it rises
  * in the east. */
-static void test_where_the_sun_stands(void **state)
+static void test_sun_position_follows_the_seasons(void **state)
 {
 	(void)state;
 	static const struct {
@@ -63,7 +63,7 @@ static void test_where_the_sun_stands(void **state)
 
 /* By the Astronomical Almanac's approximate formulas (section C, "Low precision formulas for the Sun"), whose
  * coefficients differ: hour angle from mean longitude, anomaly and Greenwich sidereal time, all in degrees. */
-static vec3 by_the_almanac(const struct daylight_time *t, double days)
+static vec3 almanac_sun_direction(const struct daylight_time *t, double days)
 {
 	double d = days + (t->hour - t->utc_offset) / 24, r = PI / 180;
 	double g = (357.529 + 0.98560028 * d) * r, q = 280.459 + 0.98564736 * d;
@@ -75,7 +75,7 @@ static vec3 by_the_almanac(const struct daylight_time *t, double days)
 		      cos(declination) * sin(l) * cos(turn) - sin(declination) * cos(l)};
 }
 
-static void test_the_almanac(void **state)
+static void test_sun_position_matches_the_almanac(void **state)
 {
 	(void)state;
 	static const struct {
@@ -88,7 +88,7 @@ static void test_the_almanac(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		vec3 here = daylight_sun_direction(&cases[i].t),
-		     there = by_the_almanac(&cases[i].t, cases[i].days - 0.5);
+		     there = almanac_sun_direction(&cases[i].t, cases[i].days - 0.5);
 		double off = vec3_length(vec3_sub(here, there)) * 180 / PI;
 		print_message("row %zu: %.4f degrees apart, %.1f above the horizon\n", i, off, asin(here.y) * 180 / PI);
 		assert_true(off < 0.02);
@@ -96,7 +96,7 @@ static void test_the_almanac(void **state)
 }
 
 /* Illuminance of open ground by the sun and by the sky. */
-static void test_how_bright_it_is(void **state)
+static void test_illuminance_is_realistic(void **state)
 {
 	(void)state;
 	double rgb[3], sun = 30 * PI / 180;
@@ -128,7 +128,7 @@ static void test_how_bright_it_is(void **state)
 }
 
 /* X, Y and Z in W / (m^2 sr), as computed by the program of the model's authors. */
-static void test_the_model(void **state)
+static void test_sky_matches_the_published_model(void **state)
 {
 	(void)state;
 	static const struct {
@@ -176,12 +176,12 @@ static void test_the_model(void **state)
 static int make_emitter(struct arena *a, const char *text, bool dialect_3, struct emitter *em, struct error *e)
 {
 	struct scene_node *n = node_make(a, PLUGIN_EMITTER, text);
-	const struct emitter_build build = {.arena = a, .dialect_3 = dialect_3, .world_scale = 1};
+	const struct emitter_build build = {.arena = a, .is_dialect_3 = dialect_3, .world_scale = 1};
 	return emitter_create(em, n, &build, e);
 }
 
 /* The image contains all light of the sun, whatever the size of its disk, in the right direction. */
-static void test_picture(void **state)
+static void test_map_contains_all_sunlight(void **state)
 {
 	(void)state;
 	static const char *const texts[] = {"sun", "sun sun_radius_scale=4", "sun sun_radius_scale=0",
@@ -218,20 +218,20 @@ static void test_picture(void **state)
 	}
 }
 
-static double seen_at(const struct emitter *em, double angle, double azimuth, const struct wavelengths *w)
+static double radiance_spectrum_at(const struct emitter *em, double angle, double azimuth, const struct wavelengths *w)
 {
 	vec3 d = {sin(angle) * sin(azimuth), cos(angle), sin(angle) * cos(azimuth)};
 	const struct emitter_point x = {.p = d, .is_infinite = true};
 	return em->ops->radiance(em, &x, vec3_neg(d), w).v[0];
 }
 
-static double radiance_seen(const struct emitter *em, double angle, double azimuth)
+static double luminance_at(const struct emitter *em, double angle, double azimuth)
 {
-	return seen_at(em, angle, azimuth, &(struct wavelengths){.is_grey = true});
+	return radiance_spectrum_at(em, angle, azimuth, &(struct wavelengths){.is_grey = true});
 }
 
 /* A brighter ground makes the sky brighter, and a green one its green; the defaults of the dialects differ. */
-static void test_ground(void **state)
+static void test_ground_albedo_colours_the_sky(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -242,14 +242,14 @@ static void test_ground(void **state)
 	assert_int_equal(make_emitter(&a, "sky albedo=0", false, &dark, &e), 0);
 	assert_int_equal(make_emitter(&a, "sky albedo=0.2", false, &grey[0], &e), 0);
 	assert_int_equal(make_emitter(&a, "sky albedo=0.3", true, &grey[1], &e), 0);
-	double by[2] = {radiance_seen(&old, 1, 2) / radiance_seen(&dark, 1, 2), recent.power / dark.power};
+	double by[2] = {luminance_at(&old, 1, 2) / luminance_at(&dark, 1, 2), recent.power / dark.power};
 	print_message("brighter by %.3f and %.3f\n", by[0], by[1]);
 	assert_true(by[0] > 1.02 && by[1] > 1.5 * by[0] - 0.5 && by[1] < 1.3);
-	assert_true(radiance_seen(&old, 1, 2) == radiance_seen(&grey[0], 1, 2) && recent.power == grey[1].power);
+	assert_true(luminance_at(&old, 1, 2) == luminance_at(&grey[0], 1, 2) && recent.power == grey[1].power);
 	const struct wavelengths w[2] = {{.nm = {540, 540, 540, 540}}, {.nm = {440, 440, 440, 440}}};
 	assert_int_equal(make_emitter(&a, "sky albedo=rgb(0,0.9,0)", false, &green, &e), 0);
 	for (int i = 0; i < 2; i++)
-		by[i] = seen_at(&green, 1, 2, &w[i]) / seen_at(&dark, 1, 2, &w[i]);
+		by[i] = radiance_spectrum_at(&green, 1, 2, &w[i]) / radiance_spectrum_at(&dark, 1, 2, &w[i]);
 	print_message("a green ground: green by %.3f, blue by %.3f\n", by[0], by[1]);
 	assert_true(by[0] > 1.05 && by[0] - 1 > 3 * (by[1] - 1));
 	arena_fini(&a);
@@ -257,7 +257,7 @@ static void test_ground(void **state)
 
 /* `stretch` moves the sky down, `extend` fades it out below the horizon: both are compared with the formula at some
  * angles, between which the map interpolates. */
-static void test_below_the_horizon(void **state)
+static void test_stretch_and_extend_fill_below_the_horizon(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -269,17 +269,17 @@ static void test_below_the_horizon(void **state)
 	assert_int_equal(make_emitter(&a, "sky extend=true", false, &extended, &e), 0);
 	for (double azimuth = 0; azimuth < 6; azimuth += 0.7) {
 		/* The first row of the map below the horizon, for which the model is evaluated just above it. */
-		double horizon = radiance_seen(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
-		assert_true(fabs(horizon / radiance_seen(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
+		double horizon = luminance_at(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
+		assert_true(fabs(horizon / luminance_at(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
 		for (double angle = 0.05; angle < 3.1; angle += 0.1) {
-			double l = radiance_seen(&plain, angle, azimuth), s = radiance_seen(&stretched, angle, azimuth);
-			double above = radiance_seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
-			assert_true(radiance_seen(&defaults, angle, azimuth) == l);
+			double l = luminance_at(&plain, angle, azimuth), s = luminance_at(&stretched, angle, azimuth);
+			double above = luminance_at(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
+			assert_true(luminance_at(&defaults, angle, azimuth) == l);
 			assert_true((l > 0) == (angle < 0.5 * PI));
 			if (fabs(angle - 0.75 * PI) > 0.05) /* not at its edge */
 				assert_true(fabs(s - above) <= 0.02 * above);
 			double below = horizon * fade * fade * (3 - 2 * fade);
-			double x = radiance_seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
+			double x = luminance_at(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
 			assert_true(fabs(x - due) <= 0.02 * due + 1e-4 * horizon);
 		}
 	}
@@ -288,7 +288,7 @@ static void test_below_the_horizon(void **state)
 
 /* The parameters that scale sky and sun: in 0.6, `scale` is a default, and the only scale of `sky` and `sun`; in 3.x,
  * it is a further factor. */
-static void test_scales(void **state)
+static void test_scales_multiply_sky_and_sun(void **state)
 {
 	(void)state;
 	static const struct {
@@ -322,7 +322,7 @@ static void test_scales(void **state)
 }
 
 /* Returns the mean direction of the light. */
-static vec3 middle_of(const struct emitter *em)
+static vec3 mean_direction(const struct emitter *em)
 {
 	enum { N = 200 };
 	const struct wavelengths grey = {.is_grey = true};
@@ -338,7 +338,7 @@ static vec3 middle_of(const struct emitter *em)
 
 /* If the sun is given by time and place, south and west are +z and -x in 0.6, +x and +y in 3.x. `stretch` moves the
  * disk down along its meridian. */
-static void test_which_way_is_north(void **state)
+static void test_north_follows_the_dialect(void **state)
 {
 	(void)state;
 	struct arena a = {0};
@@ -350,16 +350,16 @@ static void test_which_way_is_north(void **state)
 	assert_int_equal(make_emitter(&a, "sun", false, &old, &e), 0);
 	assert_int_equal(make_emitter(&a, "sun", true, &recent, &e), 0);
 	assert_int_equal(make_emitter(&a, "sun stretch=1.75", false, &low, &e), 0);
-	assert_true(vec3_length(vec3_sub(middle_of(&old), d)) < 2e-3);
-	assert_true(vec3_length(vec3_sub(middle_of(&recent), (vec3){d.z, -d.x, d.y})) < 2e-3);
+	assert_true(vec3_length(vec3_sub(mean_direction(&old), d)) < 2e-3);
+	assert_true(vec3_length(vec3_sub(mean_direction(&recent), (vec3){d.z, -d.x, d.y})) < 2e-3);
 	double angle = 1.75 * acos(d.y), across = sqrt(1 - d.y * d.y);
 	vec3 down = {d.x * sin(angle) / across, cos(angle), d.z * sin(angle) / across};
-	assert_true(vec3_length(vec3_sub(middle_of(&low), down)) < 2e-3);
+	assert_true(vec3_length(vec3_sub(mean_direction(&low), down)) < 2e-3);
 	arena_fini(&a);
 }
 
 /* Creates an emitter with the sun in the given direction. */
-static int make_under(struct arena *a, const char *type, vec3 sun, struct emitter *em, struct error *e)
+static int make_with_sun(struct arena *a, const char *type, vec3 sun, struct emitter *em, struct error *e)
 {
 	struct scene_node *n = node_make(a, PLUGIN_EMITTER, type);
 	struct property direction = {.name = "sun_direction", .value = {.type = VALUE_POINT, .as.point = sun}};
@@ -369,7 +369,7 @@ static int make_under(struct arena *a, const char *type, vec3 sun, struct emitte
 }
 
 /* As in Mitsuba, the sun may be on the horizon: the sky is bright, and the upper half of the sun is visible. */
-static void test_on_the_horizon(void **state)
+static void test_sun_may_be_on_the_horizon(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"sunsky", "sky"};
@@ -378,19 +378,19 @@ static void test_on_the_horizon(void **state)
 		struct arena a = {0};
 		struct emitter em;
 		struct error e = {""};
-		assert_true(make_under(&a, types[i], (vec3){1, -0.001, 0}, &em, &e) < 0);
+		assert_true(make_with_sun(&a, types[i], (vec3){1, -0.001, 0}, &em, &e) < 0);
 		assert_non_null(strstr(e.text, "below the horizon (-0.1 degrees)"));
-		if (make_under(&a, types[i], (vec3){1, 0, 0}, &em, &e))
+		if (make_with_sun(&a, types[i], (vec3){1, 0, 0}, &em, &e))
 			fail_msg("%s", e.text);
-		light[i][0] = radiance_seen(&em, 0.5 * PI - 1e-3, 0.5 * PI);
-		light[i][1] = radiance_seen(&em, 0.3 * PI, 2);
+		light[i][0] = luminance_at(&em, 0.5 * PI - 1e-3, 0.5 * PI);
+		light[i][1] = luminance_at(&em, 0.3 * PI, 2);
 		arena_fini(&a);
 	}
 	assert_true(light[0][0] > 2 * light[1][0] && light[1][0] > 0);
 	assert_true(light[1][1] > 0 && fabs(light[0][1] / light[1][1] - 1) < 0.02);
 }
 
-static void test_refused(void **state)
+static void test_invalid_daylight_is_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -420,17 +420,17 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_where_the_sun_stands),
-		cmocka_unit_test(test_the_almanac),
-		cmocka_unit_test(test_how_bright_it_is),
-		cmocka_unit_test(test_the_model),
-		cmocka_unit_test(test_picture),
-		cmocka_unit_test(test_ground),
-		cmocka_unit_test(test_below_the_horizon),
-		cmocka_unit_test(test_scales),
-		cmocka_unit_test(test_which_way_is_north),
-		cmocka_unit_test(test_on_the_horizon),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_sun_position_follows_the_seasons),
+		cmocka_unit_test(test_sun_position_matches_the_almanac),
+		cmocka_unit_test(test_illuminance_is_realistic),
+		cmocka_unit_test(test_sky_matches_the_published_model),
+		cmocka_unit_test(test_map_contains_all_sunlight),
+		cmocka_unit_test(test_ground_albedo_colours_the_sky),
+		cmocka_unit_test(test_stretch_and_extend_fill_below_the_horizon),
+		cmocka_unit_test(test_scales_multiply_sky_and_sun),
+		cmocka_unit_test(test_north_follows_the_dialect),
+		cmocka_unit_test(test_sun_may_be_on_the_horizon),
+		cmocka_unit_test(test_invalid_daylight_is_refused),
 	};
 	return cmocka_run_group_tests_name("daylight", tests, NULL, NULL);
 }

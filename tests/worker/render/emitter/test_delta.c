@@ -21,10 +21,10 @@
 
 static const struct wavelengths grey = {.is_grey = true};
 /* The spectrum of intensity 1. */
-static const struct color white = {.kind = COLOR_KIND_D65, .scale = 1, .times_d65 = true};
+static const struct color unit_intensity = {.kind = COLOR_KIND_D65, .scale = 1, .is_times_d65 = true};
 
 /* A sphere at (10, 0, 0) of radius 4, so that the world is translated and scaled by a power of two. */
-static struct world *world_of(const char *version, const char *emitters)
+static struct world *make_world(const char *version, const char *emitters)
 {
 	static char text[4096];
 	snprintf(text, sizeof text,
@@ -50,14 +50,14 @@ static struct emitter_point only_point(const struct emitter *em)
 	return x;
 }
 
-static bool near(vec3 a, vec3 b)
+static bool is_near(vec3 a, vec3 b)
 {
 	return vec3_length(vec3_sub(a, b)) < 1e-12 * (1 + vec3_length(b));
 }
 
 /* Both dialects, and both ways of giving the position. Light falls off with the square of the distance in scene
  * units. */
-static void test_places(void **state)
+static void test_positions_of_both_dialects_agree(void **state)
 {
 	(void)state;
 #define AT(name) "<transform name='" name "'><scale value='2'/><translate x='3' y='4' z='-5'/></transform>"
@@ -82,10 +82,10 @@ static void test_places(void **state)
 		  {"0.5.0", EMITTER("directional", ALONG("toWorld"), "irradiance")},
 	  };
 	for (size_t i = 0; i < sizeof points / sizeof *points; i++) {
-		struct world *w = world_of(points[i].version, points[i].emitter);
+		struct world *w = make_world(points[i].version, points[i].emitter);
 		const struct emitter *em = &w->emitters[0];
 		struct emitter_point x = only_point(em);
-		assert_true(near(x.p, vec3_scale(w->scale, vec3_sub((vec3){3, 4, -5}, w->center))));
+		assert_true(is_near(x.p, vec3_scale(w->scale, vec3_sub((vec3){3, 4, -5}, w->center))));
 		assert_true(vec3_length(x.n) == 0 && !x.is_infinite && w->environment == -1);
 		vec3 axis = vec3_normalize((vec3){7, -4, 5});
 		assert_true(fabs(em->ops->radiance(em, &x, axis, &grey).v[0] / (w->scale * w->scale) - 6) < 1e-12);
@@ -94,13 +94,13 @@ static void test_places(void **state)
 		world_free(w);
 	}
 	for (size_t i = 0; i < sizeof parallel / sizeof *parallel; i++) {
-		struct world *w = world_of(parallel[i].version, parallel[i].emitter);
+		struct world *w = make_world(parallel[i].version, parallel[i].emitter);
 		const struct emitter *em = &w->emitters[0];
 		struct emitter_point x = only_point(em);
 		/* Towards the light. */
-		assert_true(x.is_infinite && near(x.p, (vec3){0, 0.6, -0.8}) && w->environment == -1);
+		assert_true(x.is_infinite && is_near(x.p, (vec3){0, 0.6, -0.8}) && w->environment == -1);
 		assert_true(em->ops->radiance(em, &x, vec3_neg(x.p), &grey).v[0] == 6);
-		assert_true(fabs(em->power / (M_PI * w->radius * w->radius) - 6 * color_mean(&white)) < 1e-9);
+		assert_true(fabs(em->power / (M_PI * w->radius * w->radius) - 6 * color_mean(&unit_intensity)) < 1e-9);
 		world_free(w);
 	}
 }
@@ -149,11 +149,11 @@ static void check_directions(const char *name, const struct emitter *em, vec3 ax
 	assert_true(fabs(total / power - 1) < 1e-3);
 }
 
-static void test_directions(void **state)
+static void test_directions_follow_their_density(void **state)
 {
 	(void)state;
-	struct world *w = world_of("3.0.0", "<emitter type='point'/>");
-	double unit = w->scale * w->scale, mean = color_mean(&white);
+	struct world *w = make_world("3.0.0", "<emitter type='point'/>");
+	double unit = w->scale * w->scale, mean = color_mean(&unit_intensity);
 	check_directions("point", &w->emitters[0], (vec3){0, 0, 1}, 2, w->emitters[0].power / mean);
 	assert_true(fabs(w->emitters[0].power / (4 * M_PI * unit * mean) - 1) < 1e-12);
 	world_free(w);
@@ -166,7 +166,7 @@ static void test_directions(void **state)
 			"<emitter type='spot'><float name='cutoffAngle' value='%g'/><float name='beamWidth' value='%g'/></emitter>",
 			cutoff, beam);
 		snprintf(name, sizeof name, "spot of %g degrees, %g of them full", cutoff, beam);
-		w = world_of("0.6.0", text);
+		w = make_world("0.6.0", text);
 		const struct emitter *em = &w->emitters[0];
 		check_directions(name, em, (vec3){0, 0, 1}, 1 - cos(cutoff * M_PI / 180), em->power / mean);
 		/* Linear in the angle between beam and cut-off. */
@@ -181,7 +181,7 @@ static void test_directions(void **state)
 		}
 		world_free(w);
 	}
-	w = world_of("3.0.0", "<emitter type='spot'/>");
+	w = make_world("3.0.0", "<emitter type='spot'/>");
 	struct emitter_point x = only_point(&w->emitters[0]);
 	double a = 17.5 * M_PI / 180;
 	assert_true(
@@ -191,12 +191,12 @@ static void test_directions(void **state)
 }
 
 /* A constant instead of an image, which Mitsuba 0.6 ignores. */
-static void test_even_texture(void **state)
+static void test_constant_texture_scales_the_spot_in_3_x_only(void **state)
 {
 	(void)state;
 	for (int old = 0; old <= 1; old++) {
-		struct world *w = world_of(old ? "0.6.0" : "3.0.0",
-					   "<emitter type='spot'><spectrum name='texture' value='0.25'/></emitter>");
+		struct world *w = make_world(old ? "0.6.0" : "3.0.0",
+					     "<emitter type='spot'><spectrum name='texture' value='0.25'/></emitter>");
 		const struct emitter *em = &w->emitters[0];
 		struct emitter_point x = only_point(em);
 		double unit = w->scale * w->scale, got = em->ops->radiance(em, &x, (vec3){0, 0, 1}, &grey).v[0] / unit;
@@ -212,10 +212,10 @@ static bool has_effect(const struct world *w, const char *effect)
 	return render_effect_is_on(&s, effect);
 }
 
-static void test_world(void **state)
+static void test_world_has_the_effects_of_its_lights(void **state)
 {
 	(void)state;
-	struct world *w = world_of(
+	struct world *w = make_world(
 		"3.0.0",
 		"<emitter type='directional'/><emitter type='constant'/><emitter type='point'/><emitter type='directional'/>");
 	assert_int_equal(w->emitter_count, 4);
@@ -223,12 +223,12 @@ static void test_world(void **state)
 	assert_true(has_effect(w, "delta-light") && has_effect(w, "environment") && !has_effect(w, "area-light") &&
 		    !w->effects.colour);
 	world_free(w);
-	w = world_of("3.0.0", "<emitter type='constant'/>");
+	w = make_world("3.0.0", "<emitter type='constant'/>");
 	assert_false(has_effect(w, "delta-light"));
 	world_free(w);
 }
 
-static void test_refusals(void **state)
+static void test_invalid_delta_lights_are_refused(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -255,8 +255,11 @@ static void test_refusals(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_places), cmocka_unit_test(test_directions), cmocka_unit_test(test_even_texture),
-		cmocka_unit_test(test_world),  cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_positions_of_both_dialects_agree),
+		cmocka_unit_test(test_directions_follow_their_density),
+		cmocka_unit_test(test_constant_texture_scales_the_spot_in_3_x_only),
+		cmocka_unit_test(test_world_has_the_effects_of_its_lights),
+		cmocka_unit_test(test_invalid_delta_lights_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,21 +27,22 @@ static const double power = 2.5, half_angle = 1e-3;
 static const struct wavelengths grey = {.is_grey = true};
 
 /* A world with one emitting shape, with the given contents. */
-static struct world *beam(const char *shape, const char *more)
+static struct world *make_beam(const char *shape, const char *more)
 {
 	return world_from_text(8, 8, EYE "<shape type='%s'>%s" BEAM "</shape>", shape, more);
 }
 
 /* A plane that is tilted and far from the origin, so that its corners are rounded. */
-static struct world *plane_beam(const char *shape)
+static struct world *make_plane_beam(const char *shape)
 {
-	return beam(shape, "<transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
-			   "<translate x='5.3' y='-2.1' z='3.7'/></transform>");
+	return make_beam(shape,
+			 "<transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
+			 "<translate x='5.3' y='-2.1' z='3.7'/></transform>");
 }
 
 #define BALL "<point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
 
-static double emitted(const struct emitter *em, const struct emitter_point *x, vec3 w)
+static double emitted_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w)
 {
 	return em->ops->radiance(em, x, w, &grey).v[0];
 }
@@ -59,8 +60,8 @@ static void check_directions(const struct emitter *em, const char *name)
 		assert_true(fabs(vec3_length(w) - 1) < 1e-12 && acos(fmin(vec3_dot(w, x.n), 1)) < 1.0001 * half_angle);
 		assert_true(fabs(em->ops->pdf_direction(em, &x, w) / pdf - 1) < 1e-9);
 		/* Power per area: L cos / pdf. The normals of a disk's triangles differ by the rounding of its rim. */
-		assert_true(fabs(emitted(em, &x, w) * vec3_dot(w, x.n) / pdf / power - 1) < 1e-6);
-		assert_true(emitted(em, &x, vec3_neg(w)) == 0);
+		assert_true(fabs(emitted_radiance(em, &x, w) * vec3_dot(w, x.n) / pdf / power - 1) < 1e-6);
+		assert_true(emitted_radiance(em, &x, vec3_neg(w)) == 0);
 	}
 	struct emitter_point x;
 	double pdf, sum = 0, flux = 0;
@@ -71,19 +72,19 @@ static void check_directions(const struct emitter *em, const char *name)
 		vec3 w = frame_to_world(&f, (vec3){sin(angle) * cos(1.0 * i), sin(angle) * sin(1.0 * i), cos(angle)});
 		double ring = 2 * M_PI * sin(angle) * width;
 		sum += em->ops->pdf_direction(em, &x, w) * ring;
-		flux += emitted(em, &x, w) * cos(angle) * ring;
-		assert_true(angle < 1.001 * half_angle || emitted(em, &x, w) == 0);
-		assert_true(emitted(em, &x, w) <= em->brightness_bound);
+		flux += emitted_radiance(em, &x, w) * cos(angle) * ring;
+		assert_true(angle < 1.001 * half_angle || emitted_radiance(em, &x, w) == 0);
+		assert_true(emitted_radiance(em, &x, w) <= em->brightness_bound);
 	}
 	print_message("%s: density %.6f, power per area %.6f\n", name, sum, flux);
 	assert_true(fabs(sum - 1) < 1e-4 && fabs(flux / power - 1) < 1e-4);
 }
 
-static void test_directions(void **state)
+static void test_directions_stay_within_the_cone(void **state)
 {
 	(void)state;
-	struct world *w[] = {plane_beam("rectangle"), plane_beam("disk"), beam("sphere", BALL),
-			     beam("sphere", BALL "<boolean name='flip_normals' value='true'/>")};
+	struct world *w[] = {make_plane_beam("rectangle"), make_plane_beam("disk"), make_beam("sphere", BALL),
+			     make_beam("sphere", BALL "<boolean name='flip_normals' value='true'/>")};
 	static const char *const names[] = {"rectangle", "disk", "sphere", "sphere, inwards"};
 	for (int i = 0; i < 4; i++) {
 		check_directions(&w[i]->emitters[0], names[i]);
@@ -92,7 +93,7 @@ static void test_directions(void **state)
 }
 
 /* Estimates the irradiance of a surface at ref that faces the light; n: from ref towards the light. */
-static struct stats_mean irradiance(const struct emitter *em, vec3 ref, vec3 n, const char *name)
+static struct stats_mean estimate_irradiance(const struct emitter *em, vec3 ref, vec3 n, const char *name)
 {
 	enum { GROUPS = 16 };
 	double means[GROUPS] = {0};
@@ -108,14 +109,14 @@ static struct stats_mean irradiance(const struct emitter *em, vec3 ref, vec3 n, 
 		double l2 = vec3_dot(to, to);
 		vec3 w = vec3_scale(1 / sqrt(l2), to);
 		double g = fmax(vec3_dot(w, n), 0) * fmax(-vec3_dot(w, x.n), 0) / l2;
-		means[i % GROUPS] += emitted(em, &x, vec3_neg(w)) * g / pdf / (double)each;
+		means[i % GROUPS] += emitted_radiance(em, &x, vec3_neg(w)) * g / pdf / (double)each;
 	}
 	return stats_mean_test(means, GROUPS, power);
 }
 
 static void expect_irradiance(const struct emitter *em, vec3 ref, vec3 n, double expected, const char *name)
 {
-	struct stats_mean m = irradiance(em, ref, n, name);
+	struct stats_mean m = estimate_irradiance(em, ref, n, name);
 	print_message("%s: %.5f +- %.5f, expected %.5f\n", name, m.mean, m.error, expected);
 	if (fabs(m.mean - expected) > 8 * m.error + 1e-4 * expected)
 		fail_msg("%s: %g +- %g instead of %g", name, m.mean, m.error, expected);
@@ -136,7 +137,7 @@ static vec3 plane_normal(const struct emitter *em)
 
 static void check_plane(const char *shape)
 {
-	struct world *w = plane_beam(shape);
+	struct world *w = make_plane_beam(shape);
 	const struct emitter *em = &w->emitters[0];
 	struct emitter_point x;
 	double pdf;
@@ -152,9 +153,9 @@ static void check_plane(const char *shape)
 	}
 	/* Points behind the plane, and beside it. */
 	struct frame f = frame_around(n);
-	struct stats_mean behind = irradiance(em, vec3_madd(x.p, -side, n), n, "behind");
+	struct stats_mean behind = estimate_irradiance(em, vec3_madd(x.p, -side, n), n, "behind");
 	struct stats_mean beside =
-		irradiance(em, vec3_madd(vec3_madd(x.p, side, n), 3 * side, f.s), vec3_neg(n), "beside");
+		estimate_irradiance(em, vec3_madd(vec3_madd(x.p, side, n), 3 * side, f.s), vec3_neg(n), "beside");
 	assert_true(behind.mean == 0 && beside.mean == 0);
 	/* The density integrates to one over the disc around the projection. */
 	enum { RINGS = 4000 };
@@ -170,17 +171,17 @@ static void check_plane(const char *shape)
 	world_free(w);
 }
 
-static void test_plane(void **state)
+static void test_plane_has_its_irradiance(void **state)
 {
 	(void)state;
 	check_plane("rectangle");
 	check_plane("disk");
 }
 
-static void test_sphere(void **state)
+static void test_sphere_has_its_irradiance(void **state)
 {
 	(void)state;
-	struct world *w = beam("sphere", BALL);
+	struct world *w = make_beam("sphere", BALL);
 	const struct emitter *em = &w->emitters[0];
 	const struct geom_shape *s = &w->shapes[0];
 	const double gaps[] = {1e-3, 0.1, 1, 100};
@@ -195,7 +196,7 @@ static void test_sphere(void **state)
 }
 
 /* On a surface that is neither a plane nor a sphere, the shining part is not searched for. */
-static void test_bent(void **state)
+static void test_curved_surfaces_are_not_searched(void **state)
 {
 	(void)state;
 	static const char scene[] =
@@ -218,10 +219,10 @@ static void test_bent(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_directions),
-		cmocka_unit_test(test_plane),
-		cmocka_unit_test(test_sphere),
-		cmocka_unit_test(test_bent),
+		cmocka_unit_test(test_directions_stay_within_the_cone),
+		cmocka_unit_test(test_plane_has_its_irradiance),
+		cmocka_unit_test(test_sphere_has_its_irradiance),
+		cmocka_unit_test(test_curved_surfaces_are_not_searched),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,18 +27,18 @@ enum { WIDTH = 8, HEIGHT = 6, COLUMNS = 2 * WIDTH, CELLS = 2 * HEIGHT * COLUMNS,
 
 /* In 3.x the outer rows are at the poles; otherwise they are half a pixel away from them. */
 static bool dialect_3;
-static int rows(void)
+static int row_count(void)
 {
 	return 2 * (dialect_3 ? HEIGHT - 1 : HEIGHT);
 }
 
 static const struct wavelengths colour = {.nm = {450, 550, 600, 700}}, grey = {.is_grey = true};
-static const char *const cases[] = {
+static const char *const emitter_texts[] = {
 	"constant",	      "constant radiance=rgb(0.3,0.5,2)",
 	"envmap filename=p0", "envmap filename=p1 scale=3",
 	"envmap filename=p2", "envmap filename=p3",
 };
-enum { CASES = sizeof cases / sizeof *cases };
+enum { CASES = sizeof emitter_texts / sizeof *emitter_texts };
 
 struct fixture {
 	struct arena arena;
@@ -82,7 +82,7 @@ static int try_emitter_text(struct fixture *f, const char *text, const mat4 *to_
 			    struct error *e)
 {
 	struct scene_node *n = node_make(&f->arena, PLUGIN_EMITTER, text);
-	const struct emitter_build build = {.assets = &f->source, .arena = &f->arena, .dialect_3 = dialect_3};
+	const struct emitter_build build = {.assets = &f->source, .arena = &f->arena, .is_dialect_3 = dialect_3};
 	if (to_world)
 		node_add_transform(&f->arena, n, "to_world", *to_world);
 	return emitter_create(em, n, &build, e);
@@ -97,7 +97,7 @@ static struct emitter make_emitter(struct fixture *f, const char *text, const ma
 	return em;
 }
 
-static vec3 direction(double u, double v)
+static vec3 map_direction(double u, double v)
 {
 	double phi = 2 * PI * u, theta = PI * v;
 	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
@@ -120,10 +120,11 @@ static spectrum radiance_at(const struct emitter *em, vec3 d, const struct wavel
 static double expected_counts(const struct emitter *em, double shift, double *cells)
 {
 	double total = 0;
-	for (int i = 0; i < rows() * COLUMNS; i++) {
+	for (int i = 0; i < row_count() * COLUMNS; i++) {
 		int row = i / COLUMNS, column = i % COLUMNS;
-		double angle = 2 * PI / COLUMNS * (cos(PI * row / rows()) - cos(PI * (row + 1) / rows()));
-		double p = angle * pdf_at(em, direction((column + 0.5 + shift) / COLUMNS, (row + 0.5) / rows()));
+		double angle = 2 * PI / COLUMNS * (cos(PI * row / row_count()) - cos(PI * (row + 1) / row_count()));
+		double p =
+			angle * pdf_at(em, map_direction((column + 0.5 + shift) / COLUMNS, (row + 0.5) / row_count()));
 		cells[i] = p * SAMPLES;
 		total += p;
 	}
@@ -154,36 +155,36 @@ static double chi_square(const struct emitter *em, double shift, uint64_t seed)
 		assert_true(em->ops->sample_point(em, u, &x, &pdf));
 		check_sample(em, u, &x, pdf);
 		double turn = atan2(x.p.x, -x.p.z) / (2 * PI);
-		int column = (int)(COLUMNS * (turn - floor(turn))), row = (int)(rows() * acos(x.p.y) / PI);
+		int column = (int)(COLUMNS * (turn - floor(turn))), row = (int)(row_count() * acos(x.p.y) / PI);
 		column = column == COLUMNS ? 0 : column;
-		observed[(row == rows() ? row - 1 : row) * COLUMNS + column]++;
+		observed[(row == row_count() ? row - 1 : row) * COLUMNS + column]++;
 	}
-	return stats_counts_p(observed, expected, (size_t)rows() * COLUMNS);
+	return stats_counts_p(observed, expected, (size_t)row_count() * COLUMNS);
 }
 
 static void test_samples_follow_the_density(void **state)
 {
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make_emitter(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, emitter_texts[k], NULL);
 		assert_true(em.is_infinite && em.power > 0 && isfinite(em.power));
-		double p = chi_square(&em, 0, stats_seed(cases[k]));
-		print_message("%s: p = %.2e\n", cases[k], p);
+		double p = chi_square(&em, 0, stats_seed(emitter_texts[k]));
+		print_message("%s: p = %.2e\n", emitter_texts[k], p);
 		assert_true(p > LEVEL);
 	}
-	struct emitter em = make_emitter(*state, cases[2], NULL);
+	struct emitter em = make_emitter(*state, emitter_texts[2], NULL);
 	assert_true(chi_square(&em, 1, stats_seed(__func__)) < LEVEL);
 }
 
 /* Computes the integral of the radiance in two ways; the density is positive wherever there is light. */
-static void test_radiance_over_density(void **state)
+static void test_radiance_over_density_integrates_alike(void **state)
 {
 	enum { GROUPS = 16, STEPS = 400 };
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make_emitter(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, emitter_texts[k], NULL);
 		double sum = 0, means[GROUPS] = {0};
 		for (int i = 0; i < STEPS * 2 * STEPS; i++) {
 			double v = (i / (2 * STEPS) + 0.5) / STEPS, u = (i % (2 * STEPS) + 0.5) / (2 * STEPS);
-			vec3 d = direction(u, v);
+			vec3 d = map_direction(u, v);
 			double l = radiance_at(&em, d, &colour).v[1];
 			sum += l * sin(PI * v) * PI * PI / (STEPS * STEPS);
 			assert_true(l == 0 || pdf_at(&em, d) > 0);
@@ -191,21 +192,21 @@ static void test_radiance_over_density(void **state)
 		for (uint64_t i = 0; i < SAMPLES; i++) {
 			double u[4], pdf;
 			struct emitter_point x;
-			rng_uniform4(stats_seed(cases[k]), RNG_TEST, i, 1, 0, u);
+			rng_uniform4(stats_seed(emitter_texts[k]), RNG_TEST, i, 1, 0, u);
 			if (em.ops->sample_point(&em, u, &x, &pdf))
 				means[i % GROUPS] += radiance_at(&em, x.p, &colour).v[1] / pdf / (SAMPLES / GROUPS);
 		}
 		struct stats_mean m = stats_mean_test(means, GROUPS, sum);
-		print_message("%s: %.6g +- %.2g, by quadrature %.6g\n", cases[k], m.mean, m.error, sum);
+		print_message("%s: %.6g +- %.2g, by quadrature %.6g\n", emitter_texts[k], m.mean, m.error, sum);
 		assert_true(fabs(m.mean - sum) < 8 * m.error + 1e-4 * sum && m.error < 0.005 * sum);
 	}
 }
 
-static void test_orientation(void **state)
+static void test_map_has_its_orientation(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p1 scale=3", NULL);
 	/* The pixel (2, 3) of 8 x 6. */
-	vec3 d = direction(2.5 / 8, dialect_3 ? 3.0 / 5 : 3.5 / 6);
+	vec3 d = map_direction(2.5 / 8, dialect_3 ? 3.0 / 5 : 3.5 / 6);
 	assert_true(d.x > 0 && d.y < 0 && d.z > 0);
 	assert_true(fabs(radiance_at(&em, d, &grey).v[0] - 6) < 1e-9);
 	assert_true(fabs(radiance_at(&em, d, &colour).v[1] - 6 * color_d65(550)) < 1e-9);
@@ -225,23 +226,23 @@ static void test_orientation(void **state)
 }
 
 /* Directions at which the red of p0 is seen; not exactly at the poles of 3.x, where all columns meet. */
-static void test_pixel_centres(void **state)
+static void test_pixel_centres_have_their_colours(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p0", NULL);
 	const struct wavelengths red = {.is_rgb = true};
 	for (int i = 0; i < WIDTH * HEIGHT; i++) {
 		double row = i / WIDTH, v = dialect_3 ? row / (HEIGHT - 1) : (row + 0.5) / HEIGHT;
-		vec3 d = direction((i % WIDTH + 0.5) / WIDTH, fmin(fmax(v, 1e-9), 1 - 1e-9));
+		vec3 d = map_direction((i % WIDTH + 0.5) / WIDTH, fmin(fmax(v, 1e-9), 1 - 1e-9));
 		double is = radiance_at(&em, d, &red).v[0], want = ldexp(1, i * 7 % 11 - 5);
 		if (fabs(is - want) > 1e-6)
 			fail_msg("pixel %d: %.9g, expected %.9g", i, is, want);
 	}
 }
 
-static void test_poles_and_ends(void **state)
+static void test_poles_and_ends_are_valid(void **state)
 {
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make_emitter(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, emitter_texts[k], NULL);
 		const vec3 poles[] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {-0.0, 0, -1}, {1e-300, 1, 0}};
 		for (int i = 0; i < 5; i++) {
 			assert_true(isfinite(pdf_at(&em, poles[i])));
@@ -266,11 +267,12 @@ static const mat4 stretches[] = {
 enum { STRETCHES = sizeof stretches / sizeof *stretches };
 
 /* A direction l of the image is seen in the direction M l. */
-static void check_places(struct fixture *f, const char *text, const mat4 *m, const struct emitter *em)
+static void check_stretched_directions(struct fixture *f, const char *text, const mat4 *m, const struct emitter *em)
 {
 	struct emitter plain = make_emitter(f, text, NULL);
 	for (int i = 0; i < 2000; i++) {
-		vec3 l = direction((i % 50 + 0.37) / 50, (i / 50 + 0.41) / 40), d = vec3_normalize(mat4_vector(m, l));
+		vec3 l = map_direction((i % 50 + 0.37) / 50, (i / 50 + 0.41) / 40),
+		     d = vec3_normalize(mat4_vector(m, l));
 		double is = radiance_at(em, d, &colour).v[1], want = radiance_at(&plain, l, &colour).v[1];
 		if (fabs(is - want) > 1e-9 * (want + 1e-3 * plain.brightness_bound))
 			fail_msg("%s: %.9g at %d, not %.9g", text, is, i, want);
@@ -291,7 +293,7 @@ static void check_stretched(const struct emitter *em, uint64_t seed)
 		int y = i / (SIDES * FINE), x = i % (SIDES * FINE);
 		/* Points are shifted from column to column, because the density jumps along whole rows. */
 		double v = (y + fmod(0.5 + 0.6180339887 * x, 1)) / (ROWS * FINE);
-		vec3 d = direction((x + 0.5) / (SIDES * FINE), v);
+		vec3 d = map_direction((x + 0.5) / (SIDES * FINE), v);
 		double angle = sin(PI * v) * 2 * PI * PI / (ROWS * SIDES * FINE * FINE), p = angle * pdf_at(em, d);
 		total += p;
 		light += angle * radiance_at(em, d, &colour).v[1];
@@ -320,18 +322,18 @@ static void check_stretched(const struct emitter *em, uint64_t seed)
 	assert_true(fabs(m.mean - light) < 8 * m.error + 3e-3 * light && m.error < 0.02 * light);
 }
 
-static void test_stretched(void **state)
+static void test_stretched_maps_follow_their_density(void **state)
 {
 	static const char *const images[] = {"envmap filename=p0", "envmap filename=p2", "envmap filename=p3"};
 	for (int k = 0; k < 3; k++)
 		for (int s = 0; s < STRETCHES; s++) {
 			struct emitter em = make_emitter(*state, images[k], &stretches[s]);
-			check_places(*state, images[k], &stretches[s], &em);
+			check_stretched_directions(*state, images[k], &stretches[s], &em);
 			check_stretched(&em, stats_seed(images[k]) + (uint64_t)s);
 		}
 }
 
-static void test_black_and_refusals(void **state)
+static void test_black_or_invalid_maps_are_refused(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p4", NULL);
 	struct emitter_point x;
@@ -349,7 +351,7 @@ static void test_black_and_refusals(void **state)
 	assert_true(try_emitter_text(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
 }
 
-static int setup_3(void **state)
+static int setup_dialect_3(void **state)
 {
 	dialect_3 = true;
 	return setup(state);
@@ -359,13 +361,13 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_samples_follow_the_density),
-		cmocka_unit_test(test_radiance_over_density),
-		cmocka_unit_test(test_orientation),
-		cmocka_unit_test(test_pixel_centres),
-		cmocka_unit_test(test_poles_and_ends),
-		cmocka_unit_test(test_stretched),
-		cmocka_unit_test(test_black_and_refusals),
+		cmocka_unit_test(test_radiance_over_density_integrates_alike),
+		cmocka_unit_test(test_map_has_its_orientation),
+		cmocka_unit_test(test_pixel_centres_have_their_colours),
+		cmocka_unit_test(test_poles_and_ends_are_valid),
+		cmocka_unit_test(test_stretched_maps_follow_their_density),
+		cmocka_unit_test(test_black_or_invalid_maps_are_refused),
 	};
 	return cmocka_run_group_tests_name("0.6", tests, setup, teardown) +
-	       cmocka_run_group_tests_name("3.x", tests, setup_3, teardown);
+	       cmocka_run_group_tests_name("3.x", tests, setup_dialect_3, teardown);
 }

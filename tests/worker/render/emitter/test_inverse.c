@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-static struct emitter_point draw(const struct emitter *em, double u0, double u1)
+static struct emitter_point draw_emitter_point(const struct emitter *em, double u0, double u1)
 {
 	struct emitter_point x;
 	double pdf;
@@ -23,10 +23,10 @@ static struct emitter_point draw(const struct emitter *em, double u0, double u1)
 	return x;
 }
 
-static double slope(const struct emitter *em, const double u[2], double pdf, double h)
+static double numeric_jacobian(const struct emitter *em, const double u[2], double pdf, double h)
 {
-	struct emitter_point a[4] = {draw(em, u[0] - h, u[1]), draw(em, u[0] + h, u[1]), draw(em, u[0], u[1] - h),
-				     draw(em, u[0], u[1] + h)};
+	struct emitter_point a[4] = {draw_emitter_point(em, u[0] - h, u[1]), draw_emitter_point(em, u[0] + h, u[1]),
+				     draw_emitter_point(em, u[0], u[1] - h), draw_emitter_point(em, u[0], u[1] + h)};
 	/* Differences must not cross the borders of triangles or cells. */
 	for (int i = 0; i < 4; i++)
 		if (a[i].texture_point.prim != a[0].texture_point.prim ||
@@ -36,7 +36,7 @@ static double slope(const struct emitter *em, const double u[2], double pdf, dou
 	return vec3_length(vec3_cross(d0, d1)) / (4 * h * h);
 }
 
-static void check(const char *name, const struct emitter *em, double share)
+static void check_inverse(const char *name, const struct emitter *em, double share)
 {
 	struct dice d = dice_for_test(name);
 	size_t n = dice_scaled_count(40000), slopes = 0;
@@ -48,14 +48,14 @@ static void check(const char *name, const struct emitter *em, double share)
 		assert_true(em->ops->sample_point(em, u, &x, &pdf));
 		em->ops->point_inverse(em, &x, back);
 		assert_true(back[0] >= 0 && back[0] < 1 && back[1] >= 0 && back[1] < 1);
-		y = draw(em, back[0], back[1]);
+		y = draw_emitter_point(em, back[0], back[1]);
 		assert_true(y.is_infinite == x.is_infinite &&
 			    (x.is_infinite || y.texture_point.prim == x.texture_point.prim));
 		worst = fmax(worst, vec3_length(vec3_sub(x.p, y.p)));
 		if (fabs(u[0] - 0.5) > 0.499 || fabs(u[1] - 0.5) > 0.499)
 			continue;
 		/* Only where steps of two lengths agree: the map has square roots at the corners of triangles. */
-		double area = slope(em, u, pdf, 1e-6), area2 = slope(em, u, pdf, 2e-6);
+		double area = numeric_jacobian(em, u, pdf, 1e-6), area2 = numeric_jacobian(em, u, pdf, 2e-6);
 		if (fabs(area / area2 - 1) < 1e-5) {
 			worst_slope = fmax(worst_slope, fabs(area * pdf - 1));
 			slopes++;
@@ -75,12 +75,12 @@ static void check(const char *name, const struct emitter *em, double share)
 		em->ops->point_inverse(em, &x, u);
 		assert_true(u[0] >= 0 && u[0] < 1 && u[1] >= 0 && u[1] < 1);
 		/* At the pole where numbers are coarse, 2^-53 of the area is a circle of radius 1e-8. */
-		struct emitter_point y = draw(em, u[0], u[1]);
+		struct emitter_point y = draw_emitter_point(em, u[0], u[1]);
 		assert_true(vec3_length(vec3_sub(x.p, y.p)) < 1e-7);
 	}
 }
 
-static void test_area(void **state)
+static void test_area_samples_are_inverted(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -90,8 +90,8 @@ static void test_area(void **state)
 				"<rotate x='1' y='1' angle='50'/><translate x='2'/></transform><emitter type='area'/></shape>"
 				"<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
 				"<boolean name='flip_normals' value='true'/><emitter type='area'/></shape>");
-	check("rectangle", &w->emitters[0], 0.99);
-	check("sphere", &w->emitters[1], 0.99);
+	check_inverse("rectangle", &w->emitters[0], 0.99);
+	check_inverse("sphere", &w->emitters[1], 0.99);
 	world_free(w);
 	/* Triangles with areas of about 1 : 18 : 1300, one of them upright, and one a sliver. */
 	static const char scene[] = "<scene version='3.0.0'>" SENSOR(
@@ -103,11 +103,11 @@ static void test_area(void **state)
 	const struct memory_file files[] = {
 		{"few.xml", scene, sizeof scene - 1}, {"few.obj", few, sizeof few - 1}, {NULL, NULL, 0}};
 	w = world_from_files(8, 8, files);
-	check("mesh", &w->emitters[0], 0.99);
+	check_inverse("mesh", &w->emitters[0], 0.99);
 	world_free(w);
 }
 
-static void test_infinite(void **state)
+static void test_infinite_samples_are_inverted(void **state)
 {
 	(void)state;
 	enum { WIDTH = 8, HEIGHT = 6 };
@@ -127,14 +127,14 @@ static void test_infinite(void **state)
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		struct scene_node *n = node_make(&arena, PLUGIN_EMITTER, texts[i]);
 		const struct emitter_build build = {
-			.assets = &source, .arena = &arena, .dialect_3 = true, .world_scale = 1};
+			.assets = &source, .arena = &arena, .is_dialect_3 = true, .world_scale = 1};
 		if (i)
 			node_add_transform(&arena, n, "to_world", turn);
 		struct emitter em;
 		struct error e;
 		if (emitter_create(&em, n, &build, &e))
 			fail_msg("%s: %s", texts[i], e.text);
-		check(texts[i], &em, 0.95);
+		check_inverse(texts[i], &em, 0.95);
 	}
 	pictures_fini(&pictures);
 	arena_fini(&arena);
@@ -142,6 +142,7 @@ static void test_infinite(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_area), cmocka_unit_test(test_infinite)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_area_samples_are_inverted),
+					   cmocka_unit_test(test_infinite_samples_are_inverted)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,7 +19,7 @@
 
 enum { WIDTH = 4, HEIGHT = 2 };
 static const struct wavelengths grey = {.is_grey = true};
-static const double shades[WIDTH * HEIGHT] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1};
+static const double pixel_values[WIDTH * HEIGHT] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1};
 
 /* clang-format off */
 #define LOOK "<transform name='to_world'><lookat origin='1,2,3' target='9,1,-1' up='0,1,0.2'/></transform>"
@@ -29,12 +29,12 @@ static const double shades[WIDTH * HEIGHT] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.
 /* clang-format on */
 
 /* A sphere at (10, 0, 0) seen by a camera at LOOK, 40 degrees wide, with `emitters`; p.hdr is the picture. */
-static struct world *world_of(const char *emitters)
+static struct world *make_world(const char *emitters)
 {
 	static char text[4096];
 	double rgb[WIDTH * HEIGHT * 3];
 	for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
-		rgb[i] = shades[i / 3];
+		rgb[i] = pixel_values[i / 3];
 	struct pictures pictures = {.count = 0};
 	pictures_add(&pictures, WIDTH, HEIGHT, rgb);
 	snprintf(
@@ -61,10 +61,10 @@ static double radiance(const struct world *w, int i, vec3 d)
 }
 
 /* The film of the camera has the shape of the picture, so that a film point sees the same point of the picture. */
-static void test_camera(void **state)
+static void test_projection_matches_the_camera(void **state)
 {
 	(void)state;
-	struct world *w = world_of("<emitter type='projector'><float name='fov' value='40'/>" LOOK PICTURE(
+	struct world *w = make_world("<emitter type='projector'><float name='fov' value='40'/>" LOOK PICTURE(
 		"irradiance") "<float name='scale' value='3'/></emitter>");
 	const struct camera *c = &w->camera;
 	struct dice dice = dice_for_test("projected_camera");
@@ -76,7 +76,8 @@ static void test_camera(void **state)
 		double z = vec3_dot(d, axis), expected = 0;
 		if (camera_project(c, c->position, d, 1, &film_x, &film_y) && film_x >= 0 && film_x < 64 &&
 		    film_y >= 0 && film_y < 32)
-			expected = M_PI * 3 * shades[(int)(film_y / 16) * WIDTH + (int)(film_x / 16)] / (z * z * z);
+			expected =
+				M_PI * 3 * pixel_values[(int)(film_y / 16) * WIDTH + (int)(film_x / 16)] / (z * z * z);
 		double got = radiance(w, 0, d);
 		assert_true(fabs(got - expected) <= 1e-9 * expected);
 		lit += got > 0;
@@ -86,11 +87,11 @@ static void test_camera(void **state)
 }
 
 /* The irradiance of a plane at distance z is the intensity times the cosine over the square of the distance. */
-static void test_plane(void **state)
+static void test_irradiance_falls_off_with_the_square(void **state)
 {
 	(void)state;
-	struct world *w = world_of("<emitter type='projector'><float name='fov' value='90'/>" LOOK
-				   "<float name='irradiance' value='0.7'/></emitter>");
+	struct world *w = make_world("<emitter type='projector'><float name='fov' value='90'/>" LOOK
+				     "<float name='irradiance' value='0.7'/></emitter>");
 	struct dice dice = dice_for_test("projected_plane");
 	const struct frame *f = &w->camera.axes;
 	for (int i = 0; i < 1000; i++) {
@@ -105,10 +106,10 @@ static void test_plane(void **state)
 }
 
 /* Directions are sampled with their density, and carry all the light. */
-static void test_directions(void **state)
+static void test_directions_follow_their_density(void **state)
 {
 	(void)state;
-	struct world *w = world_of("<emitter type='projector'><float name='fov' value='70'/>" LOOK PICTURE(
+	struct world *w = make_world("<emitter type='projector'><float name='fov' value='70'/>" LOOK PICTURE(
 		"irradiance") "</emitter><emitter type='spot'>" LOOK PICTURE("texture") "</emitter>");
 	struct dice dice = dice_for_test("projected_directions");
 	enum { N = 200000 };
@@ -133,19 +134,19 @@ static void test_directions(void **state)
 		print_message("%s: power %.4g, over the sphere %.4g, density %.4g\n", em->ops->decl.type, sum, all,
 			      mass);
 		assert_true(fabs(all / sum - 1) < 0.05 && fabs(mass - 1) < 0.05);
-		assert_true(em->power >=
-			    sum * w->scale * w->scale *
-				    color_mean(&(struct color){.kind = COLOR_KIND_D65, .scale = 1, .times_d65 = true}));
+		assert_true(em->power >= sum * w->scale * w->scale *
+						 color_mean(&(struct color){
+							 .kind = COLOR_KIND_D65, .scale = 1, .is_times_d65 = true}));
 		assert_true(em->is_textured && em->brightness_bound > 0);
 	}
 	world_free(w);
 }
 
 /* On a plane across the axis, the square of the texture touches the cone; the texture multiplies the intensity. */
-static void test_spot(void **state)
+static void test_spot_texture_touches_the_cone(void **state)
 {
 	(void)state;
-	struct world *w = world_of("<emitter type='spot'>" LOOK PICTURE(
+	struct world *w = make_world("<emitter type='spot'>" LOOK PICTURE(
 		"texture") "<float name='cutoff_angle' value='35'/></emitter>"
 			   "<emitter type='spot'>" LOOK "<float name='cutoff_angle' value='35'/></emitter>"
 			   "<emitter type='spot'>" LOOK
@@ -158,14 +159,15 @@ static void test_spot(void **state)
 		double x = dice_between(&dice, -1, 1), y = dice_between(&dice, -1, 1);
 		vec3 d = vec3_normalize(frame_to_world(f, (vec3){-reach * x, -reach * y, 1}));
 		double plain = radiance(w, 1, d);
-		double expected = plain * shades[(int)(0.5 * (y + 1) * HEIGHT) * WIDTH + (int)(0.5 * (x + 1) * WIDTH)];
+		double expected =
+			plain * pixel_values[(int)(0.5 * (y + 1) * HEIGHT) * WIDTH + (int)(0.5 * (x + 1) * WIDTH)];
 		assert_true(fabs(radiance(w, 0, d) - expected) <= 1e-9 * expected);
 		assert_true(fabs(radiance(w, 2, d) - 0.5 * plain) <= 1e-9 * plain);
 	}
 	world_free(w);
 }
 
-static void test_refusals(void **state)
+static void test_invalid_projectors_are_refused(void **state)
 {
 	(void)state;
 	world_check_refused(
@@ -183,8 +185,11 @@ static void test_refusals(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_camera), cmocka_unit_test(test_plane),	cmocka_unit_test(test_directions),
-		cmocka_unit_test(test_spot),   cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_projection_matches_the_camera),
+		cmocka_unit_test(test_irradiance_falls_off_with_the_square),
+		cmocka_unit_test(test_directions_follow_their_density),
+		cmocka_unit_test(test_spot_texture_touches_the_cone),
+		cmocka_unit_test(test_invalid_projectors_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,28 +26,28 @@ static int try_emitter(struct arena *a, const char *text, double open, double cl
 		       struct error *e)
 {
 	const struct emitter_build build = {
-		.arena = a, .dialect_3 = true, .world_scale = 1, .shutter_open = open, .shutter_close = close};
+		.arena = a, .is_dialect_3 = true, .world_scale = 1, .shutter_open = open, .shutter_close = close};
 	return emitter_create(em, node_make(a, PLUGIN_EMITTER, text), &build, e);
 }
 
 /* Returns directions above the horizon (up is +z), evenly distributed. */
-static vec3 direction(int i)
+static vec3 sky_direction(int i)
 {
 	double z = (i + 0.5) / DIRECTIONS, r = sqrt(1 - z * z), phi = 2.399963 * i;
 	return (vec3){r * cos(phi), r * sin(phi), z};
 }
 
-struct light {
+struct measured_light {
 	double radiance[DIRECTIONS][3], irradiance[SLOPES][3];
 };
 
 /* Adds `share` times the light of an emitter; irradiance is estimated by its own samples. */
-static void add_light(struct light *l, const struct emitter *em, double share)
+static void add_light(struct measured_light *l, const struct emitter *em, double share)
 {
 	enum { N = 128 };
 	static const vec3 normal[SLOPES] = {{0, 0, 1}, {0.8, 0, 0.6}, {-0.6, 0.8, 0}, {0, -1, 0}};
 	for (int i = 0; i < DIRECTIONS; i++) {
-		struct emitter_point x = {.p = direction(i), .is_infinite = true};
+		struct emitter_point x = {.p = sky_direction(i), .is_infinite = true};
 		spectrum s = em->ops->radiance(em, &x, vec3_neg(x.p), &rgb);
 		for (int c = 0; c < 3; c++)
 			l->radiance[i][c] += share * s.v[c];
@@ -66,7 +66,7 @@ static void add_light(struct light *l, const struct emitter *em, double share)
 	}
 }
 
-static void make_light(struct light *l, const char *text, double open, double close)
+static void make_light(struct measured_light *l, const char *text, double open, double close)
 {
 	struct arena a = {0};
 	struct emitter em;
@@ -80,7 +80,8 @@ static void make_light(struct light *l, const char *text, double open, double cl
 
 /* Computes the mean over `steps` times, in the hours from begin to end of days from `first` on, counted from January 1,
  * 2025. The other emitters refuse a sun below the horizon, which is therefore taken as dark. */
-static void by_steps(struct light *l, const char *what, int first, int days, double begin, double end, int steps)
+static void average_over_times(struct measured_light *l, const char *what, int first, int days, double begin,
+			       double end, int steps)
 {
 	static const int length[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
 	memset(l, 0, sizeof *l);
@@ -103,7 +104,8 @@ static void by_steps(struct light *l, const char *what, int first, int days, dou
 	}
 }
 
-static void compare(const char *name, const struct light *found, const struct light *wanted, double sky, double all)
+static void compare_light(const char *name, const struct measured_light *found, const struct measured_light *wanted,
+			  double sky, double all)
 {
 	double square = 0, sum = 0, most = 0;
 	for (int i = 0; i < DIRECTIONS; i++)
@@ -123,60 +125,60 @@ static void compare(const char *name, const struct light *found, const struct li
 
 #define JULY_10 " start_month=7 start_day=10 end_year=2025 end_day=11"
 
-static void test_sky_of_a_day(void **state)
+static void test_sky_of_a_day_is_the_mean(void **state)
 {
 	(void)state;
-	static struct light found, wanted;
+	static struct measured_light found, wanted;
 	make_light(&found, "timed_sunsky sun_scale=0 window_start_time=3 window_end_time=20 turbidity=4" PLACE JULY_10,
 		   0, 1);
-	by_steps(&wanted, "sky turbidity=4", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 3, 20, 64);
-	compare("sky of a day", &found, &wanted, 0.01, 0.01);
+	average_over_times(&wanted, "sky turbidity=4", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 3, 20, 64);
+	compare_light("sky of a day", &found, &wanted, 0.01, 0.01);
 }
 
-static void test_sun_of_a_day(void **state)
+static void test_sun_of_a_day_is_the_mean(void **state)
 {
 	(void)state;
-	static struct light found, wanted;
+	static struct measured_light found, wanted;
 	make_light(&found, "timed_sunsky sky_scale=0 window_start_time=6 window_end_time=18" PLACE JULY_10, 0, 1);
-	by_steps(&wanted, "sun", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 6, 18, 48);
-	compare("sun of a day", &found, &wanted, INFINITY, 0.01);
+	average_over_times(&wanted, "sun", 31 + 28 + 31 + 30 + 31 + 30 + 9, 1, 6, 18, 48);
+	compare_light("sun of a day", &found, &wanted, INFINITY, 0.01);
 }
 
-static void test_year(void **state)
+static void test_year_is_the_mean_of_its_days(void **state)
 {
 	(void)state;
-	static struct light found, wanted;
+	static struct measured_light found, wanted;
 	make_light(&found, "timed_sunsky sun_scale=0" PLACE, 0, 1);
-	by_steps(&wanted, "sky", 0, 365, 7, 19, 157);
-	compare("sky of a year", &found, &wanted, 0.03, 0.02);
+	average_over_times(&wanted, "sky", 0, 365, 7, 19, 157);
+	compare_light("sky of a year", &found, &wanted, 0.03, 0.02);
 }
 
 /* Half of the shutter's time is half of the day; a closed interval of length 0, the default of sensors, is its
  * beginning; times are relative to the emitter's own shutter times. The sun that `sunsky` draws is off by a fraction of
  * a pixel, which matters on slopes at grazing angles. */
-static void test_shutter(void **state)
+static void test_shutter_selects_part_of_the_day(void **state)
 {
 	(void)state;
-	static struct light found, wanted;
+	static struct measured_light found, wanted;
 	make_light(&found, "timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0.5);
-	by_steps(&wanted, "sky", 190, 1, 8, 12, 32);
-	compare("sky of half a day", &found, &wanted, 0.01, 0.01);
+	average_over_times(&wanted, "sky", 190, 1, 8, 12, 32);
+	compare_light("sky of half a day", &found, &wanted, 0.01, 0.01);
 	make_light(
 		&found,
 		"timed_sunsky sun_scale=0 window_start_time=8 window_end_time=16 shutter_open=1 shutter_close=3" PLACE
 			JULY_10,
 		2, 3);
-	by_steps(&wanted, "sky", 190, 1, 12, 16, 32);
-	compare("sky of the other half", &found, &wanted, 0.01, 0.01);
+	average_over_times(&wanted, "sky", 190, 1, 12, 16, 32);
+	compare_light("sky of the other half", &found, &wanted, 0.01, 0.01);
 	make_light(&found, "timed_sunsky window_start_time=8 window_end_time=16" PLACE JULY_10, 0, 0);
-	by_steps(&wanted, "sunsky", 190, 1, 8, 8, 1);
-	compare("sky and sun at once", &found, &wanted, 0.01, 0.03);
+	average_over_times(&wanted, "sunsky", 190, 1, 8, 8, 1);
+	compare_light("sky and sun at once", &found, &wanted, 0.01, 0.03);
 	make_light(&found, "timed_sunsky window_start_time=0 window_end_time=3" PLACE JULY_10, 0, 1);
 	assert_true(found.irradiance[0][1] == 0);
 }
 
 /* The sensor's shutter is used: a shutter open from dawn on gets more light than one open at dawn only. */
-static void test_in_scene(void **state)
+static void test_shutter_of_the_sensor_is_used(void **state)
 {
 	(void)state;
 	double power[2];
@@ -192,7 +194,7 @@ static void test_in_scene(void **state)
 	assert_true(power[1] > 1.5 * power[0]);
 }
 
-static void test_days(void **state)
+static void test_days_between_dates_are_counted(void **state)
 {
 	(void)state;
 	const struct daylight_time a = {.year = 2024, .month = 2, .day = 28}, b = {.year = 2024, .month = 3, .day = 1},
@@ -202,7 +204,7 @@ static void test_days(void **state)
 	assert_int_equal(daylight_days_between(&c, &a), -366);
 }
 
-static void test_refused(void **state)
+static void test_invalid_times_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -232,9 +234,13 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sky_of_a_day), cmocka_unit_test(test_sun_of_a_day), cmocka_unit_test(test_year),
-		cmocka_unit_test(test_shutter),	     cmocka_unit_test(test_in_scene),	  cmocka_unit_test(test_days),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_sky_of_a_day_is_the_mean),
+		cmocka_unit_test(test_sun_of_a_day_is_the_mean),
+		cmocka_unit_test(test_year_is_the_mean_of_its_days),
+		cmocka_unit_test(test_shutter_selects_part_of_the_day),
+		cmocka_unit_test(test_shutter_of_the_sensor_is_used),
+		cmocka_unit_test(test_days_between_dates_are_counted),
+		cmocka_unit_test(test_invalid_times_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

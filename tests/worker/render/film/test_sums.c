@@ -59,7 +59,7 @@ static void kernels_have_integral_1(void **state)
 
 /* Values from Mitsuba 3's tests, whose kernels are 1 in the middle or, like that of Mitchell and Netravali, have
  * integral 1. */
-static void kernels_have_their_shapes(void **state)
+static void kernels_have_the_values_of_mitsuba(void **state)
 {
 	(void)state;
 	static const struct {
@@ -89,7 +89,7 @@ static void kernels_have_their_shapes(void **state)
 
 /* The kernel of a panorama wraps around: a splat loses no energy, and the part beyond an edge arrives at the opposite
  * position. */
-static void kernels_reach_around(void **state)
+static void panorama_kernels_wrap_around(void **state)
 {
 	(void)state;
 	enum { WIDTH = 40, HEIGHT = 20 };
@@ -112,11 +112,11 @@ static void kernels_reach_around(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		assert_int_equal(film_sums_init(&f, &p, &s, &e), 0);
 		film_sums_splat(&f, &(struct splat){cases[i].x, cases[i].y, {1, 1, 1}}, 1);
-		double sum = 0, there = f.xyz[3 * (cases[i].row * WIDTH + cases[i].column)];
+		double sum = 0, arrived = f.xyz[3 * (cases[i].row * WIDTH + cases[i].column)];
 		for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++)
 			sum += f.xyz[3 * k];
-		if (!(fabs(sum - 1) < 1e-12 && fabs(there - 0.25 * 0.5) < 1e-12))
-			fail_msg("%zu: %g in all, %g there", i, sum, there);
+		if (!(fabs(sum - 1) < 1e-12 && fabs(arrived - 0.25 * 0.5) < 1e-12))
+			fail_msg("%zu: %g in all, %g there", i, sum, arrived);
 		film_sums_fini(&f);
 	}
 	/* A window may lie inside the panorama or go all the way round; otherwise some of the light would be missing.
@@ -143,8 +143,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(kernels_have_integral_1),
-		cmocka_unit_test(kernels_have_their_shapes),
-		cmocka_unit_test(kernels_reach_around),
+		cmocka_unit_test(kernels_have_the_values_of_mitsuba),
+		cmocka_unit_test(panorama_kernels_wrap_around),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-static struct ray_end free_end(vec3 p)
+static struct ray_end ray_end_in_space(vec3 p)
 {
 	return (struct ray_end){.p = p, .prim = PRIM_NONE};
 }
@@ -27,14 +27,14 @@ static vec3 vertex_of(const struct geom_shape *s, uint32_t prim, int k)
 }
 
 /* Returns a random direction into the half space of n. */
-static vec3 direction_beyond(struct dice *d, vec3 n)
+static vec3 random_direction_above(struct dice *d, vec3 n)
 {
 	vec3 w = dice_direction(d);
 	return vec3_dot(w, n) < 0 ? vec3_neg(w) : w;
 }
 
 /* Returns a direction along the surface that rises by `slope`. */
-static vec3 grazing(struct dice *d, vec3 n, double slope)
+static vec3 grazing_direction(struct dice *d, vec3 n, double slope)
 {
 	vec3 w = dice_direction(d);
 	w = vec3_normalize(vec3_madd(w, -vec3_dot(w, n), n));
@@ -43,7 +43,7 @@ static vec3 grazing(struct dice *d, vec3 n, double slope)
 
 /* Rays leave a bumpy closed mesh: each hit must also be found by a search in double, and each hit of that search by
  * the ray. */
-static void test_outside_of_mesh(void **state)
+static void rays_from_a_bumpy_mesh_agree_with_a_search_in_double(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("outside of mesh");
@@ -53,7 +53,8 @@ static void test_outside_of_mesh(void **state)
 	size_t n = dice_scaled_count(100000), false_hits = 0, compared = 0, wrong = 0, hits = 0;
 	for (size_t i = 0; i < n; i++) {
 		struct surface_point x = body_sample_point(&s, 0, &d);
-		vec3 w = i % 4 ? direction_beyond(&d, x.ng) : grazing(&d, x.ng, exp(dice_between(&d, log(1e-6), 0)));
+		vec3 w = i % 4 ? random_direction_above(&d, x.ng)
+			       : grazing_direction(&d, x.ng, exp(dice_between(&d, log(1e-6), 0)));
 		struct ray_end from = body_ray_end(&x);
 		struct ray_hit hit;
 		bool met = accel_closest(a, &from, w, 0, INFINITY, &hit);
@@ -92,10 +93,11 @@ static void check_closed(const char *name, const struct geom_shape *s, double wi
 		struct surface_point x = body_sample_point(s, 0, &d);
 		vec3 inwards = vec3_scale(-s->normal_sign, x.ng);
 		struct ray_end from =
-			i % 2 ? body_ray_end(&x) : free_end(vec3_scale(within * dice_uniform(&d), dice_direction(&d)));
-		vec3 w = i % 2 ? direction_beyond(&d, inwards) : dice_direction(&d);
+			i % 2 ? body_ray_end(&x)
+			      : ray_end_in_space(vec3_scale(within * dice_uniform(&d), dice_direction(&d)));
+		vec3 w = i % 2 ? random_direction_above(&d, inwards) : dice_direction(&d);
 		if (i % 8 == 7)
-			w = grazing(&d, inwards, exp(dice_between(&d, log(1e-6), 0)));
+			w = grazing_direction(&d, inwards, exp(dice_between(&d, log(1e-6), 0)));
 		struct ray_hit hit;
 		leaks += !accel_closest(a, &from, w, 0, INFINITY, &hit);
 		leaks += !accel_occluded_to_infinity(a, &from, w);
@@ -105,7 +107,7 @@ static void check_closed(const char *name, const struct geom_shape *s, double wi
 	accel_free(a);
 }
 
-static void test_closed(void **state)
+static void nothing_slips_through_a_closed_body(void **state)
 {
 	(void)state;
 	struct geom_shape s;
@@ -123,8 +125,8 @@ static void test_closed(void **state)
 		struct surface_point x = body_sample_point(&tiny, 0, &d);
 		struct ray_end from = body_ray_end(&x);
 		struct ray_hit hit;
-		assert_false(accel_closest(a, &from, direction_beyond(&d, x.ng), 0, INFINITY, &hit));
-		assert_true(accel_closest(a, &from, direction_beyond(&d, vec3_neg(x.ng)), 0, INFINITY, &hit));
+		assert_false(accel_closest(a, &from, random_direction_above(&d, x.ng), 0, INFINITY, &hit));
+		assert_true(accel_closest(a, &from, random_direction_above(&d, vec3_neg(x.ng)), 0, INFINITY, &hit));
 		assert_true(hit.t <= 2.0001 * tiny.radius);
 	}
 	accel_free(a);
@@ -133,7 +135,7 @@ static void test_closed(void **state)
 /* Many triangles in one plane: rays from any of them, on either side and however low, meet none of the others. The
  * float vertices lie exactly in their planes: a horizontal one through the origin, tilted ones, and one far from the
  * origin. */
-static void test_plane(void **state)
+static void rays_from_a_plane_meet_no_neighbour(void **state)
 {
 	(void)state;
 	const double tilt[][3] = {{0, 0, 0}, {0.5, -0.25, 0}, {0.375, 0.625, 0}, {0, 0, 0.75}};
@@ -148,12 +150,13 @@ static void test_plane(void **state)
 		for (size_t i = 0; i < n; i++) {
 			struct surface_point x = body_sample_point(&s, 0, &d);
 			vec3 up = i % 2 ? x.ng : vec3_neg(x.ng);
-			vec3 w = i % 3 ? grazing(&d, up, i % 3 == 1 ? 1e-6 : 1e-4) : direction_beyond(&d, up);
+			vec3 w = i % 3 ? grazing_direction(&d, up, i % 3 == 1 ? 1e-6 : 1e-4)
+				       : random_direction_above(&d, up);
 			struct ray_end from = body_ray_end(&x);
 			struct ray_hit hit;
 			met += accel_closest(a, &from, w, 0, INFINITY, &hit);
 			met += accel_occluded_to_infinity(a, &from, w);
-			struct ray_end to = free_end(vec3_madd(x.p, dice_uniform(&d), w));
+			struct ray_end to = ray_end_in_space(vec3_madd(x.p, dice_uniform(&d), w));
 			met += accel_occluded(a, &from, &to);
 			met += accel_occluded(a, &to, &from);
 		}
@@ -164,7 +167,7 @@ static void test_plane(void **state)
 	}
 }
 
-static bool hidden_by_mesh(const struct geom_shape *s, vec3 a, vec3 b)
+static bool is_hidden_by_mesh(const struct geom_shape *s, vec3 a, vec3 b)
 {
 	uint32_t prim;
 	return !s->is_sphere && body_hit_distance(s, a, vec3_sub(b, a), 1e-9, &prim) < 1 - 1e-9;
@@ -185,9 +188,9 @@ static void check_segments(const char *name, const struct geom_shape *body)
 		if (!body->is_sphere && x.prim.prim == y.prim.prim)
 			continue;
 		if (accel_occluded(open, &from, &to)) /* the mesh has valleys: does the search in double agree? */
-			unseen += !hidden_by_mesh(body, x.p, y.p);
+			unseen += !is_hidden_by_mesh(body, x.p, y.p);
 		else if (i % 50 == 0)
-			unseen += hidden_by_mesh(body, x.p, y.p);
+			unseen += is_hidden_by_mesh(body, x.p, y.p);
 		vec3 line = vec3_sub(y.p, x.p), c = vec3_sub(both[1].center, x.p);
 		double t = vec3_dot(c, line) / vec3_dot(line, line);
 		if (vec3_length(vec3_sub(c, vec3_scale(t, line))) > 0.999 * both[1].radius)
@@ -210,7 +213,7 @@ static void check_segments(const char *name, const struct geom_shape *body)
 	accel_free(blocked);
 }
 
-static void test_segments(void **state)
+static void segments_are_blocked_by_what_lies_between(void **state)
 {
 	(void)state;
 	struct geom_shape s;
@@ -222,7 +225,7 @@ static void test_segments(void **state)
 }
 
 /* From 1e6 radii away, every ray has the hit that a search in double finds, and a ray that misses the body has none. */
-static void test_far_away(void **state)
+static void distant_rays_agree_with_a_search_in_double(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("far away");
@@ -233,7 +236,8 @@ static void test_far_away(void **state)
 	for (size_t i = 0; i < n; i++) {
 		double distance = i % 2 ? 1e6 : 1e3;
 		vec3 axis = dice_direction(&d), aim = vec3_scale(0.9 * cbrt(dice_uniform(&d)), dice_direction(&d));
-		struct ray_end from = free_end(vec3_scale(distance, axis)), to = free_end(vec3_scale(-distance, axis));
+		struct ray_end from = ray_end_in_space(vec3_scale(distance, axis)),
+			       to = ray_end_in_space(vec3_scale(-distance, axis));
 		vec3 w = vec3_normalize(vec3_sub(aim, from.p));
 		to.p = vec3_madd(from.p, 2 * distance, w);
 		struct ray_hit hit;
@@ -263,7 +267,7 @@ static void test_far_away(void **state)
 
 /* Rays that just touch a sphere and rays that just miss it, including positions at which the sphere touches its
  * bounding box. */
-static void test_silhouettes(void **state)
+static void rays_that_touch_a_sphere_hit_and_others_miss(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("silhouettes");
@@ -283,8 +287,8 @@ static void test_silhouettes(void **state)
 			vec3 w = vec3_normalize(vec3_cross(side, dice_direction(&d)));
 			for (int in = 0; in < 2; in++) {
 				vec3 touch = vec3_madd(s.center, radius * (in ? 1 - 1e-7 : 1 + 1e-7), side);
-				struct ray_end from = free_end(vec3_madd(touch, -3, w)),
-					       to = free_end(vec3_madd(touch, 3, w));
+				struct ray_end from = ray_end_in_space(vec3_madd(touch, -3, w)),
+					       to = ray_end_in_space(vec3_madd(touch, 3, w));
 				struct ray_hit hit;
 				assert_int_equal(accel_closest(a, &from, w, 0, INFINITY, &hit), in);
 				assert_int_equal(accel_occluded(a, &from, &to), in);
@@ -297,7 +301,7 @@ static void test_silhouettes(void **state)
 
 /* A square cut into slivers of aspect ratio 1e6 lets no more rays through than one of two triangles; triangles
  * without area do no harm. */
-static void test_slivers(void **state)
+static void slivers_leak_no_rays(void **state)
 {
 	(void)state;
 	enum { STRIPS = 64 };
@@ -323,7 +327,7 @@ static void test_slivers(void **state)
 		double reach = i % 2 ? 0x1p-14 : 0.999;
 		vec3 aim = {dice_between(&d, -reach, reach), dice_between(&d, -0.999, 0.999), 0};
 		vec3 o = {dice_between(&d, -1, 1), dice_between(&d, -1, 1), dice_between(&d, 0.1, 1)};
-		struct ray_end from = free_end(o);
+		struct ray_end from = ray_end_in_space(o);
 		vec3 w = vec3_normalize(vec3_sub(aim, o));
 		struct ray_hit hit;
 		if (!accel_closest(a, &from, w, 0, INFINITY, &hit)) {
@@ -343,7 +347,7 @@ static void test_slivers(void **state)
 }
 
 /* A long build reports progress to its liveness counter. */
-static void test_building_ticks(void **state)
+static void long_build_reports_progress(void **state)
 {
 	(void)state;
 	atomic_ullong ticks = 0;
@@ -361,7 +365,7 @@ static void test_building_ticks(void **state)
 /* Two sheets closer together than float precision in their scene, so that a ray in float begins beyond the second
  * sheet: rays that leave the first sheet meet the second all the same, however low, and the second hides what lies
  * beyond it. */
-static void test_sheets(void **state)
+static void rays_meet_a_sheet_closer_than_float_precision(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("sheets");
@@ -382,8 +386,8 @@ static void test_sheets(void **state)
 			struct ray_end from = {
 				{dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5), 0}, up, {0, 0, 0}};
 			from.prim.prim = from.p.y > from.p.x;
-			vec3 w = grazing(&d, up, exp(dice_between(&d, log(1.0 / 32), log(8))));
-			struct ray_end above = free_end(vec3_madd(from.p, 0.2, w));
+			vec3 w = grazing_direction(&d, up, exp(dice_between(&d, log(1.0 / 32), log(8))));
+			struct ray_end above = ray_end_in_space(vec3_madd(from.p, 0.2, w));
 			struct ray_hit hit;
 			assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit) && hit.prim.shape == 1);
 			assert_true(accel_occluded(a, &from, &above) && accel_occluded(a, &above, &from));
@@ -396,11 +400,15 @@ static void test_sheets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_outside_of_mesh), cmocka_unit_test(test_closed),
-		cmocka_unit_test(test_plane),		cmocka_unit_test(test_segments),
-		cmocka_unit_test(test_far_away),	cmocka_unit_test(test_slivers),
-		cmocka_unit_test(test_silhouettes),	cmocka_unit_test(test_building_ticks),
-		cmocka_unit_test(test_sheets),
+		cmocka_unit_test(rays_from_a_bumpy_mesh_agree_with_a_search_in_double),
+		cmocka_unit_test(nothing_slips_through_a_closed_body),
+		cmocka_unit_test(rays_from_a_plane_meet_no_neighbour),
+		cmocka_unit_test(segments_are_blocked_by_what_lies_between),
+		cmocka_unit_test(distant_rays_agree_with_a_search_in_double),
+		cmocka_unit_test(slivers_leak_no_rays),
+		cmocka_unit_test(rays_that_touch_a_sphere_hit_and_others_miss),
+		cmocka_unit_test(long_build_reports_progress),
+		cmocka_unit_test(rays_meet_a_sheet_closer_than_float_precision),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

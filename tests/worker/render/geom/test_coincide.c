@@ -17,19 +17,19 @@
 
 #include <cmocka.h>
 
-enum { MOST = 4096 };
+enum { TRIANGLES_MAX = 4096 };
 
 /* A list of triangles without shared vertices. */
-struct soup {
-	float position[3 * MOST + 2][3];
-	uint32_t index[MOST][3];
+struct triangle_soup {
+	float position[3 * TRIANGLES_MAX + 2][3];
+	uint32_t index[TRIANGLES_MAX][3];
 	uint32_t count;
 };
 
-static void add(struct soup *s, vec3 a, vec3 b, vec3 c)
+static void add_triangle(struct triangle_soup *s, vec3 a, vec3 b, vec3 c)
 {
 	const vec3 v[3] = {a, b, c};
-	assert_true(s->count < MOST);
+	assert_true(s->count < TRIANGLES_MAX);
 	for (int k = 0; k < 3; k++) {
 		uint32_t i = 3 * s->count + (uint32_t)k;
 		s->position[i][0] = (float)v[k].x;
@@ -40,7 +40,7 @@ static void add(struct soup *s, vec3 a, vec3 b, vec3 c)
 	s->count++;
 }
 
-static struct accel_shape shape_of(const struct soup *s, enum surface_rank rank)
+static struct accel_shape shape_of(const struct triangle_soup *s, enum surface_rank rank)
 {
 	return (struct accel_shape){.vertex_count = 3 * s->count,
 				    .triangle_count = s->count,
@@ -49,7 +49,7 @@ static struct accel_shape shape_of(const struct soup *s, enum surface_rank rank)
 				    .rank = rank};
 }
 
-static struct triangle triangle_at(const struct soup *s, uint32_t i)
+static struct triangle triangle_at(const struct triangle_soup *s, uint32_t i)
 {
 	return triangle_from((const float(*)[3])s->position, s->index[i]);
 }
@@ -57,7 +57,7 @@ static struct triangle triangle_at(const struct soup *s, uint32_t i)
 /* ---- two triangles ---- */
 
 /* Draws corners within the square [-1,1]^2 of the plane; slivers are drawn again. */
-static void throw_corners(struct dice *d, double c[3][2])
+static void draw_corners(struct dice *d, double c[3][2])
 {
 	double area;
 	do {
@@ -88,45 +88,46 @@ static double widest_gap(const double a[3][2], const double b[3][2])
 	return widest;
 }
 
-static void put(struct soup *s, const struct frame *f, vec3 at, double size, const double c[3][2])
+static void add_triangle_in_plane(struct triangle_soup *s, const struct frame *f, vec3 origin, double size,
+				  const double c[3][2])
 {
 	vec3 v[3];
 	for (int i = 0; i < 3; i++)
-		v[i] = vec3_madd(vec3_madd(at, size * c[i][0], f->s), size * c[i][1], f->t);
-	add(s, v[0], v[1], v[2]);
+		v[i] = vec3_madd(vec3_madd(origin, size * c[i][0], f->s), size * c[i][1], f->t);
+	add_triangle(s, v[0], v[1], v[2]);
 }
 
 static bool do_coincide(const struct triangle *a, const struct triangle *b)
 {
-	bool unused, one = coincide_triangles(a, b, 0, &unused), other = coincide_triangles(b, a, 0, &unused);
-	if (one != other)
+	bool unused, forward = coincide_triangles(a, b, 0, &unused), reverse = coincide_triangles(b, a, 0, &unused);
+	if (forward != reverse)
 		fail_msg("one coincides with the other, which does not with the one");
-	return one;
+	return forward;
 }
 
-static void test_two(void **state)
+static void two_triangles_coincide_if_they_overlap_in_one_plane(void **state)
 {
 	(void)state;
-	static struct soup s;
+	static struct triangle_soup s;
 	struct dice d = dice_for_test("two triangles");
 	size_t seen[2] = {0, 0};
 	for (size_t n = dice_scaled_count(100000); n > 0; n--) {
 		double a[3][2], b[3][2], size = exp2(dice_between(&d, -12, -1));
 		struct frame f = frame_around(dice_direction(&d));
-		vec3 at = vec3_scale(dice_uniform(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
-		throw_corners(&d, a);
-		throw_corners(&d, b);
+		vec3 plane_origin = vec3_scale(dice_uniform(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
+		draw_corners(&d, a);
+		draw_corners(&d, b);
 		double g = widest_gap(a, b);
 		if (fabs(g) < 0x1p-6)
 			continue;
 		s.count = 0;
-		put(&s, &f, at, size, a);
-		put(&s, &f, at, size, b);
+		add_triangle_in_plane(&s, &f, plane_origin, size, a);
+		add_triangle_in_plane(&s, &f, plane_origin, size, b);
 		/* Farther apart than the rounding of the vertices (coordinates are below 2); and a tilted copy. */
-		vec3 off = vec3_madd(at, dice_uniform(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
-		put(&s, &f, off, size, b);
+		vec3 shifted_origin = vec3_madd(plane_origin, dice_uniform(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
+		add_triangle_in_plane(&s, &f, shifted_origin, size, b);
 		struct frame tilted = frame_around(vec3_normalize(vec3_madd(f.n, 0.02, f.s)));
-		put(&s, &tilted, at, fmax(size, 0x1p-10), b);
+		add_triangle_in_plane(&s, &tilted, plane_origin, fmax(size, 0x1p-10), b);
 		const struct triangle t[4] = {triangle_at(&s, 0), triangle_at(&s, 1), triangle_at(&s, 2),
 					      triangle_at(&s, 3)};
 		if (do_coincide(&t[0], &t[1]) != (g < 0))
@@ -142,7 +143,7 @@ static void test_two(void **state)
 }
 
 /* Neighbours that share an edge or a corner, in one plane or not, never coincide: tested on a plane and a ball. */
-static void test_neighbours(void **state)
+static void neighbours_never_coincide(void **state)
 {
 	(void)state;
 	struct geom_shape g[2];
@@ -165,7 +166,7 @@ static void test_neighbours(void **state)
 
 /* Returns the primitive that exists at p by the rule: the first, in order of rank, of all primitives that overlap
  * this one or are hidden by one that does. */
-static struct prim_ref first_by_rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
+static struct prim_ref present_prim_by_rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
 {
 	const struct triangle t = triangle_from(s[at.shape].position, s[at.shape].index[at.prim]);
 	for (unsigned rank = 0; rank <= s[at.shape].rank; rank++)
@@ -193,26 +194,26 @@ static vec3 point_on(const struct accel_shape *s, uint32_t prim, struct dice *d)
 
 /* Triangles of all sizes in a few planes that cross; their coordinates are exact in float, so that all triangles of
  * one plane coincide. */
-static void fill_planes(struct soup *s, uint32_t count, struct dice *d)
+static void fill_planes(struct triangle_soup *s, uint32_t count, struct dice *d)
 {
 	for (s->count = 0; s->count < count;) {
 		double c[3][2], plane = dice_below(d, 4) / 8.0, size = exp2(-1.0 - dice_below(d, 6)),
 				x = dice_between(d, -1, 1), y = dice_between(d, -1, 1);
 		vec3 v[3];
 		unsigned axis = dice_below(d, 3);
-		throw_corners(d, c);
+		draw_corners(d, c);
 		for (int i = 0; i < 3; i++) {
 			double u = x + size * c[i][0], w = y + size * c[i][1];
 			v[i] = axis == 0 ? (vec3){plane, u, w} : axis == 1 ? (vec3){u, plane, w} : (vec3){u, w, plane};
 		}
-		add(s, v[0], v[1], v[2]);
+		add_triangle(s, v[0], v[1], v[2]);
 	}
 }
 
-static void test_search(void **state)
+static void search_finds_the_present_primitive(void **state)
 {
 	(void)state;
-	static struct soup soup[5];
+	static struct triangle_soup soup[5];
 	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_EMITS, SURFACE_OPAQUE,
 						  SURFACE_SEE_THROUGH};
 	struct dice d = dice_for_test("search");
@@ -230,11 +231,12 @@ static void test_search(void **state)
 	for (size_t n = dice_scaled_count(20000); n > 0; n--) {
 		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150), 0};
 		vec3 p = point_on(&shape[at.shape], at.prim, &d);
-		struct prim_ref there = coincide_present_prim(c, shape, at, p), right = first_by_rule(shape, 5, at, p);
-		if (there.shape != right.shape || there.prim != right.prim)
-			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape,
-				 right.prim, there.shape, there.prim);
-		hidden += there.shape != at.shape;
+		struct prim_ref actual = coincide_present_prim(c, shape, at, p),
+				expected = present_prim_by_rule(shape, 5, at, p);
+		if (actual.shape != expected.shape || actual.prim != expected.prim)
+			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, expected.shape,
+				 expected.prim, actual.shape, actual.prim);
+		hidden += actual.shape != at.shape;
 	}
 	print_message("%zu pairs of primitives, %zu of shapes; %zu of the points hidden\n", c->pair_count,
 		      c->shape_pair_count, hidden);
@@ -244,11 +246,11 @@ static void test_search(void **state)
 
 /* A plant whose round leaves, made of fans of thin triangles, cross each other everywhere: no two coincide, and the
  * search finishes. */
-static void test_crossing_leaves(void **state)
+static void crossing_leaves_do_not_coincide(void **state)
 {
 	(void)state;
 	enum { LEAVES = 36, FAN = 256 };
-	static struct soup soup[LEAVES];
+	static struct triangle_soup soup[LEAVES];
 	struct accel_shape shape[LEAVES];
 	struct dice d = dice_for_test("leaves");
 	struct coincidence *c;
@@ -265,7 +267,7 @@ static void test_crossing_leaves(void **state)
 				double phi = 2 * M_PI * (k + j) / FAN;
 				rim[j] = vec3_madd(vec3_madd(center, 0.15 * cos(phi), s), 0.15 * sin(phi), t);
 			}
-			add(&soup[i], center, rim[0], rim[1]);
+			add_triangle(&soup[i], center, rim[0], rim[1]);
 		}
 		shape[i] = shape_of(&soup[i], SURFACE_SEE_THROUGH);
 	}
@@ -303,7 +305,7 @@ static struct accel_shape make_tube(struct tube *t, vec3 a, vec3 b, double first
 
 /* Long thin skewed tubes, whose boxes overlap everywhere. The search finishes, which it would not if it compared the
  * triangles of only a few per cent of the pairs, and it finds each tube that is a part of another. */
-static void test_tubes(void **state)
+static void search_among_long_tubes_finishes(void **state)
 {
 	(void)state;
 	struct tube *tube = mem_alloc(TUBES + TWINS, sizeof *tube);
@@ -347,28 +349,28 @@ static void test_tubes(void **state)
 /* A stack of equal triangles does not need a quadratic number of pairs; a heap that does ends at the search's bounds.
  * If nothing coincides, no result is kept; one sphere hides another; and an allocation failure gives an error
  * message. */
-static void test_bounds(void **state)
+static void search_ends_at_its_bounds(void **state)
 {
 	(void)state;
-	static struct soup s, other;
+	static struct triangle_soup s, other;
 	struct dice d = dice_for_test("bounds");
 	struct coincidence *c;
 	struct error e;
 	s.count = 0;
-	for (int i = 0; i < MOST; i++)
-		add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
+	for (int i = 0; i < TRIANGLES_MAX; i++)
+		add_triangle(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
 	struct accel_shape shape[2] = {shape_of(&s, SURFACE_EMITS)};
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
-	assert_int_equal(c->pair_count, MOST - 1);
+	assert_int_equal(c->pair_count, TRIANGLES_MAX - 1);
 	assert_false(c->is_incomplete);
 	coincide_free(c);
-	for (s.count = 0; s.count < MOST;) {
+	for (s.count = 0; s.count < TRIANGLES_MAX;) {
 		double turn = dice_between(&d, 0, 6);
-		add(&s, (vec3){cos(turn), sin(turn), 0}, (vec3){cos(turn + 2), sin(turn + 2), 0},
-		    (vec3){cos(turn + 4), sin(turn + 4), 0});
+		add_triangle(&s, (vec3){cos(turn), sin(turn), 0}, (vec3){cos(turn + 2), sin(turn + 2), 0},
+			     (vec3){cos(turn + 4), sin(turn + 4), 0});
 	}
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
-	assert_true(c->is_incomplete && c->pair_count > MOST && c->pair_count < 64 * MOST);
+	assert_true(c->is_incomplete && c->pair_count > TRIANGLES_MAX && c->pair_count < 64 * TRIANGLES_MAX);
 	coincide_free(c);
 	shape[0] = shape_of(&s, SURFACE_OPAQUE);
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
@@ -384,8 +386,8 @@ static void test_bounds(void **state)
 	assert_int_equal(coincide_present_prim(c, ball, (struct prim_ref){2, 0, 0}, ball[2].center).shape, 2);
 	coincide_free(c);
 	s.count = other.count = 0;
-	add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
-	add(&other, (vec3){0, 0, 0}, (vec3){1, 1, 0}, (vec3){0, 1, 0});
+	add_triangle(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
+	add_triangle(&other, (vec3){0, 0, 0}, (vec3){1, 1, 0}, (vec3){0, 1, 0});
 	shape[0] = shape_of(&s, SURFACE_OPAQUE);
 	shape[1] = shape_of(&other, SURFACE_EMITS);
 	int rc = -ENOMEM;
@@ -403,10 +405,10 @@ static void test_bounds(void **state)
 
 /* A turned pane and a smaller lamp in its plane: the right one is met from both sides, rays that leave one do not
  * meet the other, and no segment begins or ends on a hidden surface. */
-static void test_rays(void **state)
+static void rays_ignore_hidden_surfaces(void **state)
 {
 	(void)state;
-	static struct soup s[2];
+	static struct triangle_soup s[2];
 	struct dice d = dice_for_test("rays");
 	size_t lamp = 0, pane = 0, on_hidden = 0;
 	for (size_t n = dice_scaled_count(2000); n > 0; n--) {
@@ -423,7 +425,7 @@ static void test_rays(void **state)
 					     {{co - si, si + co}, {-co + si, -si - co}, {co + si, si - co}}};
 			s[k].count = 0;
 			for (int i = 0; i < 2; i++)
-				put(&s[k], &f, at, 1, corner[i]);
+				add_triangle_in_plane(&s[k], &f, at, 1, corner[i]);
 		}
 		const struct accel_shape shape[2] = {shape_of(&s[0], SURFACE_TRANSMITS),
 						     shape_of(&s[1], SURFACE_EMITS)};
@@ -478,11 +480,11 @@ static void test_rays(void **state)
 }
 
 /* The parts of a disk meet in its middle, where the coordinates, and with them their rounding errors, are 0. */
-static void test_fan(void **state)
+static void parts_of_a_disk_do_not_coincide(void **state)
 {
 	(void)state;
 	enum { PARTS = 256 };
-	static struct soup s;
+	static struct triangle_soup s;
 	struct dice d = dice_for_test("fan");
 	for (size_t n = dice_scaled_count(200); n > 0; n--) {
 		struct frame f = frame_around(dice_direction(&d));
@@ -495,7 +497,7 @@ static void test_fan(void **state)
 		rim[PARTS] = rim[0];
 		s.count = 0;
 		for (int i = 0; i < PARTS; i++)
-			add(&s, (vec3){0, 0, 0}, rim[i], rim[i + 1]);
+			add_triangle(&s, (vec3){0, 0, 0}, rim[i], rim[i + 1]);
 		for (uint32_t i = 0; i < PARTS; i++)
 			for (uint32_t k = 0; k < i; k++) {
 				const struct triangle a = triangle_at(&s, i), b = triangle_at(&s, k);
@@ -508,9 +510,13 @@ static void test_fan(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two),	  cmocka_unit_test(test_neighbours),
-					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
-					   cmocka_unit_test(test_tubes),  cmocka_unit_test(test_crossing_leaves),
-					   cmocka_unit_test(test_rays),	  cmocka_unit_test(test_fan)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(two_triangles_coincide_if_they_overlap_in_one_plane),
+					   cmocka_unit_test(neighbours_never_coincide),
+					   cmocka_unit_test(search_finds_the_present_primitive),
+					   cmocka_unit_test(search_ends_at_its_bounds),
+					   cmocka_unit_test(search_among_long_tubes_finishes),
+					   cmocka_unit_test(crossing_leaves_do_not_coincide),
+					   cmocka_unit_test(rays_ignore_hidden_surfaces),
+					   cmocka_unit_test(parts_of_a_disk_do_not_coincide)};
 	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
 }

@@ -11,10 +11,10 @@
 
 #include <cmocka.h>
 
-static const struct kind {
+static const struct cone_kind {
 	const char *name;
 	double length, r0, r1;
-} kinds[] = {
+} cone_kinds[] = {
 	{"cylinder", 1, 0.3, 0.3},
 	{"cone", 1, 0.5, 0.2},
 	{"wider", 1, 0.1, 0.4},
@@ -28,9 +28,9 @@ static const struct kind {
 	{"one center", 0, 0.1, 0.3},
 	{"short", 1e-6, 0.5, 0.5},
 };
-enum { KINDS = sizeof kinds / sizeof *kinds };
+enum { KINDS = sizeof cone_kinds / sizeof *cone_kinds };
 
-static struct cone cone_of(const struct kind *k, vec3 *p0, vec3 *p1, struct dice *d)
+static struct cone cone_of(const struct cone_kind *k, vec3 *p0, vec3 *p1, struct dice *d)
 {
 	*p0 = vec3_scale(0.5, dice_direction(d));
 	*p1 = vec3_madd(*p0, k->length, dice_direction(d));
@@ -54,18 +54,19 @@ static double distance_by_search(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
 	return vec3_length(vec3_sub(p, vec3_madd(p0, low, way))) - r0 - low * (r1 - r0);
 }
 
-static void test_distance(void **state)
+static void distance_agrees_with_a_search(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("distances from cones");
 	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
-		const struct kind *k = &kinds[i % KINDS];
+		const struct cone_kind *k = &cone_kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &d);
 		vec3 p = vec3_madd(p0, dice_between(&d, 0, 2) * (k->r0 + k->r1 + k->length), dice_direction(&d));
-		double want = distance_by_search(p0, k->r0, p1, k->r1, p), have = cone_distance(&c, p, false, false);
-		if (!(fabs(have - want) <= 1e-12))
-			fail_msg("%s: a distance of %.17g, not %.17g", k->name, have, want);
+		double expected = distance_by_search(p0, k->r0, p1, k->r1, p),
+		       actual = cone_distance(&c, p, false, false);
+		if (!(fabs(actual - expected) <= 1e-12))
+			fail_msg("%s: a distance of %.17g, not %.17g", k->name, actual, expected);
 	}
 }
 
@@ -92,13 +93,13 @@ static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t
 /* A line meets the convex body twice or not at all: at both hits the distance is 0, between them it is negative, and
  * on a line without hits it is negative nowhere. Rays from near and far, in all directions, towards the axis and past
  * it. */
-static void test_rays(void **state)
+static void rays_meet_a_cone_twice_or_not_at_all(void **state)
 {
 	(void)state;
 	struct dice dice = dice_for_test("rays at cones");
 	uint32_t hits[KINDS] = {0};
 	for (size_t i = 0; i < dice_scaled_count(60000); i++) {
-		const struct kind *k = &kinds[i % KINDS];
+		const struct cone_kind *k = &cone_kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &dice);
 		double wide = fmax(k->r0, k->r1), away = i % 3 ? 2 : 1000;
@@ -108,26 +109,26 @@ static void test_rays(void **state)
 		double t[6], tolerance = 1e-13 * away;
 		int n = roots_of(&c, o, w, 1e-14, t);
 		for (int j = 0; j < n; j++) {
-			double off = cone_distance(&c, vec3_madd(o, t[j], w), false, false);
-			if (!(fabs(off) <= tolerance))
-				fail_msg("%s: root %.17g is off by %g", k->name, t[j], off);
+			double surface_distance = cone_distance(&c, vec3_madd(o, t[j], w), false, false);
+			if (!(fabs(surface_distance) <= tolerance))
+				fail_msg("%s: root %.17g is off by %g", k->name, t[j], surface_distance);
 		}
-		double least = INFINITY; /* smallest distance on the line */
+		double min_distance = INFINITY; /* smallest distance on the line */
 		double low = away - 3, high = away + 3;
 		for (int j = 0; j < 200; j++) {
 			double x = low + (high - low) / 3, y = high - (high - low) / 3;
 			double f = cone_distance(&c, vec3_madd(o, x, w), false, false),
 			       g = cone_distance(&c, vec3_madd(o, y, w), false, false);
-			least = fmin(least, fmin(f, g));
+			min_distance = fmin(min_distance, fmin(f, g));
 			if (f <= g)
 				high = y;
 			else
 				low = x;
 		}
-		if (least < -1e-11 && !(n >= 2 && t[0] < low + 1e-9 && t[n - 1] > low - 1e-9))
-			fail_msg("%s: goes %g deep, %d roots", k->name, -least, n);
-		if (least > 1e-11 && n > 0)
-			fail_msg("%s: passes at %g, %d roots", k->name, least, n);
+		if (min_distance < -1e-11 && !(n >= 2 && t[0] < low + 1e-9 && t[n - 1] > low - 1e-9))
+			fail_msg("%s: goes %g deep, %d roots", k->name, -min_distance, n);
+		if (min_distance > 1e-11 && n > 0)
+			fail_msg("%s: passes at %g, %d roots", k->name, min_distance, n);
 		hits[i % KINDS] += n > 0;
 	}
 	for (size_t i = 0; i < KINDS; i++)
@@ -135,12 +136,12 @@ static void test_rays(void **state)
 }
 
 /* The other root of a line that starts on the surface, against all roots. Outwards, no root lies ahead. */
-static void test_other_root(void **state)
+static void other_root_is_the_far_end_of_the_chord(void **state)
 {
 	(void)state;
 	struct dice dice = dice_for_test("rays from cones");
 	for (size_t i = 0; i < dice_scaled_count(30000); i++) {
-		const struct kind *k = &kinds[i % KINDS];
+		const struct cone_kind *k = &cone_kinds[i % KINDS];
 		vec3 p0, p1;
 		struct cone c = cone_of(k, &p0, &p1, &dice);
 		vec3 w = dice_direction(&dice), o = vec3_madd(vec3_madd(p0, 0.5, vec3_sub(p1, p0)), -3, w);
@@ -149,10 +150,10 @@ static void test_other_root(void **state)
 			if (!cone_roots(&c, part, o, w, root) || !(fabs(root[0]) < 100) || !(fabs(root[1]) < 100))
 				continue;
 			vec3 p = vec3_madd(o, root[0], w);
-			double other = cone_other_root(&c, part, p, w), want = root[1] - root[0];
-			double scale = fmax(k->r0, k->r1) / fmax(want, 1e-300);
-			if (!(fabs(other - want) <= 1e-9 * want * fmax(scale, 1)))
-				fail_msg("%s, part %d: %.17g, not %.17g", k->name, part, other, want);
+			double other = cone_other_root(&c, part, p, w), expected = root[1] - root[0];
+			double scale = fmax(k->r0, k->r1) / fmax(expected, 1e-300);
+			if (!(fabs(other - expected) <= 1e-9 * expected * fmax(scale, 1)))
+				fail_msg("%s, part %d: %.17g, not %.17g", k->name, part, other, expected);
 			if (cone_part_contains(&c, part, p, 0))
 				assert_true(other > 0 && fabs(cone_height(&c, part, p)) < 1e-13);
 		}
@@ -162,16 +163,16 @@ static void test_other_root(void **state)
 /* Lines of all directions through a ball of radius R meet a convex body of surface S with probability S / (4 pi R^2)
  * (Cauchy); N = 200000 lines, so that a deviation of 5 standard errors has a level below 1e-6, and one of 2 % of S, at
  * a probability above 0.1, is found with a power above 0.99. */
-static void test_areas(void **state)
+static void areas_agree_with_crossings_of_random_lines(void **state)
 {
 	(void)state;
-	static const struct kind bodies[] = {{"cylinder with ends", 1, 0.3, 0.3},
-					     {"cone", 1, 0.5, 0.2},
-					     {"tip", 1, 0.4, 0},
-					     {"sphere", 0.2, 0.5, 0.1}};
+	static const struct cone_kind bodies[] = {{"cylinder with ends", 1, 0.3, 0.3},
+						  {"cone", 1, 0.5, 0.2},
+						  {"tip", 1, 0.4, 0},
+						  {"sphere", 0.2, 0.5, 0.1}};
 	struct dice dice = dice_for_test("areas of cones");
 	for (size_t b = 0; b < sizeof bodies / sizeof *bodies; b++) {
-		const struct kind *k = &bodies[b];
+		const struct cone_kind *k = &bodies[b];
 		vec3 p0 = {-0.5 * k->length, 0, 0}, p1 = {0.5 * k->length, 0, 0};
 		struct cone c = cone_between(p0, k->r0, p1, k->r1);
 		double s = fmin((k->r0 - k->r1) / k->length, 1),
@@ -197,10 +198,10 @@ static void test_areas(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_distance),
-		cmocka_unit_test(test_rays),
-		cmocka_unit_test(test_other_root),
-		cmocka_unit_test(test_areas),
+		cmocka_unit_test(distance_agrees_with_a_search),
+		cmocka_unit_test(rays_meet_a_cone_twice_or_not_at_all),
+		cmocka_unit_test(other_root_is_the_far_end_of_the_chord),
+		cmocka_unit_test(areas_agree_with_crossings_of_random_lines),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

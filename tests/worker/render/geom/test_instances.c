@@ -19,13 +19,13 @@
 
 #include <cmocka.h>
 
-enum { INSTANCES = 6, SHAPES = INSTANCES + 1, MOST = 4096 };
+enum { INSTANCES = 6, SHAPES = INSTANCES + 1, TRIANGLES_MAX = 4096 };
 
 typedef struct {
 	long double x, y, z;
 } wide;
 
-static wide widen(vec3 v)
+static wide vec3_to_wide(vec3 v)
 {
 	return (wide){(long double)v.x, (long double)v.y, (long double)v.z};
 }
@@ -48,8 +48,8 @@ static long double wide_dot(wide a, wide b)
 struct scene {
 	struct geom_shape ball, shape[SHAPES];
 	struct placement place[SHAPES];
-	uint32_t (*turned)[3];
-	wide corner[SHAPES][MOST][3];
+	uint32_t (*reversed_indices)[3];
+	wide corner[SHAPES][TRIANGLES_MAX][3];
 	double size[SHAPES];
 	struct accel *accel;
 };
@@ -59,7 +59,7 @@ static mat4 product(mat4 a, mat4 b)
 	return mat4_mul(a, b);
 }
 
-static mat4 transform(int k)
+static mat4 instance_transform(int k)
 {
 	const vec3 axis = {1, 2, -1};
 	switch (k) {
@@ -81,7 +81,7 @@ static mat4 transform(int k)
 	}
 }
 
-static wide move(const mat4 *m, const float p[3])
+static wide wide_transform(const mat4 *m, const float p[3])
 {
 	long double out[3];
 	for (int i = 0; i < 3; i++) {
@@ -92,34 +92,34 @@ static wide move(const mat4 *m, const float p[3])
 	return (wide){out[0], out[1], out[2]};
 }
 
-static void turn_scene(struct scene *s)
+static void reverse_winding(struct scene *s)
 {
 	const struct geom_shape *g = &s->ball;
-	s->turned = mem_alloc(g->triangle_count, sizeof *s->turned);
-	assert_non_null(s->turned);
+	s->reversed_indices = mem_alloc(g->triangle_count, sizeof *s->reversed_indices);
+	assert_non_null(s->reversed_indices);
 	for (uint32_t i = 0; i < g->triangle_count; i++)
-		memcpy(s->turned[i], (uint32_t[3]){g->index[i][0], g->index[i][2], g->index[i][1]},
-		       sizeof s->turned[i]);
+		memcpy(s->reversed_indices[i], (uint32_t[3]){g->index[i][0], g->index[i][2], g->index[i][1]},
+		       sizeof s->reversed_indices[i]);
 }
 
 /* first: the transform of the first shape, so that the tree is built with one winding or the other. */
-static struct scene *scene_of(int first)
+static struct scene *make_scene(int first)
 {
 	struct scene *s = mem_alloc(1, sizeof *s);
 	struct accel_shape a[SHAPES] = {{.is_sphere = false}};
 	assert_non_null(s);
 	body_make_ball(&s->ball, 6, 0.8, 0.1);
 	body_make_plane(&s->shape[INSTANCES], 2, 0.25, -0.125);
-	turn_scene(s);
+	reverse_winding(s);
 	for (int k = 0; k < SHAPES; k++) {
-		mat4 m = k < INSTANCES ? transform((k + first) % INSTANCES) : mat4_identity();
+		mat4 m = k < INSTANCES ? instance_transform((k + first) % INSTANCES) : mat4_identity();
 		struct geom_shape *g = &s->shape[k];
 		if (k < INSTANCES) {
 			*g = s->ball;
 			assert_true(placement_make(&s->place[k], &m, (vec3){-0.9, -0.9, -0.9}, (vec3){0.9, 0.9, 0.9}));
 			g->placement = &s->place[k];
 			if (s->place[k].is_mirrored)
-				g->index = s->turned;
+				g->index = s->reversed_indices;
 			s->size[k] = triangle_norm_max(s->place[k].half);
 		} else {
 			s->size[k] = 1;
@@ -132,7 +132,7 @@ static struct scene *scene_of(int first)
 					    .placement = g->placement};
 		for (uint32_t i = 0; i < g->triangle_count; i++)
 			for (int c = 0; c < 3; c++)
-				s->corner[k][i][c] = move(&m, g->position[g->index[i][c]]);
+				s->corner[k][i][c] = wide_transform(&m, g->position[g->index[i][c]]);
 	}
 	struct error e = {""};
 	if (accel_new(&s->accel, a, SHAPES, NULL, &e))
@@ -143,7 +143,7 @@ static struct scene *scene_of(int first)
 static void scene_free(struct scene *s)
 {
 	accel_free(s->accel);
-	mem_free(s->turned);
+	mem_free(s->reversed_indices);
 	body_fini(&s->ball);
 	body_fini(&s->shape[INSTANCES]);
 	mem_free(s);
@@ -151,14 +151,15 @@ static void scene_free(struct scene *s)
 
 /* The nearest hit along o + t d, without the excluded triangles. margin: distance of the hit from the triangle's
  * edge, in barycentric coordinates. */
-struct met {
+struct nearest_hit {
 	struct prim_ref prim;
 	long double t, margin;
 };
 
-static struct met search(const struct scene *s, wide o, wide d, const struct prim_ref out[2], long double t_max)
+static struct nearest_hit search_nearest(const struct scene *s, wide o, wide d, const struct prim_ref out[2],
+					 long double t_max)
 {
-	struct met best = {PRIM_NONE, t_max, 1};
+	struct nearest_hit best = {PRIM_NONE, t_max, 1};
 	for (uint32_t k = 0; k < SHAPES; k++)
 		for (uint32_t i = 0; i < s->shape[k].triangle_count; i++) {
 			const wide *v = s->corner[k][i];
@@ -170,7 +171,7 @@ static struct met search(const struct scene *s, wide o, wide d, const struct pri
 			wide from = wide_sub(o, v[0]), q = wide_cross(from, e1);
 			long double u = wide_dot(from, h) / det, w = wide_dot(d, q) / det, t = wide_dot(e2, q) / det;
 			if (u >= 0 && w >= 0 && u + w <= 1 && t > 1e-15L && t < best.t)
-				best = (struct met){{k, i, 0}, t, fminl(u, fminl(w, 1 - u - w))};
+				best = (struct nearest_hit){{k, i, 0}, t, fminl(u, fminl(w, 1 - u - w))};
 		}
 	return best;
 }
@@ -189,7 +190,7 @@ static vec3 direction_leaving(const struct surface_point *x, struct dice *d)
 	return vec3_normalize(vec3_madd(w, (low - 1) * vec3_dot(w, x->ng), x->ng));
 }
 
-static struct ray_end start_of(const struct scene *s, struct dice *d, vec3 *w)
+static struct ray_end random_ray_start(const struct scene *s, struct dice *d, vec3 *w)
 {
 	if (dice_uniform(d) < 0.3) {
 		const struct ray_end from = {.p = vec3_scale(dice_between(d, 0.1, 30), dice_direction(d)),
@@ -207,33 +208,33 @@ static void check_closest(struct scene *s, struct dice *d, size_t n, size_t met[
 {
 	for (size_t i = 0; i < n; i++) {
 		vec3 w;
-		const struct ray_end from = start_of(s, d, &w);
+		const struct ray_end from = random_ray_start(s, d, &w);
 		const struct prim_ref out[2] = {from.prim, PRIM_NONE};
-		struct met want = search(s, widen(from.p), widen(w), out, INFINITY);
+		struct nearest_hit expected = search_nearest(s, vec3_to_wide(from.p), vec3_to_wide(w), out, INFINITY);
 		struct ray_hit hit = {.prim = PRIM_NONE};
 		if (!accel_closest(s->accel, &from, w, 0, INFINITY, &hit))
 			hit.prim = PRIM_NONE;
-		if (hit.prim.shape != want.prim.shape || hit.prim.prim != want.prim.prim) {
+		if (hit.prim.shape != expected.prim.shape || hit.prim.prim != expected.prim.prim) {
 			*wrong += 1;
 			continue;
 		}
-		if (want.prim.shape == PRIM_NONE.shape)
+		if (expected.prim.shape == PRIM_NONE.shape)
 			continue;
 		met[hit.prim.shape]++;
 		struct surface_point x;
 		surface_from_hit(&s->shape[hit.prim.shape], from.p, w, &hit, &x);
 		const wide *v = s->corner[hit.prim.shape][hit.prim.prim];
-		wide ng = wide_cross(wide_sub(v[1], v[0]), wide_sub(v[2], v[0])), p = widen(x.p);
-		long double along = wide_dot(ng, widen(x.ng)) / sqrtl(wide_dot(ng, ng));
+		wide ng = wide_cross(wide_sub(v[1], v[0]), wide_sub(v[2], v[0])), p = vec3_to_wide(x.p);
+		long double along = wide_dot(ng, vec3_to_wide(x.ng)) / sqrtl(wide_dot(ng, ng));
 		/* The point lies in the triangle's plane and, as far as the slope allows, on the ray, and its normal
 		 * follows the winding of the corners. */
 		long double high = wide_dot(ng, wide_sub(p, v[0])) / sqrtl(wide_dot(ng, ng));
 		double slope = fabs(vec3_dot(x.ng, w)),
-		       off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, (double)want.t, w)));
+		       off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, (double)expected.t, w)));
 		assert_true(fabsl(high) < 1e-15L && along > 1 - 1e-12L);
-		assert_true(off * slope < 1e-13 * (1 + (double)want.t));
-		assert_true(fabs(hit.t - (double)want.t) * slope <
-			    1e-5 * s->size[hit.prim.shape] + 1e-6 * (1 + (double)want.t));
+		assert_true(off * slope < 1e-13 * (1 + (double)expected.t));
+		assert_true(fabs(hit.t - (double)expected.t) * slope <
+			    1e-5 * s->size[hit.prim.shape] + 1e-6 * (1 + (double)expected.t));
 	}
 }
 
@@ -244,23 +245,26 @@ static void check_segments(struct scene *s, struct dice *d, size_t n, size_t *bl
 		const struct ray_end from = body_ray_end(&a), to = body_ray_end(&b);
 		const struct prim_ref out[2] = {a.prim, b.prim};
 		bool plane = a.prim.shape == INSTANCES && b.prim.shape == INSTANCES; /* the segment lies in the plane */
-		bool want = search(s, widen(a.p), wide_sub(widen(b.p), widen(a.p)), out, 1).prim.shape != UINT32_MAX;
-		*blocked += want && !plane;
-		*wrong += !plane && accel_occluded(s->accel, &from, &to) != want;
-		*wrong += !plane && accel_occluded(s->accel, &to, &from) != want;
+		bool expected =
+			search_nearest(s, vec3_to_wide(a.p), wide_sub(vec3_to_wide(b.p), vec3_to_wide(a.p)), out, 1)
+				.prim.shape != UINT32_MAX;
+		*blocked += expected && !plane;
+		*wrong += !plane && accel_occluded(s->accel, &from, &to) != expected;
+		*wrong += !plane && accel_occluded(s->accel, &to, &from) != expected;
 		vec3 w = direction_leaving(&a, d);
-		const struct prim_ref own[2] = {a.prim, PRIM_NONE};
-		want = search(s, widen(a.p), widen(w), own, INFINITY).prim.shape != UINT32_MAX;
-		*wrong += accel_occluded_to_infinity(s->accel, &from, w) != want;
+		const struct prim_ref own_prims[2] = {a.prim, PRIM_NONE};
+		expected = search_nearest(s, vec3_to_wide(a.p), vec3_to_wide(w), own_prims, INFINITY).prim.shape !=
+			   UINT32_MAX;
+		*wrong += accel_occluded_to_infinity(s->accel, &from, w) != expected;
 	}
 }
 
-static void test_rays(void **state)
+static void rays_agree_with_a_search_among_instances(void **state)
 {
 	(void)state;
 	for (int first = 0; first < 4; first += 2) {
 		struct dice d = dice_for_test("rays among instances");
-		struct scene *s = scene_of(first);
+		struct scene *s = make_scene(first);
 		size_t n = dice_scaled_count(4000), met[SHAPES] = {0}, wrong = 0, crossed = 0, blocked = 0;
 		check_closest(s, &d, n, met, &wrong);
 		check_segments(s, &d, n / 2, &blocked, &crossed);
@@ -277,11 +281,11 @@ static void test_rays(void **state)
 }
 
 /* From inside a closed body nothing escapes. */
-static void test_closed(void **state)
+static void nothing_escapes_a_closed_instance(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("rays within instances");
-	struct scene *s = scene_of(0);
+	struct scene *s = make_scene(0);
 	for (size_t i = 0; i < dice_scaled_count(20000); i++) {
 		uint32_t k = dice_below(&d, INSTANCES);
 		const struct surface_point x = body_sample_point(&s->shape[k], k, &d);
@@ -296,7 +300,7 @@ static void test_closed(void **state)
 	scene_free(s);
 }
 
-static void test_refused(void **state)
+static void singular_instances_are_refused(void **state)
 {
 	(void)state;
 	struct placement p;
@@ -312,7 +316,7 @@ static void test_refused(void **state)
 /* Instances of a table top on a floor at height 0, where floats are exact; the tops deviate by the rounding of 0.3 in
  * their own frame. The lifted instance and the tilted one coincide with nothing; of all others, every triangle
  * coincides with the floor. */
-static void test_coincident(void **state)
+static void coincident_instances_hide_each_other(void **state)
 {
 	(void)state;
 	struct geom_shape floor, top;
@@ -353,7 +357,7 @@ static void test_coincident(void **state)
 }
 
 /* Returns a direction along the surface that rises by `slope`. */
-static vec3 grazing(struct dice *d, vec3 n, double slope)
+static vec3 grazing_direction(struct dice *d, vec3 n, double slope)
 {
 	vec3 w = dice_direction(d);
 	w = vec3_normalize(vec3_madd(w, -vec3_dot(w, n), n));
@@ -367,9 +371,9 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	float position[5][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
 	uint32_t index[2][3] = {{0, 1, 2}, {0, 2, 3}};
 	struct placement place[2];
-	mat4 above = product(*m, mat4_translate((vec3){0, 0, gap}));
+	mat4 upper_transform = product(*m, mat4_translate((vec3){0, 0, gap}));
 	assert_true(placement_make(&place[0], m, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
-	assert_true(placement_make(&place[1], &above, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
+	assert_true(placement_make(&place[1], &upper_transform, (vec3){-1, -1, 0}, (vec3){1, 1, 0}));
 	struct geom_shape s[2] = {{.vertex_count = 4, .triangle_count = 2, .position = position, .index = index}};
 	s[1] = s[0];
 	s[0].placement = &place[0];
@@ -379,7 +383,7 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	for (size_t i = 0; i < dice_scaled_count(2000); i++) {
 		const vec3 p = {dice_between(d, -0.5, 0.5), dice_between(d, -0.5, 0.5), 0};
 		const struct ray_end from = {placement_point(&place[0], p), up, {0, p.y > p.x, 0}};
-		vec3 w = grazing(d, up, exp(dice_between(d, log(1.0 / 32), log(8))));
+		vec3 w = grazing_direction(d, up, exp(dice_between(d, log(1.0 / 32), log(8))));
 		const struct ray_end beyond = {.p = vec3_madd(from.p, 0.03, w), .prim = PRIM_NONE};
 		struct ray_hit hit;
 		assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit) && hit.prim.shape == 1);
@@ -389,7 +393,7 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	accel_free(a);
 }
 
-static void test_sheets(void **state)
+static void rays_meet_a_near_instance_of_a_sheet(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("instances of a sheet");
@@ -407,8 +411,11 @@ static void test_sheets(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_rays),	   cmocka_unit_test(test_closed), cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_coincident), cmocka_unit_test(test_sheets),
+		cmocka_unit_test(rays_agree_with_a_search_among_instances),
+		cmocka_unit_test(nothing_escapes_a_closed_instance),
+		cmocka_unit_test(singular_instances_are_refused),
+		cmocka_unit_test(coincident_instances_hide_each_other),
+		cmocka_unit_test(rays_meet_a_near_instance_of_a_sheet),
 	};
 	return cmocka_run_group_tests_name("instances", tests, NULL, NULL);
 }

@@ -18,12 +18,12 @@ enum { SHAPES = 3 };
 struct scene {
 	struct geom_shape shape[SHAPES];
 	struct accel *accel;
-	double small;
+	double small_size;
 };
 
-static struct scene scene_of(double small)
+static struct scene make_scene(double small)
 {
-	struct scene s = {.small = small};
+	struct scene s = {.small_size = small};
 	body_make_plane(&s.shape[0], 1, 0.5, 0.25);
 	body_make_ball(&s.shape[1], 6, small, 0.15);
 	s.shape[2] = (struct geom_shape){.is_sphere = true,
@@ -51,7 +51,7 @@ static double sphere_nearest(const struct geom_shape *s, vec3 o, vec3 d)
 	return along - sqrt((s->radius - pass) * (s->radius + pass));
 }
 
-static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
+static double nearest_hit(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 {
 	double best = INFINITY;
 	for (uint32_t i = 0; i < SHAPES; i++) {
@@ -70,10 +70,10 @@ static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 static vec3 near_point(const struct scene *s, struct dice *d)
 {
 	for (;;) {
-		vec3 p = vec3_scale(3 * s->small,
+		vec3 p = vec3_scale(3 * s->small_size,
 				    (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)});
 		double height = p.z - 0.5 * p.x - 0.25 * p.y;
-		if (height > 0 && vec3_length(p) > 1.2 * s->small &&
+		if (height > 0 && vec3_length(p) > 1.2 * s->small_size &&
 		    vec3_length(vec3_sub(p, s->shape[2].center)) > s->shape[2].radius)
 			return p;
 	}
@@ -93,7 +93,7 @@ static size_t check_closest(const struct scene *s, struct dice *d, bool far, siz
 		const struct ray_end from = {.p = far ? far_point(d) : near_point(s, d), .prim = PRIM_NONE};
 		vec3 w = vec3_normalize(vec3_sub(aim, from.p));
 		uint32_t shape = 0;
-		double t = nearest(s, from.p, w, &shape);
+		double t = nearest_hit(s, from.p, w, &shape);
 		struct ray_hit hit;
 		struct surface_point x;
 		bool is_met = accel_closest(s->accel, &from, w, 0, INFINITY, &hit);
@@ -107,8 +107,8 @@ static size_t check_closest(const struct scene *s, struct dice *d, bool far, siz
 		surface_from_hit(&s->shape[shape], from.p, w, &hit, &x);
 		/* The floor's vertices and the directions of far rays are doubles of about 1, whose rounding adds to
 		 * the error. */
-		double off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, t, w)));
-		wrong += !(off <= 1e-4 * s->small + 0x1p-48);
+		double deviation = vec3_length(vec3_sub(x.p, vec3_madd(from.p, t, w)));
+		wrong += !(deviation <= 1e-4 * s->small_size + 0x1p-48);
 	}
 	return wrong;
 }
@@ -122,7 +122,7 @@ static size_t check_segments(const struct scene *s, struct dice *d, size_t n, si
 		vec3 w = vec3_sub(b.p, a.p);
 		double length = vec3_length(w);
 		uint32_t shape;
-		bool is_blocked = nearest(s, a.p, vec3_scale(1 / length, w), &shape) < length;
+		bool is_blocked = nearest_hit(s, a.p, vec3_scale(1 / length, w), &shape) < length;
 		*blocked += is_blocked;
 		wrong += accel_occluded(s->accel, &a, &b) != is_blocked ||
 			 accel_occluded(s->accel, &b, &a) != is_blocked;
@@ -161,7 +161,7 @@ static size_t check_from_the_floor(const struct scene *s, struct dice *d, size_t
 	return wrong;
 }
 
-static void test_mixed(void **state)
+static void rays_agree_with_a_search_at_mixed_scales(void **state)
 {
 	(void)state;
 	/* At the last size, 1.5e-11, the rounding of the floor's own doubles amounts to 1e-4 of the size. */
@@ -172,7 +172,7 @@ static void test_mixed(void **state)
 	size_t n = dice_scaled_count(20000);
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
 		struct dice d = dice_for_test("mixed scales");
-		struct scene s = scene_of(sizes[i].size);
+		struct scene s = make_scene(sizes[i].size);
 		size_t met[SHAPES] = {0}, blocked = 0, close = check_closest(&s, &d, false, n, met),
 		       far = check_closest(&s, &d, true, n, met);
 		size_t segments = check_segments(&s, &d, n, &blocked), floor = check_from_the_floor(&s, &d, n);
@@ -181,8 +181,8 @@ static void test_mixed(void **state)
 			"%zu %zu %zu, blocked %zu\n",
 			sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
 		double expected = (double)n * (double)sizes[i].wrong * 1e-6;
-		size_t most = (size_t)(expected + 4 * sqrt(expected) + 1); /* 4 sigma, also for small samples */
-		assert_true(close <= most && far <= most && segments <= most && floor <= most);
+		size_t max_wrong = (size_t)(expected + 4 * sqrt(expected) + 1); /* 4 sigma, also for small samples */
+		assert_true(close <= max_wrong && far <= max_wrong && segments <= max_wrong && floor <= max_wrong);
 		for (int k = 0; k < SHAPES; k++)
 			assert_true(met[k] > n / 50);
 		assert_true(blocked > n / 50 && blocked < n);
@@ -192,6 +192,6 @@ static void test_mixed(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mixed)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(rays_agree_with_a_search_at_mixed_scales)};
 	return cmocka_run_group_tests_name("mixed scales", tests, NULL, NULL);
 }

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#define SAME (1e-14 / cosine)
+#define POSITION_TOLERANCE (1e-14 / cosine)
 
 static double distance_of(const struct surface_point *a, const struct surface_point *b)
 {
@@ -20,7 +20,7 @@ static double distance_of(const struct surface_point *a, const struct surface_po
 
 /* A ray through a point of the triangle from either side gives that point. A triangle behind the start, or a ray
  * beside the triangle, gives none. */
-static void test_triangles(void **state)
+static void reprojection_finds_the_point_of_a_triangle(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("points put back on triangles");
@@ -34,7 +34,8 @@ static void test_triangles(void **state)
 			continue;
 		w = vec3_scale(1 / t, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, o, w, t, &y));
-		assert_true(distance_of(&x, &y) < SAME && y.prim.shape == x.prim.shape && y.prim.prim == x.prim.prim);
+		assert_true(distance_of(&x, &y) < POSITION_TOLERANCE && y.prim.shape == x.prim.shape &&
+			    y.prim.prim == x.prim.prim);
 		assert_true(y.b1 >= 0 && y.b2 >= 0 && y.b1 + y.b2 <= 1 + 0x1p-52);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, o, vec3_neg(w), t, &y));
 		assert_false(surface_reproject(&s, x.prim, x.prim, o, w, t, &y));
@@ -48,7 +49,7 @@ static void test_triangles(void **state)
 	body_fini(&s);
 }
 
-static void test_spheres(void **state)
+static void reprojection_finds_the_point_of_a_sphere(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("points put back on spheres");
@@ -65,7 +66,7 @@ static void test_spheres(void **state)
 			continue;
 		w = vec3_scale(1 / t, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, o, w, t, &y));
-		assert_true(distance_of(&x, &y) < SAME);
+		assert_true(distance_of(&x, &y) < POSITION_TOLERANCE);
 		assert_true(fabs(vec3_length(vec3_sub(y.p, s.center)) - s.radius) < 1e-15);
 		/* From the sphere itself: the other end of the chord, or nothing if the ray leads outwards. */
 		bool inwards = vec3_dot(w, x.ng) < 0;
@@ -73,17 +74,18 @@ static void test_spheres(void **state)
 		if (!inwards)
 			continue;
 		double chord = -2 * s.radius * vec3_dot(w, x.ng);
-		assert_true(vec3_length(vec3_sub(z.p, vec3_madd(x.p, chord, w))) < SAME);
+		assert_true(vec3_length(vec3_sub(z.p, vec3_madd(x.p, chord, w))) < POSITION_TOLERANCE);
 		/* From outside, both crossings lie ahead: the requested one is returned. */
 		vec3 outside = vec3_madd(x.p, -3, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.4 * chord, &y) &&
-			    distance_of(&x, &y) < SAME);
+			    distance_of(&x, &y) < POSITION_TOLERANCE);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.6 * chord, &y) &&
-			    distance_of(&z, &y) < SAME);
+			    distance_of(&z, &y) < POSITION_TOLERANCE);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, outside, vec3_neg(w), 3, &y));
 		/* From the middle of the chord, only one crossing lies ahead. */
 		vec3 middle = vec3_madd(x.p, 0.5 * chord, w);
-		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) && distance_of(&z, &y) < SAME);
+		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) &&
+			    distance_of(&z, &y) < POSITION_TOLERANCE);
 		/* A ray that misses the sphere. */
 		vec3 aside = vec3_normalize(vec3_cross(w, x.ng)),
 		     passing = vec3_madd(vec3_madd(s.center, 0.401, aside), -2, w);
@@ -93,6 +95,7 @@ static void test_spheres(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_triangles), cmocka_unit_test(test_spheres)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(reprojection_finds_the_point_of_a_triangle),
+					   cmocka_unit_test(reprojection_finds_the_point_of_a_sphere)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,14 +17,14 @@ static vec3 corner(const struct geom_shape *s, uint32_t prim, int k)
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
 }
 
-static double off_line(vec3 p, vec3 o, vec3 d)
+static double distance_from_line(vec3 p, vec3 o, vec3 d)
 {
 	return vec3_length(vec3_cross(vec3_sub(p, o), d));
 }
 
 /* Hits lie on the triangle's plane to 1e-15 of the coordinates, and on the ray to 1e-15 over the cosine between ray
  * and normal. */
-static void test_triangles(void **state)
+static void hits_lie_on_triangle_and_ray(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("surface of triangles");
@@ -49,7 +49,7 @@ static void test_triangles(void **state)
 		assert_true(vec3_length(vec3_sub(n, x.ng)) < 1e-15);
 		/* Beside an edge, Embree's floats may choose the neighbouring triangle: the hit is then that
 		 * triangle's nearest point, within float precision. */
-		double line = off_line(x.p, o, w);
+		double line = distance_from_line(x.p, o, w);
 		if (line > 1e-9) {
 			beside++;
 			assert_true(line < 1e-6);
@@ -69,7 +69,7 @@ static void test_triangles(void **state)
 
 /* Points are center + radius x unit vector, so they lie on the sphere to rounding. They lie on the ray to 1e-15 over
  * the cosine; from far away, to the rounding of the distance. */
-static void test_spheres(void **state)
+static void hits_lie_on_sphere_and_ray(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("surface of spheres");
@@ -99,7 +99,7 @@ static void test_spheres(void **state)
 				/* The hit lies on the near side, unless the ray starts inside. */
 				double cosine = -vec3_dot(x.ng, w);
 				assert_true(distance > radius ? cosine > 0 : cosine < 0);
-				assert_true(off_line(x.p, o, w) * fabs(cosine) < 1e-15 * (1 + 4 * distance));
+				assert_true(distance_from_line(x.p, o, w) * fabs(cosine) < 1e-15 * (1 + 4 * distance));
 			}
 			accel_free(a);
 		}
@@ -107,7 +107,7 @@ static void test_spheres(void **state)
 }
 
 /* A ray from a point of the sphere into it meets the other end of the chord, however flat the ray. */
-static void test_sphere_from_itself(void **state)
+static void ray_into_a_sphere_meets_the_end_of_the_chord(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("sphere from itself");
@@ -132,13 +132,13 @@ static void test_sphere_from_itself(void **state)
 		 * the cosine. */
 		if (!(fabs(t - chord) * cosine < 1e-15))
 			fail_msg("chord %.17g, %.17g found at cosine %g", chord, t, cosine);
-		assert_true(off_line(y.p, x.p, w) < 2e-15);
+		assert_true(distance_from_line(y.p, x.p, w) < 2e-15);
 	}
 	accel_free(a);
 }
 
 /* A point beside a sliver is moved across the sliver, not along it. */
-static void test_beside_a_sliver(void **state)
+static void point_beside_a_sliver_moves_across_it(void **state)
 {
 	(void)state;
 	float position[4][3] = {{0, -1, 0}, {0x1p-20f, -1, 0}, {0x1p-20f, 1, 0}, {0, 0, 0}};
@@ -157,7 +157,7 @@ static void test_beside_a_sliver(void **state)
 }
 
 /* u grows with the longitude and v from pole to pole, and the derivatives of the position agree with differences. */
-static void test_parameters(void **state)
+static void parameters_and_derivatives_agree_with_differences(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("surface parameters");
@@ -210,9 +210,11 @@ static void test_parameters(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_triangles),	   cmocka_unit_test(test_spheres),
-		cmocka_unit_test(test_sphere_from_itself), cmocka_unit_test(test_beside_a_sliver),
-		cmocka_unit_test(test_parameters),
+		cmocka_unit_test(hits_lie_on_triangle_and_ray),
+		cmocka_unit_test(hits_lie_on_sphere_and_ray),
+		cmocka_unit_test(ray_into_a_sphere_meets_the_end_of_the_chord),
+		cmocka_unit_test(point_beside_a_sliver_moves_across_it),
+		cmocka_unit_test(parameters_and_derivatives_agree_with_differences),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,8 +29,8 @@ static void make_strand(struct strand *s, struct geom_shape *g, double radius, s
 	}
 }
 
-static bool search(const struct strand *s, const struct ray_end *from, vec3 w, double t_max, struct curve_crossing *at,
-		   struct prim_ref *prim)
+static bool search_nearest(const struct strand *s, const struct ray_end *from, vec3 w, double t_max,
+			   struct curve_crossing *at, struct prim_ref *prim)
 {
 	bool any = false;
 	for (uint32_t k = 0; k < STRANDS; k++)
@@ -67,13 +67,13 @@ static void follow_ray(const struct strand *s, const struct geom_shape *g, const
 	for (int i = 0; i < 20; i++) {
 		struct ray_hit hit;
 		struct prim_ref prim;
-		struct curve_crossing at;
+		struct curve_crossing crossing;
 		bool any = accel_closest(a, &from, w, 0, INFINITY, &hit);
-		assert_true(any == search(s, &from, w, INFINITY, &at, &prim));
+		assert_true(any == search_nearest(s, &from, w, INFINITY, &crossing, &prim));
 		assert_true((away > 10 && i == 0) || any == accel_occluded_to_infinity(a, &from, w));
 		if (!any)
 			return;
-		assert_true(fabs(hit.t - at.t) < 1e-6 * (1 + away));
+		assert_true(fabs(hit.t - crossing.t) < 1e-6 * (1 + away));
 		struct surface_point x, y;
 		surface_from_hit(&g[hit.prim.shape], from.p, w, &hit, &x);
 		if (vec3_length(vec3_cross(vec3_sub(x.p, from.p), w)) > 4e-8)
@@ -93,7 +93,7 @@ static void follow_ray(const struct strand *s, const struct geom_shape *g, const
 	}
 }
 
-static void test_rays(void **state)
+static void rays_meet_strands_as_a_search_does(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("rays at strands");
@@ -113,7 +113,7 @@ static void test_rays(void **state)
 
 /* Embree lifts rays that run low over a plane. A thin hair along an axis fills its boxes up to their sides; the
  * lifted rays must meet it where the search in double does. */
-static void test_lifted(void **state)
+static void thin_hair_is_met_by_lifted_rays(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("hairs over a plane");
@@ -135,11 +135,11 @@ static void test_lifted(void **state)
 		     w = vec3_normalize(vec3_sub(to, x.p));
 		struct ray_end from = body_ray_end(&x);
 		struct curve_ray r = {.o = x.p, .d = w, .t_max = INFINITY};
-		struct curve_crossing at;
+		struct curve_crossing crossing;
 		struct ray_hit hit;
 		bool any = false;
 		for (uint32_t k = 0; k < s.curves.count; k++)
-			any |= curves_intersect(&s.curves, k, &r, &at);
+			any |= curves_intersect(&s.curves, k, &r, &crossing);
 		assert_true(any == accel_closest(a, &from, w, 0, INFINITY, &hit));
 		assert_true(any == accel_occluded_to_infinity(a, &from, w));
 		met += any;
@@ -151,7 +151,7 @@ static void test_lifted(void **state)
 
 /* The frame: dp/du runs around the strand, so that t runs along it; smooth normals are perpendicular to the tangents
  * at the control points, from both sides. */
-static void test_frames(void **state)
+static void frames_follow_the_strand(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("frames of strands");
@@ -176,12 +176,13 @@ static void test_frames(void **state)
 	}
 }
 
-enum { HAIRS = 4000, PIECES = 25 };
+enum { HAIRS = 4000, SEGMENTS_PER_HAIR = 25 };
 
 struct hairs {
 	struct curves c;
-	float point[HAIRS * (PIECES + 1)][4], start[HAIRS * PIECES], v[HAIRS * (PIECES + 1)];
-	uint32_t cone[HAIRS * PIECES];
+	float point[HAIRS * (SEGMENTS_PER_HAIR + 1)][4], start[HAIRS * SEGMENTS_PER_HAIR],
+		v[HAIRS * (SEGMENTS_PER_HAIR + 1)];
+	uint32_t cone[HAIRS * SEGMENTS_PER_HAIR];
 };
 
 static void make_hairs(struct hairs *h, struct dice *d)
@@ -190,21 +191,21 @@ static void make_hairs(struct hairs *h, struct dice *d)
 		.points = h->point, .cone = h->cone, .u_start = h->start, .v = h->v, .max_radius = 1e-4f};
 	for (uint32_t i = 0; i < HAIRS; i++) {
 		vec3 p = vec3_scale(0.5, dice_direction(d)), w = vec3_normalize(p);
-		for (uint32_t k = 0; k <= PIECES; k++) {
+		for (uint32_t k = 0; k <= SEGMENTS_PER_HAIR; k++) {
 			memcpy(h->point[h->c.point_count++], (float[4]){(float)p.x, (float)p.y, (float)p.z, 1e-4f},
 			       sizeof h->point[0]);
 			w = vec3_normalize(vec3_madd(w, 0.1, dice_direction(d)));
-			p = vec3_madd(p, 0.4 / PIECES, w);
-			if (k < PIECES)
-				h->cone[h->c.count++] = (i * (PIECES + 1) + k) << CURVE_SHIFT |
+			p = vec3_madd(p, 0.4 / SEGMENTS_PER_HAIR, w);
+			if (k < SEGMENTS_PER_HAIR)
+				h->cone[h->c.count++] = (i * (SEGMENTS_PER_HAIR + 1) + k) << CURVE_SHIFT |
 							(k == 0 ? (uint32_t)CURVE_BEGINS : 0) |
-							(k == PIECES - 1 ? (uint32_t)CURVE_ENDS : 0);
+							(k == SEGMENTS_PER_HAIR - 1 ? (uint32_t)CURVE_ENDS : 0);
 		}
 	}
 }
 
 /* The memory per segment, and equal bits from two trees. */
-static void test_memory_and_bits(void **state)
+static void hairs_take_bounded_memory_and_give_equal_bits(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("many hairs");
@@ -234,10 +235,10 @@ static void test_memory_and_bits(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_rays),
-		cmocka_unit_test(test_lifted),
-		cmocka_unit_test(test_frames),
-		cmocka_unit_test(test_memory_and_bits),
+		cmocka_unit_test(rays_meet_strands_as_a_search_does),
+		cmocka_unit_test(thin_hair_is_met_by_lifted_rays),
+		cmocka_unit_test(frames_follow_the_strand),
+		cmocka_unit_test(hairs_take_bounded_memory_and_give_equal_bits),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,7 +32,7 @@ static struct picture render(struct world *w)
 	return out;
 }
 
-static void test_twin(void **state)
+static void test_gltf_renders_like_its_xml_twin(void **state)
 {
 	(void)state;
 	static struct gltf_files f;
@@ -67,7 +67,7 @@ static void test_twin(void **state)
 
 /* ---- one change each ---- */
 
-static struct gltf_files changed;
+static struct gltf_files changed_files;
 
 static int build_shapes(const struct scene *s, const struct memory_file *files, struct error *e)
 {
@@ -85,7 +85,7 @@ static int build_shapes(const struct scene *s, const struct memory_file *files, 
 }
 
 /* Expects an error from the reader, or from building the shapes. */
-static void refuses(const struct memory_file *files, const char *text)
+static void expect_refused(const struct memory_file *files, const char *text)
 {
 	struct scene s;
 	struct error e = {"no error at all"};
@@ -165,23 +165,23 @@ static const struct {
 	 "nodes[0]: EXT_mesh_gpu_instancing without instances"},
 };
 
-static void test_malformed(void **state)
+static void test_malformed_files_are_refused(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
 		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* a placeholder that packing fills in */
 		const struct memory_file *files =
-			gltf_files_make_changed(&changed, buffer ? NULL : malformed[i].from, malformed[i].to);
+			gltf_files_make_changed(&changed_files, buffer ? NULL : malformed[i].from, malformed[i].to);
 		if (buffer) {
-			gltf_files_replace(&changed, "BUFFER", malformed[i].to);
-			changed.files[0].size = changed.file_size = strlen(changed.json);
-			memcpy(changed.file, changed.json, changed.file_size);
+			gltf_files_replace(&changed_files, "BUFFER", malformed[i].to);
+			changed_files.files[0].size = changed_files.file_size = strlen(changed_files.json);
+			memcpy(changed_files.file, changed_files.json, changed_files.file_size);
 		}
-		refuses(files, malformed[i].text);
+		expect_refused(files, malformed[i].text);
 	}
 }
 
-static void test_malformed_containers(void **state)
+static void test_malformed_binary_containers_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -197,19 +197,19 @@ static void test_malformed_containers(void **state)
 		{0, 'x', "s.glb:1: "},
 	};
 	for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
-		gltf_files_make(&changed);
-		gltf_files_pack(&changed, GLTF_BINARY);
-		changed.file[damage[i].at] = damage[i].value;
-		refuses(changed.files, damage[i].text);
+		gltf_files_make(&changed_files);
+		gltf_files_pack(&changed_files, GLTF_BINARY);
+		changed_files.file[damage[i].at] = damage[i].value;
+		expect_refused(changed_files.files, damage[i].text);
 	}
-	gltf_files_make(&changed);
-	gltf_files_pack(&changed, GLTF_BINARY);
-	changed.files[0].size -= changed.buffer_size;
-	refuses(changed.files, "its header says");
+	gltf_files_make(&changed_files);
+	gltf_files_pack(&changed_files, GLTF_BINARY);
+	changed_files.files[0].size -= changed_files.buffer_size;
+	expect_refused(changed_files.files, "its header says");
 }
 
 /* The limit on values applies before jansson allocates memory for them; brackets within text do not count. */
-static void test_too_much(void **state)
+static void test_too_many_values_are_refused(void **state)
 {
 	(void)state;
 	enum { SIZE = 9 << 20 };
@@ -219,32 +219,32 @@ static void test_too_much(void **state)
 	for (int i = 0; i < SIZE; i++)
 		text[i] = i % 2 ? '[' : ']';
 	text[0] = '[';
-	refuses(files, "more than 4194304 values");
+	expect_refused(files, "more than 4194304 values");
 	memset(text, '[', SIZE);
 	memcpy(text, "{\"a\\\"\": \"", 9);
-	refuses(files, "s.gltf:1: ");
+	expect_refused(files, "s.gltf:1: ");
 	mem_free(text);
 }
 
 /* Damaged bytes of a small file, and prefixes of the file, give a scene or an error message. */
-static void test_damaged(void **state)
+static void test_damaged_files_are_read_or_refused(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("damaged glTF");
 	for (int form = 0; form < GLTF_FORMS; form++)
 		for (int i = 0; i < 400; i++) {
-			gltf_files_make(&changed);
-			gltf_files_pack(&changed, (enum gltf_form)form);
-			size_t at = dice_below(&d, (uint32_t)changed.file_size);
+			gltf_files_make(&changed_files);
+			gltf_files_pack(&changed_files, (enum gltf_form)form);
+			size_t at = dice_below(&d, (uint32_t)changed_files.file_size);
 			if (i % 4 == 0)
-				changed.files[0].size = at;
+				changed_files.files[0].size = at;
 			else
-				changed.file[at] = (unsigned char)dice_below(&d, 256);
+				changed_files.file[at] = (unsigned char)dice_below(&d, 256);
 			struct scene s;
 			struct error e = {""};
-			int rc = gltf_files_read(changed.files, i % 2, &s, &e);
+			int rc = gltf_files_read(changed_files.files, i % 2, &s, &e);
 			if (!rc) {
-				rc = build_shapes(&s, changed.files, &e);
+				rc = build_shapes(&s, changed_files.files, &e);
 				scene_fini(&s);
 			}
 			assert_true(rc == 0 || (rc < 0 && *e.text));
@@ -253,7 +253,7 @@ static void test_damaged(void **state)
 
 /* ---- the resulting materials, cameras and lights ---- */
 
-static const struct scene_node *find(const struct scene *s, enum plugin_class cls, const char *type)
+static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, const char *type)
 {
 	for (uint32_t i = 0; i < s->object_count; i++)
 		if (s->objects[i]->cls == cls && strcmp(s->objects[i]->type, type) == 0)
@@ -268,25 +268,25 @@ static void assert_near(double got, double want)
 		fail_msg("%.17g is not %.17g", got, want);
 }
 
-static void test_lights_and_cameras(void **state)
+static void test_lights_and_cameras_are_converted(void **state)
 {
 	(void)state;
 	struct scene s = gltf_files_read_changed(
 		"\"type\": \"point\"",
 		"\"type\": \"spot\", \"spot\": {\"innerConeAngle\": 0.25, \"outerConeAngle\": 0.5}", false);
-	const struct scene_node *spot = find(&s, PLUGIN_EMITTER, "spot");
+	const struct scene_node *spot = find_object(&s, PLUGIN_EMITTER, "spot");
 	mat4 m = node_transform(spot, "to_world");
 	assert_near(node_float(spot, "cutoff_angle", 0), 0.5 * 180 / M_PI);
 	assert_near(node_float(spot, "beam_width", 0), 0.25 * 180 / M_PI);
 	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* the light emits along -z */
 	scene_fini(&s);
 	s = gltf_files_read_changed("\"type\": \"point\"", "\"type\": \"directional\"", false);
-	m = node_transform(find(&s, PLUGIN_EMITTER, "directional"), "to_world");
+	m = node_transform(find_object(&s, PLUGIN_EMITTER, "directional"), "to_world");
 	assert_true(m.m[2][2] == -1);
 	scene_fini(&s);
 	s = gltf_files_read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {",
 				    false);
-	const struct scene_node *sensor = find(&s, PLUGIN_SENSOR, "orthographic");
+	const struct scene_node *sensor = find_object(&s, PLUGIN_SENSOR, "orthographic");
 	m = node_transform(sensor, "to_world");
 	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
 	assert_int_equal(node_int(node_child(sensor, PLUGIN_FILM, 0), "height", 0), 384);
@@ -295,7 +295,7 @@ static void test_lights_and_cameras(void **state)
 	/* The format advises against negative factors, but does not forbid them. */
 	s = gltf_files_read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": -2, \"ymag\": -1}, \"x\": {",
 				    false);
-	sensor = find(&s, PLUGIN_SENSOR, "orthographic");
+	sensor = find_object(&s, PLUGIN_SENSOR, "orthographic");
 	m = node_transform(sensor, "to_world");
 	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
 	assert_int_equal(node_int(node_child(sensor, PLUGIN_FILM, 0), "height", 0), 384);
@@ -305,7 +305,7 @@ static void test_lights_and_cameras(void **state)
 
 /* Blender's lamps are in lumens since version 3.4, its emission never is; its diffuse surfaces are those of the
  * format since 4.0. */
-static void test_versions_of_blender(void **state)
+static void test_units_follow_the_version_of_blender(void **state)
 {
 	(void)state;
 	static const struct {
@@ -324,29 +324,30 @@ static void test_versions_of_blender(void **state)
 		char asset[128];
 		snprintf(asset, sizeof asset, "{\"generator\": %s, \"version\": \"2.0\"}", files[i].generator);
 		struct scene s = gltf_files_read_changed("{\"version\": \"2.0\"}", asset, false);
-		const double *rgb = node_find_property(find(&s, PLUGIN_EMITTER, "point"), "intensity")->value.as.rgb;
+		const double *rgb =
+			node_find_property(find_object(&s, PLUGIN_EMITTER, "point"), "intensity")->value.as.rgb;
 		for (int k = 0; k < 3; k++)
 			assert_near(rgb[k], (4 >> k) * files[i].scale);
 		assert_true(scene_has_note(&s, "lamps are divided by 683") == (files[i].scale < 1));
-		const struct scene_node *bsdf = find(&s, PLUGIN_BSDF, "principled");
+		const struct scene_node *bsdf = find_object(&s, PLUGIN_BSDF, "principled");
 		assert_true(node_bool(bsdf, "lambertian", false) == files[i].lambertian);
 		scene_fini(&s);
 	}
 }
 
 /* The camera that stands in has the scene's whole box within its field of view. */
-static void test_no_camera_no_light(void **state)
+static void test_missing_camera_and_light_are_replaced(void **state)
 {
 	(void)state;
-	gltf_files_make(&changed);
-	gltf_files_replace(&changed, "\"camera\": 0,", "");
-	gltf_files_replace(&changed, "\"emissiveFactor\": [1, 0.5, 0.5],", "");
-	gltf_files_replace(&changed, "{\"translation\": [2, 2, 2], \"ext", "{\"translation\": [2, 2, 2], \"ext_");
-	struct scene s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
+	gltf_files_make(&changed_files);
+	gltf_files_replace(&changed_files, "\"camera\": 0,", "");
+	gltf_files_replace(&changed_files, "\"emissiveFactor\": [1, 0.5, 0.5],", "");
+	gltf_files_replace(&changed_files, "{\"translation\": [2, 2, 2], \"ext", "{\"translation\": [2, 2, 2], \"ext_");
+	struct scene s = gltf_files_read_packed(&changed_files, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "it has no camera") && scene_has_note(&s, "it has no light") &&
 		    scene_has_note(&s, "points and lines"));
-	find(&s, PLUGIN_EMITTER, "constant");
-	mat4 m = node_transform(find(&s, PLUGIN_SENSOR, "perspective"), "to_world");
+	find_object(&s, PLUGIN_EMITTER, "constant");
+	mat4 m = node_transform(find_object(&s, PLUGIN_SENSOR, "perspective"), "to_world");
 	vec3 eye = {m.m[0][3], m.m[1][3], m.m[2][3]}, ahead = {m.m[0][2], m.m[1][2], m.m[2][2]};
 	for (int i = 0; i < 8; i++) {
 		vec3 corner = {i & 1 ? 4 : -4, i & 2 ? 3 : -1, i & 4 ? 4 : -4}, to = vec3_sub(corner, eye);
@@ -355,7 +356,7 @@ static void test_no_camera_no_light(void **state)
 	scene_fini(&s);
 }
 
-static unsigned count_of(const struct scene *s, enum plugin_class cls)
+static unsigned count_objects(const struct scene *s, enum plugin_class cls)
 {
 	unsigned n = 0;
 	for (uint32_t i = 0; i < s->object_count; i++)
@@ -364,31 +365,32 @@ static unsigned count_of(const struct scene *s, enum plugin_class cls)
 }
 
 /* A Draco-compressed mesh is read if its accessors contain the numbers as well. */
-static void test_draco(void **state)
+static void test_draco_is_accepted_with_uncompressed_numbers(void **state)
 {
 	(void)state;
 	struct scene s = gltf_files_read_changed(NULL, NULL, false);
-	unsigned shapes = count_of(&s, PLUGIN_SHAPE);
+	unsigned shapes = count_objects(&s, PLUGIN_SHAPE);
 	scene_fini(&s);
-	gltf_files_make(&changed);
-	gltf_files_replace(&changed, "\"mode\": 5,",
+	gltf_files_make(&changed_files);
+	gltf_files_replace(&changed_files, "\"mode\": 5,",
 			   "\"mode\": 5, \"extensions\": {\"KHR_draco_mesh_compression\": {\"bufferView\": 0}},");
-	s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
-	assert_int_equal(count_of(&s, PLUGIN_SHAPE), shapes);
+	s = gltf_files_read_packed(&changed_files, GLTF_EXTERNAL);
+	assert_int_equal(count_objects(&s, PLUGIN_SHAPE), shapes);
 	assert_false(scene_has_note(&s, "Draco") || scene_has_note(&s, "draco"));
 	scene_fini(&s);
-	gltf_files_replace(&changed, "\"extensionsUsed\"",
+	gltf_files_replace(&changed_files, "\"extensionsUsed\"",
 			   "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"extensionsUsed\"");
-	gltf_files_replace(&changed, "{\"bufferView\": 6, ", "{");
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	refuses(changed.files, "meshes[0]: compressed by Draco (KHR_draco_mesh_compression), which is not supported; "
-			       "export without compression");
+	gltf_files_replace(&changed_files, "{\"bufferView\": 6, ", "{");
+	gltf_files_pack(&changed_files, GLTF_EXTERNAL);
+	expect_refused(changed_files.files,
+		       "meshes[0]: compressed by Draco (KHR_draco_mesh_compression), which is not supported; "
+		       "export without compression");
 }
 
 #define HIDDEN(value) "\"extensions\": {\"KHR_node_visibility\": {" value "}"
 
 /* Shapes and lights of a hidden node and of its descendants are absent, but its camera is present. */
-static void test_hidden(void **state)
+static void test_hidden_nodes_are_left_out(void **state)
 {
 	(void)state;
 	static const struct {
@@ -406,7 +408,7 @@ static void test_hidden(void **state)
 		unsigned points = 0;
 		for (uint32_t k = 0; k < s.object_count; k++)
 			points += strcmp(s.objects[k]->type, "point") == 0;
-		assert_int_equal(count_of(&s, PLUGIN_SHAPE), cases[i].shapes);
+		assert_int_equal(count_objects(&s, PLUGIN_SHAPE), cases[i].shapes);
 		assert_int_equal(points, cases[i].points);
 		assert_false(scene_has_note(&s, "no camera") || scene_has_note(&s, "not supported"));
 		scene_fini(&s);
@@ -414,31 +416,31 @@ static void test_hidden(void **state)
 }
 
 /* Ignored extensions and properties get a note. */
-static void test_notes(void **state)
+static void test_ignored_extensions_are_noted(void **state)
 {
 	(void)state;
-	gltf_files_make(&changed);
-	gltf_files_replace(&changed, "\"extensionsUsed\": [\"KHR_lights_punctual\"]",
+	gltf_files_make(&changed_files);
+	gltf_files_replace(&changed_files, "\"extensionsUsed\": [\"KHR_lights_punctual\"]",
 			   "\"extensionsUsed\": [\"KHR_lights_punctual\", \"ACME_fog\", \"ACME_wind\"]");
-	gltf_files_replace(&changed, "\"intensity\": ", "\"range\": 5, \"intensity\": ");
-	struct scene s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
+	gltf_files_replace(&changed_files, "\"intensity\": ", "\"range\": 5, \"intensity\": ");
+	struct scene s = gltf_files_read_packed(&changed_files, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);
 	/* Levels of less detail are not in the scene. What is required, and therefore refused, is not said to be
 	 * ignored. */
-	gltf_files_make(&changed);
-	gltf_files_replace(&changed, "\"extensionsUsed\": [",
+	gltf_files_make(&changed_files);
+	gltf_files_replace(&changed_files, "\"extensionsUsed\": [",
 			   "\"extensionsRequired\": [\"MSFT_lod\"], \"extensionsUsed\": [\"MSFT_lod\", ");
-	s = gltf_files_read_packed(&changed, GLTF_EXTERNAL);
+	s = gltf_files_read_packed(&changed_files, GLTF_EXTERNAL);
 	assert_false(scene_has_note(&s, "not supported"));
 	scene_fini(&s);
-	gltf_files_make(&changed);
+	gltf_files_make(&changed_files);
 	gltf_files_replace(
-		&changed, "\"extensionsUsed\": [",
+		&changed_files, "\"extensionsUsed\": [",
 		"\"extensionsRequired\": [\"ACME_fog\"], \"extensionsUsed\": [\"ACME_fog\", \"ACME_wind\", ");
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	struct asset_source assets = memory_assets(changed.files);
+	gltf_files_pack(&changed_files, GLTF_EXTERNAL);
+	struct asset_source assets = memory_assets(changed_files.files);
 	struct error e;
 	assert_int_equal(scene_read_all(&s, &assets, "s.gltf", render_plugins(), NULL, 0, false, &e), 0);
 	assert_int_equal(s.problem_count, 1);
@@ -448,7 +450,7 @@ static void test_notes(void **state)
 }
 
 /* Files that the format forbids or leaves undefined, but that other readers accept. */
-static void test_loose_files(void **state)
+static void test_loose_files_are_accepted(void **state)
 {
 	(void)state;
 	struct gltf_files f;
@@ -488,7 +490,7 @@ static void test_loose_files(void **state)
 }
 
 /* A mesh that a scale of 0 reduces to a point or a line is left out; one reduced to a sheet is refused. */
-static void test_no_area(void **state)
+static void test_meshes_without_area_are_left_out(void **state)
 {
 	(void)state;
 	static const char scale[] = "\"scale\": [4, 1, 4]";
@@ -511,19 +513,19 @@ static void test_no_area(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_twin),
-		cmocka_unit_test(test_malformed),
-		cmocka_unit_test(test_malformed_containers),
-		cmocka_unit_test(test_too_much),
-		cmocka_unit_test(test_damaged),
-		cmocka_unit_test(test_lights_and_cameras),
-		cmocka_unit_test(test_no_camera_no_light),
-		cmocka_unit_test(test_versions_of_blender),
-		cmocka_unit_test(test_draco),
-		cmocka_unit_test(test_hidden),
-		cmocka_unit_test(test_notes),
-		cmocka_unit_test(test_loose_files),
-		cmocka_unit_test(test_no_area),
+		cmocka_unit_test(test_gltf_renders_like_its_xml_twin),
+		cmocka_unit_test(test_malformed_files_are_refused),
+		cmocka_unit_test(test_malformed_binary_containers_are_refused),
+		cmocka_unit_test(test_too_many_values_are_refused),
+		cmocka_unit_test(test_damaged_files_are_read_or_refused),
+		cmocka_unit_test(test_lights_and_cameras_are_converted),
+		cmocka_unit_test(test_missing_camera_and_light_are_replaced),
+		cmocka_unit_test(test_units_follow_the_version_of_blender),
+		cmocka_unit_test(test_draco_is_accepted_with_uncompressed_numbers),
+		cmocka_unit_test(test_hidden_nodes_are_left_out),
+		cmocka_unit_test(test_ignored_extensions_are_noted),
+		cmocka_unit_test(test_loose_files_are_accepted),
+		cmocka_unit_test(test_meshes_without_area_are_left_out),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
 }

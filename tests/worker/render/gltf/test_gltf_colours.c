@@ -40,7 +40,7 @@ static const char strip_ply[] =
 #define RAW(channel) "<boolean name='raw' value='true'/><string name='channel' value='" channel "'/>"
 
 /* clang-format off */
-static const char twin[] =
+static const char twin_xml[] =
 	"<scene version='3.0.0'>"
 		SENSOR("0,3,9", "0,0,0")
 		"<emitter type='constant'/>"
@@ -100,7 +100,7 @@ static size_t write_solid(char *text, size_t size)
 	return n;
 }
 
-static void make_gltf(struct gltf_files *f, const char *mode)
+static void make_gltf_files(struct gltf_files *f, const char *mode)
 {
 	char material[128];
 	snprintf(material, sizeof material,
@@ -119,7 +119,7 @@ static void make_gltf(struct gltf_files *f, const char *mode)
 	gltf_files_pack(f, GLTF_BINARY);
 }
 
-static void test_twin(void **state)
+static void test_vertex_colours_render_like_the_xml_twin(void **state)
 {
 	(void)state;
 	static struct gltf_files f;
@@ -127,12 +127,12 @@ static void test_twin(void **state)
 	static const double rgb[12] = {0.5, 0.25, 0.75, 0.125, 0.5, 0.25, 0.75, 0.75, 0.5, 0.25, 0.75, 0.875};
 	struct pictures p = {0};
 	pictures_add(&p, 2, 2, rgb);
-	make_gltf(&f, "BLEND");
+	make_gltf_files(&f, "BLEND");
 	size_t count = 0;
 	while (f.files[count].name)
 		count++;
 	f.files[count] = (struct memory_file){"rgb.hdr", p.file[0].bytes, p.file[0].size};
-	const struct memory_file files[] = {{"twin.xml", twin, sizeof twin - 1},
+	const struct memory_file files[] = {{"twin.xml", twin_xml, sizeof twin_xml - 1},
 					    {"strip.ply", strip_ply, sizeof strip_ply - 1},
 					    {"solid.ply", solid, write_solid(solid, sizeof solid)},
 					    f.files[count],
@@ -168,7 +168,7 @@ static void test_twin(void **state)
 }
 
 /* A product with a vertex colour has no threshold; with opaque materials alpha has no effect. */
-static void test_modes(void **state)
+static void test_alpha_modes_limit_vertex_colours(void **state)
 {
 	(void)state;
 	static struct gltf_files f;
@@ -177,7 +177,7 @@ static void test_modes(void **state)
 		int result;
 	} cases[] = {{"MASK", -1}, {"OPAQUE", 0}};
 	for (int i = 0; i < 2; i++) {
-		make_gltf(&f, cases[i].mode);
+		make_gltf_files(&f, cases[i].mode);
 		struct asset_source assets = memory_assets(f.files);
 		struct scene s;
 		struct error e = {""};
@@ -193,8 +193,8 @@ static void test_modes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_twin),
-		cmocka_unit_test(test_modes),
+		cmocka_unit_test(test_vertex_colours_render_like_the_xml_twin),
+		cmocka_unit_test(test_alpha_modes_limit_vertex_colours),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,7 +27,7 @@ static void assert_near(double got, double want)
 #define IOR "\"KHR_materials_ior\": {"
 /* Layers that `principled` represents in its own way, textures for two of them, and details that are left out with a
  * note. */
-static void test_layers(void **state)
+static void test_layers_become_principled_parameters(void **state)
 {
 	(void)state;
 	static const char third[] = "bsdf of materials[2]";
@@ -62,15 +62,15 @@ static void assert_absorbs_only(const struct scene_node *node)
 	struct arena arena = {0};
 	struct error e;
 	struct medium m;
-	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .world_scale = 1};
+	const struct volume_build build = {.arena = &arena, .is_dialect_3 = true, .world_scale = 1};
 	if (medium_create(&m, node, &build, &e))
 		fail_msg("%s", e.text);
-	assert_true(m.absorbs && !m.scatters);
+	assert_true(m.is_absorbing && !m.is_scattering);
 	arena_fini(&arena);
 }
 
 /* After a distance of 2, one quarter of red light, one half of green light and nearly no blue light is left. */
-static void test_volume(void **state)
+static void test_attenuation_becomes_an_absorbing_medium(void **state)
 {
 	(void)state;
 	static const char volume[] =
@@ -100,7 +100,7 @@ static void test_volume(void **state)
 
 /* A share of the light is transmitted diffusely, with a colour of its own; a metal transmits less of it, and glass
  * none. */
-static void test_diffuse_transmission(void **state)
+static void test_diffuse_transmission_is_a_share_of_the_light(void **state)
 {
 	(void)state;
 #define FIRST "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0, \"baseColorFactor\": [0.8, 0.4, 0.2, 1]}"
@@ -138,7 +138,7 @@ static void test_diffuse_transmission(void **state)
 }
 
 /* The two roughnesses of `principled` equal those of the format. */
-static void test_anisotropy(void **state)
+static void test_anisotropy_gives_the_roughnesses_of_the_format(void **state)
 {
 	(void)state;
 	static const char third[] = "bsdf of materials[2]";
@@ -161,7 +161,7 @@ static void test_anisotropy(void **state)
 	}
 }
 
-static void test_materials(void **state)
+static void test_materials_are_converted(void **state)
 {
 	(void)state;
 	static const char second[] = "bsdf of materials[1]", third[] = "bsdf of materials[2]";
@@ -244,7 +244,7 @@ static void test_materials(void **state)
 /* The reflectance at normal incidence is min(r^2 c, 1) f: f is the strength, and c is `specular_color`, times its
  * largest component if that is above 1, which the index includes. Glass keeps its index. */
 #define R2 ((0.75 / 2.75) * (0.75 / 2.75))
-static void test_reflection(void **state)
+static void test_normal_reflectance_follows_the_format(void **state)
 {
 	(void)state;
 	/* of the cases below */
@@ -252,8 +252,9 @@ static void test_reflection(void **state)
 			    of_glass[][3] = {[3] = {0}, [4] = {0.25, 0.25, 0.25}, [5] = {0}, [6] = {0, 1, 1}};
 	static const struct {
 		const char *members;
-		double ior, want, strength;    /* want: the square of the index's r; strength: -1: a texture */
-		const char *colour, *of_glass; /* "rgb", or the type of a texture; NULL: none */
+		double ior, expected_reflectance,
+			strength; /* expected_reflectance: the square of the index's r; strength: -1: a texture */
+		const char *colour, *glass_colour; /* "rgb", or the type of a texture; NULL: none */
 	} files[] = {
 		{"\"specularFactor\": 0.5", 1.75, R2, 0.5, NULL, NULL},
 		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * R2, 1, NULL, NULL},
@@ -279,9 +280,9 @@ static void test_reflection(void **state)
 			const struct scene_node *bsdf =
 				scene_find_object(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
 			const struct property *colour = node_find_property(bsdf, "specular_color");
-			const char *want = glass ? files[i].of_glass : files[i].colour;
+			const char *want = glass ? files[i].glass_colour : files[i].colour;
 			double eta = node_float(bsdf, "eta", 0), root = (eta - 1) / (eta + 1);
-			assert_near(root * root, glass ? R2 : files[i].want);
+			assert_near(root * root, glass ? R2 : files[i].expected_reflectance);
 			assert_true((colour != NULL) == (want != NULL));
 			if (want && strcmp(want, "rgb") == 0)
 				for (int k = 0; k < 3; k++)
@@ -300,7 +301,7 @@ static void test_reflection(void **state)
 }
 
 /* Both sides of a doubleSided surface emit light. */
-static void test_both_sides_shine(void **state)
+static void test_double_sided_surfaces_emit_on_both_sides(void **state)
 {
 	(void)state;
 	static const char factor[] = "\"emissiveFactor\": [1, 0.5, 0.5]";
@@ -315,7 +316,7 @@ static void test_both_sides_shine(void **state)
 }
 
 /* A WebP image is preferred to the fallback image for readers without WebP. */
-static void test_webp(void **state)
+static void test_webp_is_preferred_to_its_fallback(void **state)
 {
 	(void)state;
 	static struct gltf_files f;
@@ -334,7 +335,7 @@ static void test_webp(void **state)
 
 /* If the format of an image is not supported, the fallback image is used; without one, the error asks to convert the
  * image. */
-static void test_foreign_images(void **state)
+static void test_unsupported_images_use_their_fallback(void **state)
 {
 	(void)state;
 	static const char *const formats[] = {"KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"};
@@ -376,7 +377,7 @@ static void test_foreign_images(void **state)
 }
 
 /* A mesh without a material has the format's default, which is a metal, or Blender's, which is grey. */
-static void test_no_material(void **state)
+static void test_mesh_without_material_gets_the_default(void **state)
 {
 	(void)state;
 	static const char version[] = "{\"version\": \"2.0\"}";
@@ -400,7 +401,7 @@ static void test_no_material(void **state)
 
 /* An image in the middle of a buffer equals the same image in a file, at every offset, in each form of the file
  * format. */
-static void test_images_in_buffers(void **state)
+static void test_images_in_buffers_equal_those_in_files(void **state)
 {
 	(void)state;
 	static const double rgb[12] = {0.5, 0.25, 0.75, 0.125, 0.5, 0.25, 0.75, 0.75, 0.5, 0.25, 0.75, 0.875};
@@ -456,12 +457,17 @@ static void test_images_in_buffers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_volume),		 cmocka_unit_test(test_diffuse_transmission),
-		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
-		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
-		cmocka_unit_test(test_no_material),	 cmocka_unit_test(test_webp),
-		cmocka_unit_test(test_foreign_images),
+		cmocka_unit_test(test_materials_are_converted),
+		cmocka_unit_test(test_layers_become_principled_parameters),
+		cmocka_unit_test(test_attenuation_becomes_an_absorbing_medium),
+		cmocka_unit_test(test_diffuse_transmission_is_a_share_of_the_light),
+		cmocka_unit_test(test_anisotropy_gives_the_roughnesses_of_the_format),
+		cmocka_unit_test(test_normal_reflectance_follows_the_format),
+		cmocka_unit_test(test_double_sided_surfaces_emit_on_both_sides),
+		cmocka_unit_test(test_images_in_buffers_equal_those_in_files),
+		cmocka_unit_test(test_mesh_without_material_gets_the_default),
+		cmocka_unit_test(test_webp_is_preferred_to_its_fallback),
+		cmocka_unit_test(test_unsupported_images_use_their_fallback),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }

@@ -20,8 +20,8 @@
 
 #include <cmocka.h>
 
-static const char *const extensions[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
-static struct gltf_files changed;
+static const char *const extension_names[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
+static struct gltf_files changed_files;
 
 /* ---- all shapes of a file ---- */
 
@@ -52,14 +52,14 @@ static int build(const struct memory_file *files, bool lenient, struct built *b,
 	return rc;
 }
 
-static void free_built(struct built *b)
+static void release_built(struct built *b)
 {
 	if (b->has_scene)
 		scene_fini(&b->scene);
 	arena_fini(&b->arena);
 }
 
-static void build_sound(const struct memory_file *files, struct built *b)
+static void build_valid(const struct memory_file *files, struct built *b)
 {
 	struct error e = {""};
 	if (build(files, false, b, &e))
@@ -94,40 +94,40 @@ static void assert_same_meshes(const struct built *a, const struct built *b)
 	}
 }
 
-static void test_twin(void **state)
+static void test_compressed_file_gives_the_same_meshes(void **state)
 {
 	(void)state;
 	struct built plain, packed;
-	gltf_files_make(&changed);
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	build_sound(changed.files, &plain);
+	gltf_files_make(&changed_files);
+	gltf_files_pack(&changed_files, GLTF_EXTERNAL);
+	build_valid(changed_files.files, &plain);
 	for (int form = 0; form < GLTF_FORMS; form++)
 		for (int i = 0; i < 2; i++) {
-			gltf_files_make(&changed);
-			gltf_files_compress(&changed, extensions[i]);
-			gltf_files_pack(&changed, (enum gltf_form)form);
-			build_sound(changed.files, &packed);
+			gltf_files_make(&changed_files);
+			gltf_files_compress(&changed_files, extension_names[i]);
+			gltf_files_pack(&changed_files, (enum gltf_form)form);
+			build_valid(changed_files.files, &packed);
 			assert_same_meshes(&plain, &packed);
-			free_built(&packed);
+			release_built(&packed);
 		}
-	free_built(&plain);
+	release_built(&plain);
 }
 
 /* ---- filters ---- */
 
-enum { VERTICES = 63, INSTANCES = 4, ROOM = 4096 };
+enum { VERTICES = 63, INSTANCES = 4, BUFFER_BYTES = 4096 };
 
 static struct {
-	unsigned char bytes[ROOM];
+	unsigned char bytes[BUFFER_BYTES];
 	size_t size;
 	char views[2048];
-	char json[ROOM];
+	char json[BUFFER_BYTES];
 } own;
 
-static void put_view(const void *numbers, size_t count, size_t stride, const char *filter)
+static void append_view(const void *numbers, size_t count, size_t stride, const char *filter)
 {
 	size_t n = strlen(own.views),
-	       size = meshopt_encodeVertexBuffer(own.bytes + own.size, ROOM - own.size, numbers, count, stride);
+	       size = meshopt_encodeVertexBuffer(own.bytes + own.size, BUFFER_BYTES - own.size, numbers, count, stride);
 	assert_true(size > 0);
 	snprintf(
 		own.views + n, sizeof own.views - n,
@@ -207,12 +207,12 @@ static void encode(bool fine)
 	meshopt_encodeFilterQuat(encoded.turn, INSTANCES, 8, 12, turn[0]);
 	own.size = 0;
 	*own.views = 0;
-	put_view(encoded.position, VERTICES, 12, "EXPONENTIAL");
-	put_view(fine ? (const void *)encoded.fine : encoded.normal, VERTICES, fine ? 8 : 4, "OCTAHEDRAL");
-	put_view(encoded.turn, INSTANCES, 8, "QUATERNION");
+	append_view(encoded.position, VERTICES, 12, "EXPONENTIAL");
+	append_view(fine ? (const void *)encoded.fine : encoded.normal, VERTICES, fine ? 8 : 4, "OCTAHEDRAL");
+	append_view(encoded.turn, INSTANCES, 8, "QUATERNION");
 }
 
-static void build_own(bool fine, struct built *b)
+static void build_encoded(bool fine, struct built *b)
 {
 	encode(fine);
 	int n = snprintf(
@@ -228,7 +228,7 @@ static void build_own(bool fine, struct built *b)
 		VERTICES, fine ? 5122 : 5120, VERTICES, INSTANCES, own.views, own.size);
 	assert_true(n > 0 && (size_t)n < sizeof own.json);
 	const struct memory_file files[] = {{"s.gltf", own.json, (size_t)n}, {"b", own.bytes, own.size}, {0}};
-	build_sound(files, b);
+	build_valid(files, b);
 	assert_int_equal(b->count, INSTANCES);
 }
 
@@ -239,12 +239,12 @@ static void assert_direction(const double got[3], vec3 want, double error)
 		fail_msg("%g %g %g, not %g %g %g", got[0], got[1], got[2], want.x, want.y, want.z);
 }
 
-static void test_filters(void **state)
+static void test_filters_are_decoded(void **state)
 {
 	(void)state;
 	struct built b;
 	for (int fine = 0; fine < 2; fine++) {
-		build_own(fine, &b);
+		build_encoded(fine, &b);
 		for (int i = 0; i < INSTANCES; i++) {
 			double q[4], turn[3][3];
 			quaternion(encoded.turn[i], q);
@@ -266,12 +266,12 @@ static void test_filters(void **state)
 				assert_direction(mesh->position[v], mat4_point(&m, p), 1e-8);
 			}
 		}
-		free_built(&b);
+		release_built(&b);
 	}
 }
 
 /* Five colours as meshoptimizer 1.3 encodes them with 8, 6 and 12 bits, the last into components of two bytes. */
-static void test_colours(void **state)
+static void test_colour_filter_is_decoded(void **state)
 {
 	(void)state;
 	enum { COLOURS = 5 };
@@ -292,8 +292,8 @@ static void test_colours(void **state)
 		own.size = 0;
 		*own.views = 0;
 		meshopt_encodeVertexVersion(0);
-		put_view(position, COLOURS, 12, "NONE");
-		put_view(cases[i].numbers, COLOURS, (size_t)cases[i].stride, "COLOR");
+		append_view(position, COLOURS, 12, "NONE");
+		append_view(cases[i].numbers, COLOURS, (size_t)cases[i].stride, "COLOR");
 		int n = snprintf(
 			own.json, sizeof own.json,
 			"{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"mesh\": 0}], \"meshes\": "
@@ -304,7 +304,7 @@ static void test_colours(void **state)
 			cases[i].stride == 4 ? 5121 : 5123, own.views, own.size);
 		assert_true(n > 0 && (size_t)n < sizeof own.json);
 		const struct memory_file files[] = {{"s.gltf", own.json, (size_t)n}, {"b", own.bytes, own.size}, {0}};
-		build_sound(files, &b);
+		build_valid(files, &b);
 		const struct mesh *m = &b.shapes[0].mesh;
 		assert_int_equal(m->attribute_count, 2);
 		assert_string_equal(m->attributes[0].name, "vertex_color");
@@ -315,18 +315,18 @@ static void test_colours(void **state)
 			if (!(fabs(got - colours[k / 4][k % 4]) < (k % 4 < 3 ? 2 : 3) * step))
 				fail_msg("%d bits, number %d: %g", cases[i].bits, k, got);
 		}
-		free_built(&b);
+		release_built(&b);
 	}
 }
 
 /* ---- one change each ---- */
 
-static void refuses(const struct memory_file *files, const char *text)
+static void expect_refused(const struct memory_file *files, const char *text)
 {
 	struct built b;
 	struct error e = {"no error at all"};
 	int rc = build(files, false, &b, &e);
-	free_built(&b);
+	release_built(&b);
 	if (rc >= 0 || !strstr(e.text, text))
 		fail_msg("gave %d: %s\n not: %s", rc, e.text, text);
 }
@@ -364,21 +364,21 @@ static const struct {
 	{{"\"count\": 6, \"type\": \"VEC2\""}, {"\"count\": 9, \"type\": \"VEC2\""}, "it exceeds bufferViews[1]"},
 };
 
-static void test_malformed(void **state)
+static void test_malformed_compression_is_refused(void **state)
 {
 	(void)state;
 	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
-		gltf_files_make(&changed);
-		gltf_files_compress(&changed, extensions[0]);
+		gltf_files_make(&changed_files);
+		gltf_files_compress(&changed_files, extension_names[0]);
 		for (int k = 0; k < 2 && malformed[i].from[k]; k++)
-			gltf_files_replace(&changed, malformed[i].from[k], malformed[i].to[k]);
-		gltf_files_pack(&changed, GLTF_EXTERNAL);
-		refuses(changed.files, malformed[i].text);
+			gltf_files_replace(&changed_files, malformed[i].from[k], malformed[i].to[k]);
+		gltf_files_pack(&changed_files, GLTF_EXTERNAL);
+		expect_refused(changed_files.files, malformed[i].text);
 	}
 }
 
 /* The first of the compressed bytes tells the coding. */
-static void test_codings(void **state)
+static void test_unknown_codings_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -387,16 +387,16 @@ static void test_codings(void **state)
 	} cases[] = {{0xaf, "compressed by version 15 of meshopt's ATTRIBUTES"},
 		     {0x55, "bufferViews[0]: its compressed bytes are damaged"}};
 	for (int i = 0; i < 2; i++) {
-		gltf_files_make(&changed);
-		gltf_files_compress(&changed, extensions[1]);
-		changed.buffer[GLTF_FILES_PLAIN_BYTES] = cases[i].first;
-		gltf_files_pack(&changed, GLTF_EXTERNAL);
-		refuses(changed.files, cases[i].text);
+		gltf_files_make(&changed_files);
+		gltf_files_compress(&changed_files, extension_names[1]);
+		changed_files.buffer[GLTF_FILES_PLAIN_BYTES] = cases[i].first;
+		gltf_files_pack(&changed_files, GLTF_EXTERNAL);
+		expect_refused(changed_files.files, cases[i].text);
 	}
 }
 
 /* Half a megabyte of compressed data would expand to more than one file may have, although memory would suffice. */
-static void test_too_much(void **state)
+static void test_expanded_size_is_limited(void **state)
 {
 	(void)state;
 	enum { SIZE = 600000, COUNT = 50000000 };
@@ -412,12 +412,12 @@ static void test_too_much(void **state)
 		12 * COUNT, SIZE, COUNT, SIZE);
 	assert_true(n > 0 && (size_t)n < sizeof own.json);
 	const struct memory_file files[] = {{"s.gltf", own.json, (size_t)n}, {"b", bytes, SIZE}, {0}};
-	refuses(files, "bufferViews[0]: the compressed views have more than 512 MB");
+	expect_refused(files, "bufferViews[0]: the compressed views have more than 512 MB");
 	mem_free(bytes);
 }
 
 /* Damaged bytes of the file and of its buffer give a scene or an error message. */
-static void test_damaged(void **state)
+static void test_damaged_files_are_read_or_refused(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("damaged meshopt");
@@ -425,37 +425,39 @@ static void test_damaged(void **state)
 	for (int i = 0; i < 2000; i++) {
 		struct built b;
 		struct error e = {""};
-		gltf_files_make(&changed);
-		gltf_files_compress(&changed, extensions[i / 2 % 2]);
-		gltf_files_pack(&changed, GLTF_EXTERNAL);
+		gltf_files_make(&changed_files);
+		gltf_files_compress(&changed_files, extension_names[i / 2 % 2]);
+		gltf_files_pack(&changed_files, GLTF_EXTERNAL);
 		if (i % 2)
-			changed.file[dice_below(&d, (uint32_t)changed.file_size)] = (unsigned char)dice_below(&d, 256);
-		else
-			changed.buffer[GLTF_FILES_PLAIN_BYTES +
-				       dice_below(&d, (uint32_t)changed.buffer_size - GLTF_FILES_PLAIN_BYTES)] =
+			changed_files.file[dice_below(&d, (uint32_t)changed_files.file_size)] =
 				(unsigned char)dice_below(&d, 256);
-		int rc = build(changed.files, i % 3, &b, &e);
+		else
+			changed_files
+				.buffer[GLTF_FILES_PLAIN_BYTES +
+					dice_below(&d, (uint32_t)changed_files.buffer_size - GLTF_FILES_PLAIN_BYTES)] =
+				(unsigned char)dice_below(&d, 256);
+		int rc = build(changed_files.files, i % 3, &b, &e);
 		assert_true(rc == 0 || (rc < 0 && *e.text));
 		sound += rc == 0;
-		free_built(&b);
+		release_built(&b);
 	}
 	assert_true(sound > 100 && sound < 1900);
 }
 
 /* Each allocation of the reader fails once: each failure gives an error message, and the last run a scene. */
-static void test_memory(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	struct scene s;
 	struct error e;
 	long n = 0;
 	int rc = -ENOMEM;
-	gltf_files_make(&changed);
-	gltf_files_compress(&changed, extensions[0]);
-	gltf_files_pack(&changed, GLTF_EMBEDDED);
+	gltf_files_make(&changed_files);
+	gltf_files_compress(&changed_files, extension_names[0]);
+	gltf_files_pack(&changed_files, GLTF_EMBEDDED);
 	for (; rc; n++) {
 		mem_fail_after(n);
-		rc = gltf_files_read(changed.files, false, &s, &e);
+		rc = gltf_files_read(changed_files.files, false, &s, &e);
 		mem_fail_after(-1);
 		assert_true(rc == 0 || (rc == -ENOMEM && strstr(e.text, "memory")));
 	}
@@ -466,9 +468,14 @@ static void test_memory(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_twin),	  cmocka_unit_test(test_filters), cmocka_unit_test(test_colours),
-		cmocka_unit_test(test_malformed), cmocka_unit_test(test_codings), cmocka_unit_test(test_too_much),
-		cmocka_unit_test(test_damaged),	  cmocka_unit_test(test_memory),
+		cmocka_unit_test(test_compressed_file_gives_the_same_meshes),
+		cmocka_unit_test(test_filters_are_decoded),
+		cmocka_unit_test(test_colour_filter_is_decoded),
+		cmocka_unit_test(test_malformed_compression_is_refused),
+		cmocka_unit_test(test_unknown_codings_are_refused),
+		cmocka_unit_test(test_expanded_size_is_limited),
+		cmocka_unit_test(test_damaged_files_are_read_or_refused),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests_name("gltf_meshopt", tests, NULL, NULL);
 }

@@ -54,22 +54,22 @@ static const unsigned char two_blocks[] = {
 /* clang-format on */
 enum { COUNT = 37, STRIDE = 12, COUNT_2 = 300, STRIDE_2 = 8 };
 
-static void put(unsigned char *to, uint32_t x, int width)
+static void store_little_endian(unsigned char *to, uint32_t x, int width)
 {
 	for (int i = 0; i < width; i++)
 		to[i] = (unsigned char)(x >> 8 * i);
 }
 
 /* Squares, a decreasing sequence, equally spaced floats, and bytes: constant, random, multiples of 3, random bits. */
-static void test_all_kinds(void **state)
+static void test_every_kind_of_column_is_decoded(void **state)
 {
 	(void)state;
 	unsigned char want[COUNT][STRIDE], got[COUNT][STRIDE];
 	uint32_t random = 1;
 	for (unsigned i = 0; i < COUNT; i++) {
-		put(want[i], 1000 + 37 * i * i, 2);
-		put(want[i] + 2, 60000 - 900 * i, 2);
-		put(want[i] + 4, 0x3f800000 + 70000 * i, 4);
+		store_little_endian(want[i], 1000 + 37 * i * i, 2);
+		store_little_endian(want[i] + 2, 60000 - 900 * i, 2);
+		store_little_endian(want[i] + 4, 0x3f800000 + 70000 * i, 4);
 		want[i][8] = 7;
 		random = random * 1664525 + 1013904223;
 		want[i][9] = random >> 16 & 255;
@@ -81,7 +81,7 @@ static void test_all_kinds(void **state)
 	assert_memory_equal(got, want, sizeof want);
 }
 
-static void test_blocks(void **state)
+static void test_several_blocks_are_decoded(void **state)
 {
 	(void)state;
 	unsigned char want[COUNT_2][STRIDE_2] = {{0}}, got[COUNT_2][STRIDE_2];
@@ -96,7 +96,7 @@ static void test_blocks(void **state)
 	assert_memory_equal(got, want, sizeof want);
 }
 
-static void test_malformed(void **state)
+static void test_malformed_data_is_refused(void **state)
 {
 	(void)state;
 	unsigned char bytes[sizeof all_kinds + 1] = {0}, out[(COUNT + 1) * STRIDE];
@@ -120,7 +120,7 @@ static void test_malformed(void **state)
 	}
 }
 
-static void test_damaged(void **state)
+static void test_damaged_data_is_decoded_or_refused(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("damaged version 1");
@@ -138,10 +138,10 @@ static void test_damaged(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_kinds),
-		cmocka_unit_test(test_blocks),
-		cmocka_unit_test(test_malformed),
-		cmocka_unit_test(test_damaged),
+		cmocka_unit_test(test_every_kind_of_column_is_decoded),
+		cmocka_unit_test(test_several_blocks_are_decoded),
+		cmocka_unit_test(test_malformed_data_is_refused),
+		cmocka_unit_test(test_damaged_data_is_decoded_or_refused),
 	};
 	return cmocka_run_group_tests_name("gltf_meshopt_v1", tests, NULL, NULL);
 }

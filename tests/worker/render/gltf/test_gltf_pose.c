@@ -29,7 +29,7 @@ static struct {
 	struct memory_file list[2];
 } file;
 
-static void begin(void)
+static void begin_file(void)
 {
 	memset(&file, 0, sizeof file);
 }
@@ -62,16 +62,16 @@ static void finish_json(const char *json)
 	file.list[0] = (struct memory_file){"s.gltf", file.json, n};
 }
 
-static vec3 corner(const struct world *w, uint32_t shape, uint32_t triangle, int k)
+static vec3 triangle_corner(const struct world *w, uint32_t shape, uint32_t triangle, int k)
 {
 	struct surface_point x;
 	surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, triangle, 0}, k == 1, k == 2, &x);
 	return vec3_add(vec3_scale(1 / w->scale, x.p), w->center);
 }
 
-static void assert_at(const struct world *w, uint32_t shape, int k, vec3 want)
+static void assert_corner(const struct world *w, uint32_t shape, int k, vec3 want)
 {
-	vec3 got = corner(w, shape, 0, k);
+	vec3 got = triangle_corner(w, shape, 0, k);
 	if (!(vec3_length(vec3_sub(got, want)) < 1e-6))
 		fail_msg("shape %u, corner %d: %g %g %g, not %g %g %g", shape, k, got.x, got.y, got.z, want.x, want.y,
 			 want.z);
@@ -80,12 +80,12 @@ static void assert_at(const struct world *w, uint32_t shape, int k, vec3 want)
 /* Expects a triangle with corners at the origin, on x and on y, the latter two at the distance `side`. */
 static void assert_triangle(const struct world *w, uint32_t shape, vec3 origin, double side)
 {
-	assert_at(w, shape, 0, origin);
-	assert_at(w, shape, 1, vec3_add(origin, (vec3){side, 0, 0}));
-	assert_at(w, shape, 2, vec3_add(origin, (vec3){0, side, 0}));
+	assert_corner(w, shape, 0, origin);
+	assert_corner(w, shape, 1, vec3_add(origin, (vec3){side, 0, 0}));
+	assert_corner(w, shape, 2, vec3_add(origin, (vec3){0, side, 0}));
 }
 
-static void refuses(const char *text)
+static void expect_refused(const char *text)
 {
 	struct scene s;
 	struct error e = {""};
@@ -95,14 +95,14 @@ static void refuses(const char *text)
 		fail_msg("%d: %s; not: %s", rc, e.text, text);
 }
 
-static const float plain[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+static const float plain_triangle[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
 
 /* ---- the same triangle ---- */
 
 #define NODES "'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [0]}], 'nodes': [{'mesh': 0"
 #define ONE_BUFFER "'buffers': [$0]"
 
-static void of_each_type(void **state)
+static void positions_of_each_type_are_read(void **state)
 {
 	(void)state;
 	static const int8_t i8[12] = {0, 0, 0, 0, 127, 0, 0, 0, 0, 127, 0, 0};
@@ -115,14 +115,18 @@ static void of_each_type(void **state)
 		int type, stride;
 		const char *normalized;
 		double side;
-	} cases[] = {{i8, sizeof i8, 5120, 4, "true", 1},	 {i8, sizeof i8, 5120, 4, "false", 127},
-		     {u8, sizeof u8, 5121, 4, "false", 3},	 {u8, sizeof u8, 5121, 4, "true", 3 / 255.0},
-		     {i16, sizeof i16, 5122, 8, "true", 1},	 {i16, sizeof i16, 5122, 8, "false", 32767},
-		     {u16, sizeof u16, 5123, 8, "false", 3},	 {u16, sizeof u16, 5123, 8, "true", 3 / 65535.0},
-		     {plain, sizeof plain, 5126, 12, "false", 1}};
+	} cases[] = {{i8, sizeof i8, 5120, 4, "true", 1},
+		     {i8, sizeof i8, 5120, 4, "false", 127},
+		     {u8, sizeof u8, 5121, 4, "false", 3},
+		     {u8, sizeof u8, 5121, 4, "true", 3 / 255.0},
+		     {i16, sizeof i16, 5122, 8, "true", 1},
+		     {i16, sizeof i16, 5122, 8, "false", 32767},
+		     {u16, sizeof u16, 5123, 8, "false", 3},
+		     {u16, sizeof u16, 5123, 8, "true", 3 / 65535.0},
+		     {plain_triangle, sizeof plain_triangle, 5126, 12, "false", 1}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char json[1024];
-		begin();
+		begin_file();
 		add_bytes(0, cases[i].bytes, cases[i].size);
 		snprintf(json, sizeof json,
 			 "{'extensionsRequired': ['KHR_mesh_quantization'], " NODES "}], 'meshes': [{'primitives': "
@@ -132,7 +136,7 @@ static void of_each_type(void **state)
 			 cases[i].type, cases[i].normalized, cases[i].size, cases[i].stride);
 		finish_json(json);
 		struct world *w = world_from_files(4, 4, file.list);
-		vec3 far = corner(w, 0, 0, 1);
+		vec3 far = triangle_corner(w, 0, 0, 1);
 		if (!(fabs(far.x - cases[i].side) <= 1e-6 * cases[i].side))
 			fail_msg("case %zu: %g, not %g", i, far.x, cases[i].side);
 		world_free(w);
@@ -140,7 +144,7 @@ static void of_each_type(void **state)
 }
 
 /* Zeros, with two vertices replaced, in a buffer other than that of the indices. */
-static void sparse_accessors(void **state)
+static void sparse_accessors_replace_vertices(void **state)
 {
 	(void)state;
 	static const uint8_t at[2] = {1, 2};
@@ -152,7 +156,7 @@ static void sparse_accessors(void **state)
 		"{'bufferView': 0, 'componentType': 5121}, 'values': {'bufferView': 1}}}, {'bufferView': 2, "
 		"'componentType': 5123, 'count': 3, 'type': 'SCALAR'}], 'bufferViews': [{'buffer': 0, 'byteLength': 2}, "
 		"{'buffer': 0, 'byteOffset': 4, 'byteLength': 24}, {'buffer': 1, 'byteLength': 6}], 'buffers': [$0, $1]}";
-	begin();
+	begin_file();
 	add_bytes(0, at, sizeof at);
 	add_bytes(0, values, sizeof values);
 	add_bytes(1, indices, sizeof indices);
@@ -162,18 +166,18 @@ static void sparse_accessors(void **state)
 	world_free(w);
 	char *type = strstr(file.json, "5123"); /* with a signed type, -1 would be an index */
 	memcpy(type, "5122", 4);
-	refuses("accessors[1]: of a type that index cannot have");
+	expect_refused("accessors[1]: of a type that index cannot have");
 	file.bytes[0][1] = 3; /* there is no such vertex */
 	finish_json(json);
-	refuses("accessors[0]: its sparse indices exceed its count");
+	expect_refused("accessors[0]: its sparse indices exceed its count");
 }
 
-static void in_several_buffers(void **state)
+static void meshes_may_use_several_buffers(void **state)
 {
 	(void)state;
 	static const float normals[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1};
-	begin();
-	add_bytes(0, plain, sizeof plain);
+	begin_file();
+	add_bytes(0, plain_triangle, sizeof plain_triangle);
 	add_bytes(1, normals, sizeof normals);
 	finish_json(
 		"{" NODES "}], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0, 'NORMAL': 1}}]}], "
@@ -196,7 +200,7 @@ static void in_several_buffers(void **state)
 	"{'buffer': 0, 'byteOffset': 36, 'byteLength': 36}, {'buffer': 0, 'byteOffset': 72, 'byteLength': 36}], " ONE_BUFFER \
 	"}"
 
-static void morph_targets(void **state)
+static void morph_targets_move_vertices(void **state)
 {
 	(void)state;
 	static const float up[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1}, larger[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -206,8 +210,8 @@ static void morph_targets(void **state)
 	} cases[] = {{TARGETS("", ", 'weights': [0, 0]", "3"), 0, 1},
 		     {TARGETS("", ", 'weights': [0.5, 2]", "3"), 0.5, 3},
 		     {TARGETS(", 'weights': [-1, 0]", ", 'weights': [0.5, 2]", "3"), -1, 1}};
-	begin();
-	add_bytes(0, plain, sizeof plain);
+	begin_file();
+	add_bytes(0, plain_triangle, sizeof plain_triangle);
 	add_bytes(0, up, sizeof up);
 	add_bytes(0, larger, sizeof larger);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -217,7 +221,7 @@ static void morph_targets(void **state)
 		world_free(w);
 	}
 	finish_json(TARGETS("", ", 'weights': [1, 0]", "2"));
-	refuses("accessors[1]: a morph target has another number of vertices than its primitive");
+	expect_refused("accessors[1]: a morph target has another number of vertices than its primitive");
 }
 
 /* Joint 0 stays; joint 1 is moved by (0, 0, 4) below a node of scale 2 at (1, 0, 0), and was bound at (0, 0, 2). The
@@ -241,25 +245,25 @@ static void skins_move_vertices(void **state)
 	static const float weights[12] = {1, 0, 0, 0, 1, 0, 0, 0, 0.5f, 1.5f, 0, 0};
 	static const float inverse[32] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,	1,
 					  1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -2, 1};
-	begin();
-	add_bytes(0, plain, sizeof plain);
+	begin_file();
+	add_bytes(0, plain_triangle, sizeof plain_triangle);
 	add_bytes(0, joints, sizeof joints);
 	add_bytes(0, weights, sizeof weights);
 	add_bytes(0, inverse, sizeof inverse);
 	finish_json(SKIN("[1, 3]"));
 	struct world *w = world_from_files(4, 4, file.list);
-	assert_at(w, 0, 0, (vec3){0, 0, 0});
-	assert_at(w, 0, 1, (vec3){3, 0, 4});
-	assert_at(w, 0, 2, (vec3){0.75, 1.75, 3});
+	assert_corner(w, 0, 0, (vec3){0, 0, 0});
+	assert_corner(w, 0, 1, (vec3){3, 0, 4});
+	assert_corner(w, 0, 2, (vec3){0.75, 1.75, 3});
 	world_free(w);
 	finish_json(SKIN("[1]"));
-	refuses("accessors[1]: vertex 1 has a joint that its skin does not have");
+	expect_refused("accessors[1]: vertex 1 has a joint that its skin does not have");
 	finish_json(SKIN("[1, 3, 2]"));
-	refuses("accessors[3]: fewer matrices than skins[0] has joints");
+	expect_refused("accessors[3]: fewer matrices than skins[0] has joints");
 	finish_json(SKIN("[]"));
-	refuses("skins[0]: it has no joints");
+	expect_refused("skins[0]: it has no joints");
 	finish_json(SKIN("[1, 30]"));
-	refuses("there is no nodes[30]");
+	expect_refused("there is no nodes[30]");
 }
 
 /* ---- instances ---- */
@@ -273,12 +277,12 @@ static void skins_move_vertices(void **state)
 	"'byteLength': 36}, {'buffer': 0, 'byteOffset': 36, 'byteLength': 24}, {'buffer': 0, 'byteOffset': 60, "    \
 	"'byteLength': 24}], " ONE_BUFFER "}"
 
-static void of_a_list(void **state)
+static void instancing_extension_places_meshes(void **state)
 {
 	(void)state;
 	static const float places[6] = {1, 2, 3, -1, 0, 0}, scales[6] = {1, 1, 1, 2, 2, 2};
-	begin();
-	add_bytes(0, plain, sizeof plain);
+	begin_file();
+	add_bytes(0, plain_triangle, sizeof plain_triangle);
 	add_bytes(0, places, sizeof places);
 	add_bytes(0, scales, sizeof scales);
 	finish_json(INSTANCES("2"));
@@ -287,18 +291,18 @@ static void of_a_list(void **state)
 	assert_triangle(w, 1, (vec3){9, 0, 0}, 2);
 	world_free(w);
 	finish_json(INSTANCES("1"));
-	refuses("nodes[0]: attributes of instances with different numbers of entries");
+	expect_refused("nodes[0]: attributes of instances with different numbers of entries");
 	memcpy(strstr(file.json, "\"count\": 2"), "\"count\": 0", 10); /* of TRANSLATION, which comes first */
-	refuses("nodes[0]: attributes of instances with different numbers of entries");
+	expect_refused("nodes[0]: attributes of instances with different numbers of entries");
 }
 
 enum { SIDE = 300, CORNERS = SIDE * SIDE * 6 };
 
 /* Writes three nodes with a grid of numbers of the given type. */
-static void write_grid(char *json, size_t room, int type, int stride, double scale)
+static void write_grid(char *json, size_t capacity, int type, int stride, double scale)
 {
 	snprintf(
-		json, room,
+		json, capacity,
 		"{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [0, 1, 2]}], \"nodes\": [{\"mesh\": 0, "
 		"\"scale\": [%g, %g, 1]}, {\"mesh\": 0, \"translation\": [0, 0, 5], \"scale\": [%g, %g, 1]}, {\"mesh\": 0, "
 		"\"scale\": [%g, %g, -1]}], \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], "
@@ -311,7 +315,7 @@ static void write_grid(char *json, size_t room, int type, int stride, double sca
 
 /* A large mesh shared by several nodes is in memory once; for a mesh of integers that represent -1 to 1, the camera
  * that stands in has the same view. */
-static void of_several_nodes(void **state)
+static void shared_meshes_are_stored_once(void **state)
 {
 	(void)state;
 	static float grid[CORNERS][3];
@@ -373,8 +377,8 @@ static void animations_are_interpolated(void **state)
 	static const float places[6] = {1, 2, 3, 9, 9, 9}, sizes[9] = {5, 5, 5, 2, 2, 2, 5, 5, 5},
 			   weights[4] = {0, 0.5f, 9, 9};
 	static const int16_t turn[4] = {0, 0, 23170, 23170};
-	begin();
-	add_bytes(0, plain, sizeof plain);
+	begin_file();
+	add_bytes(0, plain_triangle, sizeof plain_triangle);
 	add_bytes(0, up, sizeof up);
 	add_bytes(0, larger, sizeof larger);
 	add_bytes(1, places, sizeof places);
@@ -383,9 +387,9 @@ static void animations_are_interpolated(void **state)
 	add_bytes(1, weights, sizeof weights);
 	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	struct world *w = world_from_files(4, 4, file.list);
-	assert_at(w, 0, 0, (vec3){1, 2, 3});
-	assert_at(w, 0, 1, (vec3){1, 5, 3});
-	assert_at(w, 0, 2, (vec3){-2, 2, 3});
+	assert_corner(w, 0, 0, (vec3){1, 2, 3});
+	assert_corner(w, 0, 1, (vec3){1, 5, 3});
+	assert_corner(w, 0, 2, (vec3){-2, 2, 3});
 	world_free(w);
 	finish_json(ANIMATED(
 		CHANNEL("0", "translation") ", {'sampler': 0, 'target': {'path': 'pointer'}}, " CHANNEL("3", "blur"),
@@ -401,37 +405,37 @@ static void animations_are_interpolated(void **state)
 	assert_triangle(w, 0, (vec3){7, 7, 8}, 2);
 	world_free(w);
 	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));
-	refuses("accessors[6]: fewer values than the animation needs");
+	expect_refused("accessors[6]: fewer values than the animation needs");
 	finish_json(ANIMATED(CHANNEL("0", "rotation"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	refuses("accessors[3]: of a type that animation cannot have");
+	expect_refused("accessors[3]: of a type that animation cannot have");
 	finish_json(ANIMATED(CHANNEL("9", "scale"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	refuses("animations[0]: a channel without a sampler");
+	expect_refused("animations[0]: a channel without a sampler");
 	static const float infinite[1] = {INFINITY};
 	memcpy(file.bytes[1], infinite, sizeof infinite);
 	finish_json(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
-	refuses("accessors[3]: a value that is not finite");
+	expect_refused("accessors[3]: a value that is not finite");
 }
 
 /* ---- buffers ---- */
 
-static int opened;
-static struct asset_source inner;
+static int open_count;
+static struct asset_source inner_source;
 
 static int open_counted(void *user, const char *name, struct asset *out, struct error *e)
 {
 	(void)user;
-	opened++;
-	return inner.open(inner.user, name, out, e);
+	open_count++;
+	return inner_source.open(inner_source.user, name, out, e);
 }
 
 static void close_counted(void *user, struct asset *a)
 {
 	(void)user;
-	inner.close(inner.user, a);
+	inner_source.close(inner_source.user, a);
 }
 
 /* Makes twenty meshes with computed vertices, from two buffers in turn. */
-static void make_by_turns(const char *buffers)
+static void make_meshes_of_alternating_buffers(const char *buffers)
 {
 	static const int8_t i8[12] = {0, 0, 0, 0, 127, 0, 0, 0, 0, 127, 0, 0};
 	static const int8_t other[12] = {0, 0, 0, 0, 63, 0, 0, 0, 0, 63, 0, 0};
@@ -444,7 +448,7 @@ static void make_by_turns(const char *buffers)
 		snprintf(nodes + n, sizeof nodes - n, "%s{'mesh': %d}", comma, i);
 		snprintf(roots + r, sizeof roots - r, "%s%d", comma, i);
 	}
-	begin();
+	begin_file();
 	add_bytes(0, i8, sizeof i8);
 	add_bytes(1, other, sizeof other);
 	snprintf(
@@ -459,18 +463,18 @@ static void make_by_turns(const char *buffers)
 }
 
 /* Each buffer embedded in the file is decoded once. */
-static void by_turns(void **state)
+static void embedded_buffers_are_decoded_once(void **state)
 {
 	(void)state;
 	struct scene s;
 	struct error e;
 	const struct asset_source assets = {.open = open_counted, .close = close_counted};
-	make_by_turns("$0, $1");
-	inner = memory_assets(file.list);
-	opened = 0;
+	make_meshes_of_alternating_buffers("$0, $1");
+	inner_source = memory_assets(file.list);
+	open_count = 0;
 	if (scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
-	assert_int_equal(opened, 3); /* the scene, and each buffer in it */
+	assert_int_equal(open_count, 3); /* the scene, and each buffer in it */
 	scene_fini(&s);
 }
 
@@ -484,35 +488,35 @@ static int open_large(void *user, const char *name, struct asset *out, struct er
 }
 
 /* External files are read again when needed, but only a limited number of times. */
-static void by_turns_for_ever(void **state)
+static void external_buffers_are_reread_a_limited_number_of_times(void **state)
 {
 	(void)state;
 	struct scene s;
 	struct error e;
-	make_by_turns("{'byteLength': 12, 'uri': 'a.bin'}, {'byteLength': 12, 'uri': 'b.bin'}");
+	make_meshes_of_alternating_buffers("{'byteLength': 12, 'uri': 'a.bin'}, {'byteLength': 12, 'uri': 'b.bin'}");
 	const struct memory_file list[] = {
 		file.list[0], {"a.bin", file.bytes[0], file.size[0]}, {"b.bin", file.bytes[1], file.size[1]}, {0}};
 	const struct asset_source assets = {.open = open_large, .close = close_counted};
-	inner = memory_assets(list);
-	opened = 0;
+	inner_source = memory_assets(list);
+	open_count = 0;
 	assert_int_equal(scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e), -E2BIG);
 	assert_non_null(strstr(e.text, "its files are requested again and again; 300 GB were read so far"));
-	assert_int_equal(opened, 6);
+	assert_int_equal(open_count, 6);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(of_each_type),
-		cmocka_unit_test(sparse_accessors),
-		cmocka_unit_test(in_several_buffers),
-		cmocka_unit_test(morph_targets),
+		cmocka_unit_test(positions_of_each_type_are_read),
+		cmocka_unit_test(sparse_accessors_replace_vertices),
+		cmocka_unit_test(meshes_may_use_several_buffers),
+		cmocka_unit_test(morph_targets_move_vertices),
 		cmocka_unit_test(skins_move_vertices),
-		cmocka_unit_test(of_a_list),
-		cmocka_unit_test(of_several_nodes),
+		cmocka_unit_test(instancing_extension_places_meshes),
+		cmocka_unit_test(shared_meshes_are_stored_once),
 		cmocka_unit_test(animations_are_interpolated),
-		cmocka_unit_test(by_turns),
-		cmocka_unit_test(by_turns_for_ever),
+		cmocka_unit_test(embedded_buffers_are_decoded_once),
+		cmocka_unit_test(external_buffers_are_reread_a_limited_number_of_times),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,7 +46,7 @@ static struct scene read_text(const char *json)
 	return s;
 }
 
-static const struct scene_node *shape_of(const struct scene *s)
+static const struct scene_node *find_shape(const struct scene *s)
 {
 	if (s->problem_count)
 		fail_msg("%s", s->problems[0]);
@@ -60,13 +60,13 @@ static const struct scene_node *shape_of(const struct scene *s)
 static void expect_texcoord(const char *json, const char *first_byte)
 {
 	struct scene s = read_text(json);
-	const char *texcoord = node_string(shape_of(&s), "texcoord", "");
+	const char *texcoord = node_string(find_shape(&s), "texcoord", "");
 	if (!strstr(texcoord, first_byte))
 		fail_msg("%s\n takes %s", json, texcoord);
 	scene_fini(&s);
 }
 
-static void refuses(const char *json, const char *sentence)
+static void expect_refused(const char *json, const char *sentence)
 {
 	struct scene s = read_text(json);
 	if (!s.problem_count || !strstr(s.problems[0], sentence))
@@ -74,7 +74,7 @@ static void refuses(const char *json, const char *sentence)
 	scene_fini(&s);
 }
 
-static void test_sets(void **state)
+static void test_texture_coordinate_set_is_selected(void **state)
 {
 	(void)state;
 	expect_texcoord(FILE_OF("\"2.0\"", FIRST, "", BOUNDS), "36");
@@ -85,11 +85,11 @@ static void test_sets(void **state)
 			"\"baseColorTexture\": {\"index\": 0, \"extensions\": {\"KHR_texture_transform\": {\"texCoord\": 1}}}",
 			"", BOUNDS),
 		"60");
-	refuses(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), NORMAL("2"), BOUNDS),
-		"`texCoord` is not supported; --lenient leaves it out");
+	expect_refused(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), NORMAL("2"), BOUNDS),
+		       "`texCoord` is not supported; --lenient leaves it out");
 }
 
-static const struct scene_node *material_of(const struct scene *s)
+static const struct scene_node *find_material(const struct scene *s)
 {
 	for (uint32_t i = 0; i < s->object_count; i++)
 		if (s->objects[i]->cls == PLUGIN_BSDF)
@@ -99,7 +99,7 @@ static const struct scene_node *material_of(const struct scene *s)
 }
 
 /* Returns the coordinates by which the image of a property is looked up. */
-static const char *coordinates_of(const struct scene_node *bsdf, const char *name)
+static const char *image_coordinates(const struct scene_node *bsdf, const char *name)
 {
 	const struct property *p = node_find_property(bsdf, name);
 	assert_non_null(p);
@@ -107,55 +107,55 @@ static const char *coordinates_of(const struct scene_node *bsdf, const char *nam
 }
 
 /* One set becomes that of the shape, preferably the normal map's; the other becomes an attribute. */
-static void test_two_sets(void **state)
+static void test_second_set_becomes_an_attribute(void **state)
 {
 	(void)state;
 	struct scene s = read_text(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), "", BOUNDS));
-	assert_true(strstr(node_string(shape_of(&s), "texcoord", ""), "36") ==
-		    node_string(shape_of(&s), "texcoord", ""));
-	assert_string_equal(node_string(shape_of(&s), "texcoord_other", ""), "60 8 3 f32");
-	assert_string_equal(coordinates_of(material_of(&s), "base_color"), "");
-	assert_string_equal(coordinates_of(material_of(&s), "metallic"), "vertex_texcoord");
-	assert_string_equal(coordinates_of(material_of(&s), "roughness"), "vertex_texcoord");
+	assert_true(strstr(node_string(find_shape(&s), "texcoord", ""), "36") ==
+		    node_string(find_shape(&s), "texcoord", ""));
+	assert_string_equal(node_string(find_shape(&s), "texcoord_other", ""), "60 8 3 f32");
+	assert_string_equal(image_coordinates(find_material(&s), "base_color"), "");
+	assert_string_equal(image_coordinates(find_material(&s), "metallic"), "vertex_texcoord");
+	assert_string_equal(image_coordinates(find_material(&s), "roughness"), "vertex_texcoord");
 	scene_fini(&s);
 	s = read_text(FILE_OF("\"2.0\"", SECOND, NORMAL("0"), BOUNDS));
-	assert_string_equal(node_string(shape_of(&s), "texcoord", ""), "36 8 3 f32");
-	assert_string_equal(node_string(shape_of(&s), "texcoord_other", ""), "60 8 3 f32");
-	const struct scene_node *bent = node_child(material_of(&s), PLUGIN_BSDF, 0);
-	assert_string_equal(coordinates_of(bent, "base_color"), "vertex_texcoord");
+	assert_string_equal(node_string(find_shape(&s), "texcoord", ""), "36 8 3 f32");
+	assert_string_equal(node_string(find_shape(&s), "texcoord_other", ""), "60 8 3 f32");
+	const struct scene_node *bent = node_child(find_material(&s), PLUGIN_BSDF, 0);
+	assert_string_equal(image_coordinates(bent, "base_color"), "vertex_texcoord");
 	scene_fini(&s);
 }
 
 /* Unlit materials are rendered as lit ones, with a note; a file that requires the extension is refused. */
-static void test_unlit(void **state)
+static void test_unlit_materials_are_rendered_as_lit(void **state)
 {
 	(void)state;
 #define UNLIT ", \"extensions\": {\"KHR_materials_unlit\": {}}"
 	struct scene s = read_text(FILE_OF("\"2.0\"", FIRST, UNLIT, BOUNDS));
-	shape_of(&s);
+	find_shape(&s);
 	assert_true(scene_has_note(&s, "surfaces of KHR_materials_unlit are lit like others"));
 	scene_fini(&s);
-	refuses(FILE_OF("\"2.0\"", FIRST,
-			UNLIT "}], \"extensionsRequired\": [\"KHR_materials_unlit\"], \"cameras\": [{", BOUNDS),
-		"`KHR_materials_unlit` is not supported; --lenient leaves it out");
+	expect_refused(FILE_OF("\"2.0\"", FIRST,
+			       UNLIT "}], \"extensionsRequired\": [\"KHR_materials_unlit\"], \"cameras\": [{", BOUNDS),
+		       "`KHR_materials_unlit` is not supported; --lenient leaves it out");
 }
 
-static void test_versions(void **state)
+static void test_other_versions_are_refused(void **state)
 {
 	(void)state;
-	refuses(FILE_OF("1.0", FIRST, "", BOUNDS), "glTF of version 1; 2.0 is supported");
-	refuses(FILE_OF("\"1.0\"", FIRST, "", BOUNDS), "glTF of version \"1.0\"; 2.0 is supported");
+	expect_refused(FILE_OF("1.0", FIRST, "", BOUNDS), "glTF of version 1; 2.0 is supported");
+	expect_refused(FILE_OF("\"1.0\"", FIRST, "", BOUNDS), "glTF of version \"1.0\"; 2.0 is supported");
 }
 
 /* Without bounds, no camera can be placed before the meshes are read, so the scene has none. */
-static void test_camera(void **state)
+static void test_no_camera_is_placed_without_bounds(void **state)
 {
 	(void)state;
 	for (int bounds = 0; bounds < 2; bounds++) {
 		struct scene s =
 			read_text(bounds ? FILE_OF("\"2.0\"", FIRST, "", BOUNDS) : FILE_OF("\"2.0\"", FIRST, "", ""));
 		int sensors = 0;
-		assert_string_equal(shape_of(&s)->id, "shape 1, of meshes[0]");
+		assert_string_equal(find_shape(&s)->id, "shape 1, of meshes[0]");
 		for (uint32_t i = 0; i < s.object_count; i++)
 			sensors += s.objects[i]->cls == PLUGIN_SENSOR;
 		assert_int_equal(sensors, bounds);
@@ -164,7 +164,7 @@ static void test_camera(void **state)
 }
 
 /* A material that glows like a screen needs other light in the scene; a lamp is enough light. */
-static void test_light(void **state)
+static void test_only_glowing_scenes_get_other_light(void **state)
 {
 	(void)state;
 #define GLOWS(more) FILE_OF("\"2.0\"", FIRST, ", \"emissiveFactor\": [1, 0.5, 0]" more, BOUNDS)
@@ -173,7 +173,7 @@ static void test_light(void **state)
 			strong ? GLOWS(", \"extensions\": {\"KHR_materials_emissive_strength\": {\"emissiveStrength\": 1.5}}")
 			       : GLOWS(""));
 		int skies = 0;
-		assert_non_null(node_child(shape_of(&s), PLUGIN_EMITTER, 0)); /* the shape emits light in any case */
+		assert_non_null(node_child(find_shape(&s), PLUGIN_EMITTER, 0)); /* the shape emits light in any case */
 		for (uint32_t i = 0; i < s.object_count; i++)
 			skies += s.objects[i]->cls == PLUGIN_EMITTER && strcmp(s.objects[i]->type, "constant") == 0;
 		assert_int_equal(skies, !strong);
@@ -182,7 +182,7 @@ static void test_light(void **state)
 }
 
 /* Base colour and metalness are those from which the two colours were computed. */
-static void test_specular_glossiness(void **state)
+static void test_specular_glossiness_becomes_metallic_roughness(void **state)
 {
 	(void)state;
 	static const struct {
@@ -231,13 +231,13 @@ static void test_specular_glossiness(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sets),
-		cmocka_unit_test(test_two_sets),
-		cmocka_unit_test(test_unlit),
-		cmocka_unit_test(test_versions),
-		cmocka_unit_test(test_camera),
-		cmocka_unit_test(test_light),
-		cmocka_unit_test(test_specular_glossiness),
+		cmocka_unit_test(test_texture_coordinate_set_is_selected),
+		cmocka_unit_test(test_second_set_becomes_an_attribute),
+		cmocka_unit_test(test_unlit_materials_are_rendered_as_lit),
+		cmocka_unit_test(test_other_versions_are_refused),
+		cmocka_unit_test(test_no_camera_is_placed_without_bounds),
+		cmocka_unit_test(test_only_glowing_scenes_get_other_light),
+		cmocka_unit_test(test_specular_glossiness_becomes_metallic_roughness),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

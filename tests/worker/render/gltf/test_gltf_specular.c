@@ -38,7 +38,7 @@ struct material {
 };
 
 /* base and more: of the material; specular: of the extension. textures[0]: of one pixel, [1]: of two. */
-static void make(struct material *m, const char *base, const char *more, const char *specular)
+static void make_material(struct material *m, const char *base, const char *more, const char *specular)
 {
 	static const char format[] =
 		"{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"mesh\": 0}],"
@@ -67,12 +67,12 @@ static void make(struct material *m, const char *base, const char *more, const c
 		fail_msg("%s", e.text);
 	if (m->scene.problem_count)
 		fail_msg("%s", m->scene.problems[0]);
-	const struct bsdf_build build = {.arena = &m->arena, .dialect_3 = true, .assets = &assets};
+	const struct bsdf_build build = {.arena = &m->arena, .is_dialect_3 = true, .assets = &assets};
 	if (bsdf_create(&m->bsdf, scene_find_object(&m->scene, "bsdf of materials[0]"), &build, &e))
 		fail_msg("%s", e.text);
 }
 
-static void release(struct material *m)
+static void release_material(struct material *m)
 {
 	scene_fini(&m->scene);
 	arena_fini(&m->arena);
@@ -84,7 +84,7 @@ static vec3 direction(double z, double phi)
 	return (vec3){s * cos(phi), s * sin(phi), z};
 }
 
-static spectrum value(const struct material *m, double u, vec3 wo, vec3 wi)
+static spectrum evaluate_bsdf(const struct material *m, double u, vec3 wo, vec3 wi)
 {
 	static const struct wavelengths w = {.nm = {430, 500, 570, 640}};
 	const struct bsdf_point at = {
@@ -93,14 +93,14 @@ static spectrum value(const struct material *m, double u, vec3 wo, vec3 wi)
 }
 
 /* At u, a is b. The spectra of images are interpolated in a table: they differ by up to 0.7 % from those of factors. */
-static void expect_same(const struct material *a, double u, const struct material *b, int kind)
+static void expect_same_bsdf(const struct material *a, double u, const struct material *b, int kind)
 {
 	int seen = 0;
 	for (int i = 0; i < 400; i++) {
 		double side = i % 3 ? 1 : -1, other = i % 2 ? 1 : -1;
 		vec3 wo = direction(side * (0.05 + 0.9 * (i % 20) / 20), 0.4),
 		     wi = direction(other * (0.05 + 0.9 * (i / 20) / 20), 0.3 * i);
-		spectrum p = value(a, u, wo, wi), q = value(b, u, wo, wi);
+		spectrum p = evaluate_bsdf(a, u, wo, wi), q = evaluate_bsdf(b, u, wo, wi);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			if (!(fabs(p.v[l] - q.v[l]) <= (kind ? 1e-2 : 1e-6) * q.v[l]))
 				fail_msg("%d at %g: %.9g is not %.9g", kind, u, p.v[l], q.v[l]);
@@ -113,7 +113,7 @@ static void expect_same(const struct material *a, double u, const struct materia
 #define STRENGTH "\"specularTexture\": {\"index\": %d}, \"specularFactor\": 0.9"
 #define COLOUR "\"specularColorTexture\": {\"index\": %d}"
 
-static void test_textures_are_factors(void **state)
+static void test_textures_equal_factors(void **state)
 {
 	(void)state;
 	static const char *const more[] = {"", GLASS, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, "};
@@ -131,48 +131,48 @@ static void test_textures_are_factors(void **state)
 					snprintf(text, sizeof text, COLOUR, i);
 				else
 					snprintf(text, sizeof text, STRENGTH ", " COLOUR, i, i);
-				make(&maps[i], "0.8, 0.3, 0.1", more[k], text);
+				make_material(&maps[i], "0.8, 0.3, 0.1", more[k], text);
 				snprintf(text, sizeof text,
 					 "\"specularFactor\": %.17g, \"specularColorFactor\": [%.17g, %.17g, %.17g]",
 					 strength, rgb[0], rgb[1], rgb[2]);
-				make(&of_pixel[i], "0.8, 0.3, 0.1", more[k], text);
+				make_material(&of_pixel[i], "0.8, 0.3, 0.1", more[k], text);
 			}
-			expect_same(&maps[0], 0.2, &of_pixel[0], kind);
-			expect_same(&maps[0], 0.8, &of_pixel[0], kind);
-			expect_same(&maps[1], 0.2, &of_pixel[0], kind);
-			expect_same(&maps[1], 0.8, &of_pixel[1], kind);
+			expect_same_bsdf(&maps[0], 0.2, &of_pixel[0], kind);
+			expect_same_bsdf(&maps[0], 0.8, &of_pixel[0], kind);
+			expect_same_bsdf(&maps[1], 0.2, &of_pixel[0], kind);
+			expect_same_bsdf(&maps[1], 0.8, &of_pixel[1], kind);
 			assert_false(scene_has_note(&maps[0].scene, "specular"));
 			for (int i = 0; i < 2; i++) {
-				release(&maps[i]);
-				release(&of_pixel[i]);
+				release_material(&maps[i]);
+				release_material(&of_pixel[i]);
 			}
 		}
 }
 
 /* The colour scales what is reflected at normal incidence alone: black surfaces still reflect grazing light. */
-static void test_grazing_light(void **state)
+static void test_black_surfaces_reflect_grazing_light(void **state)
 {
 	(void)state;
 	struct material none, some;
-	make(&none, "0, 0, 0", "", "\"specularColorFactor\": [0, 0, 0]");
-	make(&some, "0, 0, 0", "", "\"specularColorFactor\": [0.25, 0.25, 0.25]");
+	make_material(&none, "0, 0, 0", "", "\"specularColorFactor\": [0, 0, 0]");
+	make_material(&some, "0, 0, 0", "", "\"specularColorFactor\": [0.25, 0.25, 0.25]");
 	for (int i = 0; i < 18; i++) {
 		double z = 0.05 + 0.05 * i, grazing = pow(1 - z, 5);
-		spectrum p = value(&none, 0.5, direction(z, 0), direction(z, PI)),
-			 q = value(&some, 0.5, direction(z, 0), direction(z, PI));
+		spectrum p = evaluate_bsdf(&none, 0.5, direction(z, 0), direction(z, PI)),
+			 q = evaluate_bsdf(&some, 0.5, direction(z, 0), direction(z, PI));
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			if (!(q.v[l] > 0 && fabs(p.v[l] / q.v[l] - grazing / (0.01 + 0.99 * grazing)) <= 1e-6))
 				fail_msg("at a cosine of %g: %.9g of %.9g", z, p.v[l], q.v[l]);
 	}
-	release(&none);
-	release(&some);
+	release_material(&none);
+	release_material(&some);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_textures_are_factors),
-		cmocka_unit_test(test_grazing_light),
+		cmocka_unit_test(test_textures_equal_factors),
+		cmocka_unit_test(test_black_surfaces_reflect_grazing_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,16 +7,16 @@
 
 #include <string.h>
 
-enum { DENSE_MOST = 2 * FULL_PATH_VERTICES_MAX };
+enum { DENSE_SIZE_MAX = 2 * FULL_PATH_VERTICES_MAX };
 
 struct dense {
 	unsigned n;
-	long double m[DENSE_MOST][DENSE_MOST], inverse[DENSE_MOST][DENSE_MOST];
+	long double m[DENSE_SIZE_MAX][DENSE_SIZE_MAX], inverse[DENSE_SIZE_MAX][DENSE_SIZE_MAX];
 	long double log_det;
 	/* The scale of an entry, 0 outside the blocks: the product of scales of its row and its column, so that the
 	 * largest entry of each row and column is about as large. Condition numbers refer to errors of this size and
 	 * so do not depend on units. */
-	long double size[DENSE_MOST][DENSE_MOST];
+	long double scale[DENSE_SIZE_MAX][DENSE_SIZE_MAX];
 };
 
 /* Fills the dense matrix with the blocks of the vertices c+1..b-1, in this order. */
@@ -39,9 +39,9 @@ static inline void dense_fill(struct dense *d, const struct constraint *k, unsig
 	}
 }
 
-static inline void dense_sizes(struct dense *d)
+static inline void dense_compute_scales(struct dense *d)
 {
-	long double column[DENSE_MOST], row[DENSE_MOST];
+	long double column[DENSE_SIZE_MAX], row[DENSE_SIZE_MAX];
 	for (unsigned r = 0; r < d->n; r++)
 		row[r] = column[r] = 1;
 	for (unsigned pass = 0; pass < 3; pass++) {
@@ -54,14 +54,14 @@ static inline void dense_sizes(struct dense *d)
 	}
 	for (unsigned r = 0; r < d->n; r++)
 		for (unsigned c = 0; c < d->n; c++)
-			d->size[r][c] = r / 2 <= c / 2 + 1 && c / 2 <= r / 2 + 1 ? row[r] * column[c] : 0;
+			d->scale[r][c] = r / 2 <= c / 2 + 1 && c / 2 <= r / 2 + 1 ? row[r] * column[c] : 0;
 }
 
 /* Inverts by Gauss-Jordan elimination, exchanging rows and columns. Returns false if a pivot is 0. */
 static inline bool dense_invert(struct dense *d)
 {
-	static long double a[DENSE_MOST][2 * DENSE_MOST];
-	unsigned n = d->n, column_at[DENSE_MOST];
+	static long double a[DENSE_SIZE_MAX][2 * DENSE_SIZE_MAX];
+	unsigned n = d->n, column_at[DENSE_SIZE_MAX];
 	for (unsigned r = 0; r < n; r++) {
 		column_at[r] = r;
 		for (unsigned c = 0; c < n; c++) {
@@ -108,7 +108,7 @@ static inline bool dense_invert(struct dense *d)
 	for (unsigned r = 0; r < n; r++)
 		for (unsigned c = 0; c < n; c++)
 			d->inverse[column_at[r]][c] = a[r][n + c];
-	dense_sizes(d);
+	dense_compute_scales(d);
 	return true;
 }
 
@@ -118,7 +118,7 @@ static inline double dense_det_condition(const struct dense *d)
 	long double sum = 0;
 	for (unsigned r = 0; r < d->n; r++)
 		for (unsigned c = 0; c < d->n; c++)
-			sum += d->size[r][c] * fabsl(d->inverse[c][r]);
+			sum += d->scale[r][c] * fabsl(d->inverse[c][r]);
 	return (double)sum;
 }
 

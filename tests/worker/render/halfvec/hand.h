@@ -45,7 +45,7 @@ static inline void hand_begin(struct hand *h, unsigned edges)
 	}
 }
 
-static inline vec3 hand_across(struct dice *d, vec3 n)
+static inline vec3 hand_random_tangent(struct dice *d, vec3 n)
 {
 	vec3 r = dice_direction(d);
 	return vec3_normalize(vec3_madd(r, -vec3_dot(r, n), n));
@@ -54,7 +54,7 @@ static inline vec3 hand_across(struct dice *d, vec3 n)
 /* How to build a triangle. */
 struct hand_triangle {
 	double size, aspect; /* distance of the corners from p; aspect 1e-4: a sliver */
-	bool flat;	     /* without vertex normals */
+	bool is_flat;	     /* without vertex normals */
 	double bend;	     /* approximate |d normal| per length */
 	enum hand_uv uv;
 };
@@ -64,7 +64,7 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 				 struct dice *d)
 {
 	struct geom_shape *s = &h->shape[j];
-	vec3 a = hand_across(d, ng), b = vec3_cross(ng, a), ga = vec3_scale(t->bend, dice_direction(d)),
+	vec3 a = hand_random_tangent(d, ng), b = vec3_cross(ng, a), ga = vec3_scale(t->bend, dice_direction(d)),
 	     gb = vec3_scale(t->bend, dice_direction(d));
 	double w[3] = {dice_between(d, 0.1, 1), dice_between(d, 0.1, 1), dice_between(d, 0.1, 1)}, off[3][2],
 	       mean[2] = {0, 0};
@@ -89,10 +89,10 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 	}
 	*s = (struct geom_shape){
 		.vertex_count = 3, .triangle_count = 1, .position = h->position[j], .index = h->index[j]};
-	s->normal = t->flat ? NULL : h->normal[j];
+	s->normal = t->is_flat ? NULL : h->normal[j];
 	s->uv = t->uv == HAND_UV_NONE ? NULL : h->uv[j];
 	if (t->uv == HAND_TANGENTS) { /* tangents that turn by up to a radian between corners */
-		vec3 along = hand_across(d, n);
+		vec3 along = hand_random_tangent(d, n);
 		for (int m = 0; m < 3; m++) {
 			vec3 q = vec3_normalize(vec3_madd(along, 0.5, dice_direction(d)));
 			memcpy(h->tangent[j][0][m], (float[3]){(float)q.x, (float)q.y, (float)q.z}, sizeof(float[3]));
@@ -105,11 +105,11 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 
 /* A sphere through p with the normal n there; sign -1: the normal points inwards. The pole lies at the angle `polar`
  * from n. */
-static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, double radius, double sign, double polar,
-			       struct dice *d)
+static inline void hand_place_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, double radius, double sign,
+				     double polar, struct dice *d)
 {
 	struct geom_shape *s = &h->shape[j];
-	vec3 w = vec3_scale(sign, n), side = hand_across(d, w);
+	vec3 w = vec3_scale(sign, n), side = hand_random_tangent(d, w);
 	*s = (struct geom_shape){
 		.is_sphere = true, .center = vec3_madd(p, -radius, w), .radius = radius, .normal_sign = sign};
 	s->sphere_axes = frame_around(vec3_normalize(vec3_madd(vec3_scale(cos(polar), w), sin(polar), side)));
@@ -117,27 +117,27 @@ static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, doubl
 	h->x.v[j].kind = VERTEX_SURFACE;
 }
 
-static inline void hand_camera(struct hand *h, unsigned j, vec3 p)
+static inline void hand_place_camera(struct hand *h, unsigned j, vec3 p)
 {
 	h->x.v[j].kind = VERTEX_CAMERA;
 	h->x.v[j].x = (struct surface_point){.p = p, .prim = PRIM_NONE};
 	h->w.camera.position = p;
 }
 
-static inline void hand_infinite(struct hand *h, vec3 direction)
+static inline void hand_place_infinite(struct hand *h, vec3 direction)
 {
 	h->x.v[0].kind = VERTEX_INFINITE;
 	h->x.v[0].x = (struct surface_point){.p = direction, .prim = PRIM_NONE};
 }
 
 /* An emitter at p with the normal ng; ng = 0: a point light. */
-static inline void hand_emitter(struct hand *h, vec3 p, vec3 ng)
+static inline void hand_place_emitter(struct hand *h, vec3 p, vec3 ng)
 {
 	h->x.v[0].kind = VERTEX_EMITTER;
 	h->x.v[0].x = (struct surface_point){.p = p, .ng = ng, .sh = {.n = ng}, .prim = PRIM_NONE};
 }
 
-static inline void hand_join(struct hand *h)
+static inline void hand_compute_edges(struct hand *h)
 {
 	for (unsigned e = 0; e < h->x.edges; e++) {
 		bool apart = full_path_compute_edge(&h->x, e);
@@ -147,7 +147,7 @@ static inline void hand_join(struct hand *h)
 }
 
 /* Sets how vertex j scatters: eta is n_o / n_i, or 0 for reflection. The edges must be joined already. */
-static inline void hand_scatters(struct hand *h, unsigned j, double eta)
+static inline void hand_set_scattering(struct hand *h, unsigned j, double eta)
 {
 	bool above = vec3_dot(h->x.v[j].x.sh.n, h->x.edge[j].w) > 0;
 	h->x.v[j].mode = eta == 0 ? BSDF_REFLECT : BSDF_TRANSMIT;
@@ -156,7 +156,7 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 
 /* Makes a random chain of `edges` edges on spheres, or, if `bent`, on triangles with n != ng. Returns false if an
  * edge came too close to grazing. */
-static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
+static inline bool hand_make_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
 {
 	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};
 	vec3 p[FULL_PATH_VERTICES_MAX];
@@ -182,12 +182,12 @@ static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struc
 		if (bent > 0)
 			hand_triangle(h, j, p[j], ng, n, &t, d);
 		else
-			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_uniform(d) < 0.3 ? -1 : 1,
-				    dice_between(d, 0.3, 2.8), d);
+			hand_place_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_uniform(d) < 0.3 ? -1 : 1,
+					  dice_between(d, 0.3, 2.8), d);
 	}
-	hand_join(h);
+	hand_compute_edges(h);
 	for (unsigned j = 1; j < edges; j++)
-		hand_scatters(h, j, eta[j]);
+		hand_set_scattering(h, j, eta[j]);
 	return true;
 }
 

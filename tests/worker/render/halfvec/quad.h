@@ -13,12 +13,12 @@ typedef struct {
 	quad x, y, z;
 } qvec;
 
-static inline quad qabs(quad a)
+static inline quad q_abs(quad a)
 {
 	return a < 0 ? -a : a;
 }
 
-static inline quad qroot(quad a)
+static inline quad q_sqrt(quad a)
 {
 	if (!(a > 0))
 		return 0;
@@ -28,12 +28,12 @@ static inline quad qroot(quad a)
 	return r;
 }
 
-static inline qvec q_of(vec3 a)
+static inline qvec q_from_vec3(vec3 a)
 {
 	return (qvec){a.x, a.y, a.z};
 }
 
-static inline qvec q_of_float(const float a[3])
+static inline qvec q_from_floats(const float a[3])
 {
 	return (qvec){(quad)a[0], (quad)a[1], (quad)a[2]};
 }
@@ -65,11 +65,11 @@ static inline qvec q_cross(qvec a, qvec b)
 
 static inline qvec q_unit(qvec a)
 {
-	return q_scale(1 / qroot(q_dot(a, a)), a);
+	return q_scale(1 / q_sqrt(q_dot(a, a)), a);
 }
 
 /* Returns the part of a perpendicular to the unit vector n, normalised. */
-static inline qvec q_across(qvec a, qvec n)
+static inline qvec q_perpendicular(qvec a, qvec n)
 {
 	return q_unit(q_madd(a, -q_dot(a, n), n));
 }
@@ -80,11 +80,11 @@ enum quad_kind { QUAD_TRIANGLE, QUAD_SPHERE, QUAD_POINT, QUAD_DIRECTION };
 struct quad_vertex {
 	enum quad_kind kind;
 	qvec p;
-	bool smooth;
+	bool is_smooth;
 	qvec e1, e2, normal[3]; /* of a triangle */
 	quad b1, b2;
-	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, unless carried by the normal or turning */
-	bool carried, turning;
+	quad dpdu_e1, dpdu_e2; /* dp/du = dpdu_e1 e1 + dpdu_e2 e2, unless carried by the normal or turning */
+	bool is_carried, is_turning;
 	qvec tangent[3];
 	qvec center, axis; /* of a sphere */
 	quad radius, sign;
@@ -92,33 +92,33 @@ struct quad_vertex {
 };
 
 /* Position and frame of a vertex after moving by (a, b) in its tangent plane. */
-struct quad_place {
+struct quad_point_frame {
 	qvec p, s, t, n;
 };
 
-static inline qvec quad_between(const qvec corner[3], quad b1, quad b2)
+static inline qvec quad_interpolate(const qvec corner[3], quad b1, quad b2)
 {
 	return q_madd(q_madd(q_scale(1 - b1 - b2, corner[0]), b1, corner[1]), b2, corner[2]);
 }
 
 /* Returns dp/du of a triangle. Without uv: (3, -6, 2) / 7, carried along by the shortest rotation from (2, 3, 6) / 7
  * to the normal. With tangents: interpolated at the barycentric coordinates (b1, b2). */
-static inline qvec quad_along(const struct quad_vertex *v, quad b1, quad b2)
+static inline qvec quad_dpdu(const struct quad_vertex *v, quad b1, quad b2)
 {
-	if (v->turning)
-		return quad_between(v->tangent, b1, b2);
-	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
+	if (v->is_turning)
+		return quad_interpolate(v->tangent, b1, b2);
+	qvec reference = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
 	qvec ng = q_unit(q_cross(v->e1, v->e2));
-	if (v->carried)
-		return q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(from, ng)), q_madd(from, 1, ng));
-	return q_madd(q_scale(v->of_e1, v->e1), v->of_e2, v->e2);
+	if (v->is_carried)
+		return q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(reference, ng)), q_madd(reference, 1, ng));
+	return q_madd(q_scale(v->dpdu_e1, v->e1), v->dpdu_e2, v->e2);
 }
 
 static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv)
 {
 	if (v->kind == QUAD_TRIANGLE) {
 		qvec ng = q_unit(q_cross(v->e1, v->e2));
-		*du = q_across(quad_along(v, v->b1, v->b2), ng);
+		*du = q_perpendicular(quad_dpdu(v, v->b1, v->b2), ng);
 		*dv = q_cross(ng, *du);
 	} else if (v->kind == QUAD_SPHERE) {
 		qvec w = q_unit(q_sub(v->p, v->center));
@@ -130,9 +130,9 @@ static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv
 	}
 }
 
-static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, quad b)
+static inline struct quad_point_frame quad_moved_frame(const struct quad_vertex *v, quad a, quad b)
 {
-	struct quad_place r = {.p = v->p};
+	struct quad_point_frame r = {.p = v->p};
 	qvec du, dv, along = {0, 0, 0};
 	quad_tangents(v, &du, &dv);
 	r.p = q_madd(q_madd(v->p, a, du), b, dv);
@@ -144,10 +144,10 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 		quad inverse = 1 / q_dot(area, area);
 		quad b1 = v->b1 + inverse * q_dot(q_cross(move, v->e2), area),
 		     b2 = v->b2 + inverse * q_dot(q_cross(v->e1, move), area);
-		along = quad_along(v, b1, b2);
+		along = quad_dpdu(v, b1, b2);
 		r.n = q_unit(area);
-		if (v->smooth) {
-			qvec m = quad_between(v->normal, b1, b2);
+		if (v->is_smooth) {
+			qvec m = quad_interpolate(v->normal, b1, b2);
 			if (q_dot(m, r.n) > 0)
 				r.n = q_unit(m);
 		}
@@ -159,7 +159,7 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 		along = q_unit(q_cross(v->axis, w));
 	}
 	if (v->kind == QUAD_TRIANGLE || v->kind == QUAD_SPHERE) {
-		r.s = q_across(along, r.n);
+		r.s = q_perpendicular(along, r.n);
 		r.t = q_cross(r.n, r.s);
 	}
 	return r;
@@ -168,14 +168,14 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 struct quad_problem {
 	struct quad_vertex v[3]; /* towards the light, the vertex itself, towards the camera */
 	quad eta;
-	bool matched;
+	bool is_matched;
 };
 
-static inline void quad_half(const struct quad_problem *q, const struct quad_place *p, quad h[2])
+static inline void quad_half_vector(const struct quad_problem *q, const struct quad_point_frame *p, quad h[2])
 {
 	qvec i = q->v[0].kind == QUAD_DIRECTION ? p[0].p : q_unit(q_sub(p[0].p, p[1].p));
 	qvec sum = q_madd(i, q->eta, q_unit(q_sub(p[2].p, p[1].p)));
-	quad along = q->matched ? 1 : q_dot(sum, p[1].n);
+	quad along = q->is_matched ? 1 : q_dot(sum, p[1].n);
 	h[0] = q_dot(sum, p[1].s) / along;
 	h[1] = q_dot(sum, p[1].t) / along;
 }
@@ -184,20 +184,20 @@ static inline void quad_half(const struct quad_problem *q, const struct quad_pla
  * extrapolated. */
 static inline void quad_derivatives(const struct quad_problem *q, quad step, quad h[2], quad m[3][4])
 {
-	struct quad_place here[3];
+	struct quad_point_frame base_frames[3];
 	for (int k = 0; k < 3; k++)
-		here[k] = quad_at(&q->v[k], 0, 0);
-	quad_half(q, here, h);
+		base_frames[k] = quad_moved_frame(&q->v[k], 0, 0);
+	quad_half_vector(q, base_frames, h);
 	for (int k = 0; k < 3; k++) {
-		struct quad_place p[3] = {here[0], here[1], here[2]};
+		struct quad_point_frame p[3] = {base_frames[0], base_frames[1], base_frames[2]};
 		for (int column = 0; column < 2; column++) {
 			quad d[2][2];
 			for (int half = 0; half < 2; half++) {
 				quad s = half ? step / 2 : step, up[2], down[2];
-				p[k] = quad_at(&q->v[k], column ? 0 : s, column ? s : 0);
-				quad_half(q, p, up);
-				p[k] = quad_at(&q->v[k], column ? 0 : -s, column ? -s : 0);
-				quad_half(q, p, down);
+				p[k] = quad_moved_frame(&q->v[k], column ? 0 : s, column ? s : 0);
+				quad_half_vector(q, p, up);
+				p[k] = quad_moved_frame(&q->v[k], column ? 0 : -s, column ? -s : 0);
+				quad_half_vector(q, p, down);
 				for (int row = 0; row < 2; row++)
 					d[half][row] = (up[row] - down[row]) / (2 * s);
 			}
@@ -207,47 +207,48 @@ static inline void quad_derivatives(const struct quad_problem *q, quad step, qua
 	}
 }
 
-static inline struct quad_vertex quad_of_surface(const struct hand *h, unsigned j)
+static inline struct quad_vertex quad_vertex_from_surface(const struct hand *h, unsigned j)
 {
 	const struct surface_point *x = &h->x.v[j].x;
 	const struct geom_shape *s = &h->shape[j];
-	struct quad_vertex v = {.kind = QUAD_SPHERE, .p = q_of(x->p)};
+	struct quad_vertex v = {.kind = QUAD_SPHERE, .p = q_from_vec3(x->p)};
 	if (s->is_sphere) {
-		v.center = q_of(s->center);
-		v.axis = q_of(s->sphere_axes.n);
+		v.center = q_from_vec3(s->center);
+		v.axis = q_from_vec3(s->sphere_axes.n);
 		v.radius = s->radius;
 		v.sign = s->normal_sign;
 		return v;
 	}
 	v.kind = QUAD_TRIANGLE;
-	v.e1 = q_sub(q_of_float(s->position[1]), q_of_float(s->position[0]));
-	v.e2 = q_sub(q_of_float(s->position[2]), q_of_float(s->position[0]));
+	v.e1 = q_sub(q_from_floats(s->position[1]), q_from_floats(s->position[0]));
+	v.e2 = q_sub(q_from_floats(s->position[2]), q_from_floats(s->position[0]));
 	v.b1 = x->b1;
 	v.b2 = x->b2;
-	v.smooth = s->normal != NULL;
-	for (int m = 0; m < 3 && v.smooth; m++)
-		v.normal[m] = q_of_float(s->normal[m]);
-	v.carried = true;
-	v.turning = s->tangent != NULL;
-	for (int m = 0; m < 3 && v.turning; m++)
-		v.tangent[m] = q_of_float(s->tangent[0][m]);
+	v.is_smooth = s->normal != NULL;
+	for (int m = 0; m < 3 && v.is_smooth; m++)
+		v.normal[m] = q_from_floats(s->normal[m]);
+	v.is_carried = true;
+	v.is_turning = s->tangent != NULL;
+	for (int m = 0; m < 3 && v.is_turning; m++)
+		v.tangent[m] = q_from_floats(s->tangent[0][m]);
 	if (s->uv) {
 		quad u1 = (quad)s->uv[1][0] - (quad)s->uv[0][0], v1 = (quad)s->uv[1][1] - (quad)s->uv[0][1];
 		quad u2 = (quad)s->uv[2][0] - (quad)s->uv[0][0], v2 = (quad)s->uv[2][1] - (quad)s->uv[0][1];
 		quad det = u1 * v2 - v1 * u2;
-		v.carried = det == 0;
-		v.of_e1 = v.carried ? 0 : v2 / det;
-		v.of_e2 = v.carried ? 0 : -v1 / det;
+		v.is_carried = det == 0;
+		v.dpdu_e1 = v.is_carried ? 0 : v2 / det;
+		v.dpdu_e2 = v.is_carried ? 0 : -v1 / det;
 	}
 	return v;
 }
 
-static inline struct quad_vertex quad_of_end(const struct hand *h, unsigned j)
+static inline struct quad_vertex quad_vertex_from_end(const struct hand *h, unsigned j)
 {
 	const struct path_vertex *v = &h->x.v[j];
 	if (v->kind == VERTEX_SURFACE)
-		return quad_of_surface(h, j);
-	struct quad_vertex r = {.kind = v->kind == VERTEX_INFINITE ? QUAD_DIRECTION : QUAD_POINT, .p = q_of(v->x.p)};
+		return quad_vertex_from_surface(h, j);
+	struct quad_vertex r = {.kind = v->kind == VERTEX_INFINITE ? QUAD_DIRECTION : QUAD_POINT,
+				.p = q_from_vec3(v->x.p)};
 	struct frame f;
 	if (v->kind == VERTEX_CAMERA)
 		f = h->w.camera.axes;
@@ -255,35 +256,37 @@ static inline struct quad_vertex quad_of_end(const struct hand *h, unsigned j)
 		f = frame_around(v->x.ng);
 	else
 		f = frame_around(vec3_neg(h->x.edge[0].w));
-	r.du = q_of(f.s);
-	r.dv = q_of(f.t);
+	r.du = q_from_vec3(f.s);
+	r.dv = q_from_vec3(f.t);
 	return r;
 }
 
-static inline struct quad_problem quad_problem_of(const struct hand *h, unsigned j)
+static inline struct quad_problem quad_problem_from_hand(const struct hand *h, unsigned j)
 {
-	struct quad_problem q = {.v = {quad_of_end(h, j - 1), quad_of_surface(h, j), quad_of_end(h, j + 1)}, .eta = 1};
+	struct quad_problem q = {
+		.v = {quad_vertex_from_end(h, j - 1), quad_vertex_from_surface(h, j), quad_vertex_from_end(h, j + 1)},
+		.eta = 1};
 	const struct path_vertex *v = &h->x.v[j];
 	if (v->mode & BSDF_TRANSMIT) {
 		quad eta = h->bsdf[j].eta;
 		q.eta = vec3_dot(v->x.sh.n, h->x.edge[j].w) > 0 ? 1 / eta : eta;
-		q.matched = eta == 1;
+		q.is_matched = eta == 1;
 	}
 	return q;
 }
 
 /* Returns the number shaken by one rounding of double, up or down. */
-static inline quad quad_shaken(quad a, struct dice *d)
+static inline quad quad_perturbed(quad a, struct dice *d)
 {
 	return a * (1 + (dice_uniform(d) < 0.5 ? -1 : 1) * (quad)0x1p-53);
 }
 
-static inline qvec q_shaken(qvec a, struct dice *d)
+static inline qvec q_perturbed(qvec a, struct dice *d)
 {
-	return (qvec){quad_shaken(a.x, d), quad_shaken(a.y, d), quad_shaken(a.z, d)};
+	return (qvec){quad_perturbed(a.x, d), quad_perturbed(a.y, d), quad_perturbed(a.z, d)};
 }
 
-static inline struct quad_problem quad_problem_shaken(const struct quad_problem *q, struct dice *d)
+static inline struct quad_problem quad_problem_perturbed(const struct quad_problem *q, struct dice *d)
 {
 	struct quad_problem r = *q;
 	for (int k = 0; k < 3; k++) {
@@ -292,13 +295,13 @@ static inline struct quad_problem quad_problem_shaken(const struct quad_problem 
 				   &v->normal[1],  &v->normal[2], &v->tangent[0], &v->tangent[1],
 				   &v->tangent[2], &v->center,	  &v->axis};
 		for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-			*vectors[i] = q_shaken(*vectors[i], d);
-		v->b1 = quad_shaken(v->b1, d);
-		v->b2 = quad_shaken(v->b2, d);
-		v->radius = quad_shaken(v->radius, d);
+			*vectors[i] = q_perturbed(*vectors[i], d);
+		v->b1 = quad_perturbed(v->b1, d);
+		v->b2 = quad_perturbed(v->b2, d);
+		v->radius = quad_perturbed(v->radius, d);
 	}
-	if (!q->matched)
-		r.eta = quad_shaken(q->eta, d);
+	if (!q->is_matched)
+		r.eta = quad_perturbed(q->eta, d);
 	return r;
 }
 

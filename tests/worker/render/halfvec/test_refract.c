@@ -24,7 +24,7 @@ static void begin(const struct world *w)
 {
 	memset(counters, 0, sizeof counters);
 	c = (struct path_context){.w = w, .counters = counters};
-	c.wl = world_wavelengths(w, 0.5);
+	c.wl = world_sample_wavelengths(w, 0.5);
 }
 
 static vec3 in_world(const struct world *w, vec3 p)
@@ -34,7 +34,7 @@ static vec3 in_world(const struct world *w, vec3 p)
 
 /* Refracts d by Snell's law; the index on the side of the incident ray is larger by the factor `eta`. Returns false
  * for total reflection. */
-static bool snell(vec3 d, vec3 n, double eta, vec3 *out)
+static bool refract_by_snell(vec3 d, vec3 n, double eta, vec3 *out)
 {
 	if (vec3_dot(d, n) > 0)
 		n = vec3_neg(n);
@@ -55,7 +55,7 @@ static bool trace_through(const struct path_vertex *z, vec3 d, unsigned count, v
 		if (!path_extend(&c, from, d, 0, INFINITY, to))
 			return false;
 		double eta = bsdf_eta(to->bsdf, &c.wl);
-		if (!snell(d, to->x.sh.n, vec3_dot(d, to->x.sh.n) < 0 ? 1 / eta : eta, &d))
+		if (!refract_by_snell(d, to->x.sh.n, vec3_dot(d, to->x.sh.n) < 0 ? 1 / eta : eta, &d))
 			return false;
 		from = to;
 	}
@@ -66,56 +66,57 @@ static bool trace_through(const struct path_vertex *z, vec3 d, unsigned count, v
 
 /* Stores two coordinates of the ray's intersection with the plane through y perpendicular to the frame's normal or,
  * if y is at infinity, of the ray's direction. */
-static bool arrival_of(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
-		       const struct frame *f, double at[2])
+static bool trace_arrival(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
+			  const struct frame *f, double at[2])
 {
 	vec3 p, w;
 	if (!trace_through(z, d, count, &p, &w))
 		return false;
-	vec3 off = y->kind == VERTEX_INFINITE
-			   ? vec3_sub(w, y->x.p)
-			   : vec3_sub(vec3_madd(p, vec3_dot(vec3_sub(y->x.p, p), f->n) / vec3_dot(w, f->n), w), y->x.p);
-	at[0] = vec3_dot(off, f->s);
-	at[1] = vec3_dot(off, f->t);
+	vec3 offset =
+		y->kind == VERTEX_INFINITE
+			? vec3_sub(w, y->x.p)
+			: vec3_sub(vec3_madd(p, vec3_dot(vec3_sub(y->x.p, p), f->n) / vec3_dot(w, f->n), w), y->x.p);
+	at[0] = vec3_dot(offset, f->s);
+	at[1] = vec3_dot(offset, f->t);
 	return true;
 }
 
 struct tally {
-	unsigned found, several;
-	double miss, transfer;
+	unsigned found, through_several_surfaces;
+	double max_miss, max_transfer_error;
 };
 
 /* The ratio of solid angle at z to area (or solid angle) at y, by central differences, and from it T relative to the
  * solid angle of x_m. */
-static void check_one(const struct path_vertex *z, const struct path_vertex *y, const struct path_refraction *r,
-		      struct tally *t)
+static void check_refraction(const struct path_vertex *z, const struct path_vertex *y, const struct path_refraction *r,
+			     struct tally *t)
 {
 	const double step = 1e-5;
 	double distance2, unused, at[2], high[2], low[2];
 	vec3 d = path_direction(z, &r->v[0], &distance2), last = path_direction(&r->v[r->count - 1], y, &unused);
 	bool has_normal = vec3_dot(y->x.ng, y->x.ng) > 0 && y->kind != VERTEX_INFINITE;
-	struct frame here = frame_around(d), there = frame_around(has_normal ? y->x.ng : last);
+	struct frame ray_frame = frame_around(d), arrival_frame = frame_around(has_normal ? y->x.ng : last);
 	mat2 m;
-	assert_true(arrival_of(z, d, r->count, y, &there, at));
-	t->miss = fmax(t->miss, fmax(fabs(at[0]), fabs(at[1])));
-	if (!arrival_of(z, vec3_normalize(vec3_madd(d, step, here.s)), r->count, y, &there, high) ||
-	    !arrival_of(z, vec3_normalize(vec3_madd(d, -step, here.s)), r->count, y, &there, low))
+	assert_true(trace_arrival(z, d, r->count, y, &arrival_frame, at));
+	t->max_miss = fmax(t->max_miss, fmax(fabs(at[0]), fabs(at[1])));
+	if (!trace_arrival(z, vec3_normalize(vec3_madd(d, step, ray_frame.s)), r->count, y, &arrival_frame, high) ||
+	    !trace_arrival(z, vec3_normalize(vec3_madd(d, -step, ray_frame.s)), r->count, y, &arrival_frame, low))
 		return;
 	m.xx = (high[0] - low[0]) / (2 * step);
 	m.yx = (high[1] - low[1]) / (2 * step);
-	if (!arrival_of(z, vec3_normalize(vec3_madd(d, step, here.t)), r->count, y, &there, high) ||
-	    !arrival_of(z, vec3_normalize(vec3_madd(d, -step, here.t)), r->count, y, &there, low))
+	if (!trace_arrival(z, vec3_normalize(vec3_madd(d, step, ray_frame.t)), r->count, y, &arrival_frame, high) ||
+	    !trace_arrival(z, vec3_normalize(vec3_madd(d, -step, ray_frame.t)), r->count, y, &arrival_frame, low))
 		return;
 	m.xy = (high[0] - low[0]) / (2 * step);
 	m.yy = (high[1] - low[1]) / (2 * step);
 	double transfer = distance2 / (path_cosine(&r->v[0], d) * fabs(m.xx * m.yy - m.xy * m.yx));
-	t->transfer = fmax(t->transfer, fabs(exp(r->log_transfer) / transfer - 1));
+	t->max_transfer_error = fmax(t->max_transfer_error, fabs(exp(r->log_transfer) / transfer - 1));
 	t->found++;
-	t->several += r->count > 2;
+	t->through_several_surfaces += r->count > 2;
 }
 
 /* Checks connections from points of the floor to points of each emitter. */
-static struct tally check(const char *name, struct world *w, unsigned tries)
+static struct tally check_connections(const char *name, struct world *w, unsigned tries)
 {
 	struct tally t = {0};
 	struct dice dice = dice_for_test(name);
@@ -134,12 +135,12 @@ static struct tally check(const char *name, struct world *w, unsigned tries)
 			continue;
 		for (int k = 0; k < 3; k++)
 			z.next_event[k] = dice_uniform(&dice);
-		if (path_draw_next_event(&c, &z, &y, &pdf) && halfvec_refract(&c, &z, &y, &r))
-			check_one(&z, &y, &r, &t);
+		if (path_sample_next_event(&c, &z, &y, &pdf) && halfvec_refract(&c, &z, &y, &r))
+			check_refraction(&z, &y, &r, &t);
 	}
-	print_message("%s: %u of %u found, largest miss %.3g, T off by %.3g\n", name, t.found, tries, t.miss,
-		      t.transfer);
-	assert_true(t.miss < 1e-7 && t.transfer < 1e-4);
+	print_message("%s: %u of %u found, largest miss %.3g, T off by %.3g\n", name, t.found, tries, t.max_miss,
+		      t.max_transfer_error);
+	assert_true(t.max_miss < 1e-7 && t.max_transfer_error < 1e-4);
 	world_free(w);
 	return t;
 }
@@ -152,7 +153,7 @@ static struct tally check(const char *name, struct world *w, unsigned tries)
 #define BALL(place, radius, bsdf)                                                                               \
 	"<shape type='sphere'><point name='center' " place "/><float name='radius' value='" radius "'/>" bsdf "</shape>"
 #define GLASS "<bsdf type='dielectric'/>"
-#define WEAK "<bsdf type='dielectric'><float name='int_ior' value='1.1'/><float name='ext_ior' value='1'/></bsdf>"
+#define WEAK_GLASS "<bsdf type='dielectric'><float name='int_ior' value='1.1'/><float name='ext_ior' value='1'/></bsdf>"
 #define LAMP "<emitter type='area'/>"
 #define SURFACE                                                                                                 \
 	"<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='-90'/></transform>" \
@@ -163,60 +164,61 @@ static struct tally check(const char *name, struct world *w, unsigned tries)
 #define SUN "<emitter type='directional'><vector name='direction' x='-.94' y='-.342' z='0'/></emitter>"
 /* clang-format on */
 
-static void test_lamps(void **state)
+static void refracted_connections_arrive_at_lamps(void **state)
 {
 	(void)state;
-	struct tally t = check("a lamp in a ball",
-			       world_from_text(8, 8, "%s",
-					       FLOOR BALL("x='0' y='1' z='0'", "1", GLASS)
-						       BALL("x='.2' y='1.3' z='0'", ".1", LAMP)),
-			       400);
+	struct tally t = check_connections("a lamp in a ball",
+					   world_from_text(8, 8, "%s",
+							   FLOOR BALL("x='0' y='1' z='0'", "1", GLASS)
+								   BALL("x='.2' y='1.3' z='0'", ".1", LAMP)),
+					   400);
 	assert_true(t.found > 200);
-	t = check(
+	t = check_connections(
 		"a point behind a ball and a pane",
 		world_from_text(
 			8, 8, "%s",
 			FLOOR BALL(
 				"x='0' y='1' z='0'", ".6",
-				WEAK) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/><rotate z='1' angle='10'/>"
-				      "</transform>" GLASS
-				      "</shape><emitter type='point'><point name='position' x='.1' y='2' z='0'/>"
-				      "</emitter>"),
+				WEAK_GLASS) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/>"
+					    "<rotate z='1' angle='10'/>"
+					    "</transform>" GLASS
+					    "</shape><emitter type='point'><point name='position' x='.1' y='2' z='0'/>"
+					    "</emitter>"),
 		400);
-	assert_true(t.found > 100 && t.several > 10);
-	t = check(
+	assert_true(t.found > 100 && t.through_several_surfaces > 10);
+	t = check_connections(
 		"the sun through a ball and a pane",
 		world_from_text(
 			8, 8, "%s",
 			FLOOR BALL(
 				"x='0' y='1' z='0'", ".6",
-				WEAK) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/></transform>" GLASS
-				      "</shape><emitter type='directional'><vector name='direction' value='.3,-1,.2'/></emitter>"),
+				WEAK_GLASS) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/></transform>" GLASS
+					    "</shape><emitter type='directional'><vector name='direction' value='.3,-1,.2'/></emitter>"),
 		400);
 	assert_true(t.found > 200);
 }
 
 /* Under water beside a wall, straight lines to a low sun meet the wall, and refracted ones to the left of x = -.5 do
  * not: about a quarter of the points. */
-static void test_around_a_wall(void **state)
+static void refracted_sun_passes_a_wall(void **state)
 {
 	(void)state;
 	static const char *const between[] = {SURFACE WALL, SURFACE WALL BALL("x='0' y='-1.9' z='0'", ".05", GLASS)};
 	for (size_t i = 0; i < sizeof between / sizeof *between; i++) {
-		struct tally t =
-			check("a pool under a low sun", world_from_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
+		struct tally t = check_connections("a pool under a low sun",
+						   world_from_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
 		assert_true(t.found > 80);
 	}
 	/* Points in the air beside a glass ball, in the shadow of a wall, have no refracted connection. */
-	struct tally t =
-		check("a ball in the air",
-		      world_from_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
+	struct tally t = check_connections(
+		"a ball in the air",
+		world_from_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
 	assert_int_equal(t.found, 0);
 }
 
 /* Light through a glass ball with a focus above the floor: several refracted paths connect points beyond the focus
  * with the lamp, and technique 1 makes the one at which the walk ends. */
-static void test_one_of_several(void **state)
+static void one_of_several_refracted_paths_is_made_by_technique_1(void **state)
 {
 	(void)state;
 	unsigned made = 0, others = 0;
@@ -246,14 +248,14 @@ static void test_one_of_several(void **state)
 			v[k] = &c.light[k];
 		v[4] = &above;
 		assert_int_equal(path_refracted_end(v, 4), 3);
-		bool there = path_is_made_by_refraction(&c, v, 3, &log_transfer);
+		bool is_made = path_is_made_by_refraction(&c, v, 3, &log_transfer);
 		bool found = halfvec_refract(&c, v[3], v[0], &r);
-		double apart = found ? vec3_length(vec3_sub(r.v[0].x.p, v[2]->x.p)) : INFINITY;
-		assert_true(there ? apart < 1e-4 : apart > 1e-9);
-		if (there)
+		double distance = found ? vec3_length(vec3_sub(r.v[0].x.p, v[2]->x.p)) : INFINITY;
+		assert_true(is_made ? distance < 1e-4 : distance > 1e-9);
+		if (is_made)
 			assert_true(log_transfer == r.log_transfer);
-		made += there;
-		others += !there;
+		made += is_made;
+		others += !is_made;
 	}
 	print_message("%u made by refraction, %u others\n", made, others);
 	assert_true(made > 10 && others > 100);
@@ -262,7 +264,7 @@ static void test_one_of_several(void **state)
 
 /* Returns the number of surfaces through which the floor's point below the origin is connected to a point light at a
  * height of 3; 0: not connected by refraction. */
-static unsigned joined_by(const char *between)
+static unsigned count_joining_surfaces(const char *between)
 {
 	struct world *w = world_from_text(8, 8, "%s%s%s", FLOOR, between,
 					  "<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>");
@@ -274,7 +276,7 @@ static unsigned joined_by(const char *between)
 	begin(w);
 	assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
 	memset(z.next_event, 0, sizeof z.next_event);
-	assert_true(path_draw_next_event(&c, &z, &y, &pdf));
+	assert_true(path_sample_next_event(&c, &z, &y, &pdf));
 	unsigned count = halfvec_refract(&c, &z, &y, &r) ? r.count : 0;
 	world_free(w);
 	return count;
@@ -282,7 +284,7 @@ static unsigned joined_by(const char *between)
 
 enum sight { BLOCKED, OPEN, THROUGH_SHEET, SIGHTS };
 
-static enum sight sight_of(const struct path_vertex *z, const struct path_vertex *y)
+static enum sight classify_sight(const struct path_vertex *z, const struct path_vertex *y)
 {
 	struct path_vertex first;
 	double distance2;
@@ -296,7 +298,7 @@ static enum sight sight_of(const struct path_vertex *z, const struct path_vertex
 /* A connection between points that see each other is straight, possibly through the holes of a sheet, and must not be
  * made a second time by refraction. Points of the floor under a bubble in glass, with a point light above: beside the
  * bubble's shadow, light arrives both straight and refracted by the bubble's rim. */
-static void test_not_where_straight(void **state)
+static void points_that_see_each_other_are_not_joined_by_refraction(void **state)
 {
 	(void)state;
 	unsigned count[SIGHTS] = {0}, found[SIGHTS] = {0};
@@ -319,8 +321,8 @@ static void test_not_where_straight(void **state)
 		double pdf;
 		assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
 		memset(z.next_event, 0, sizeof z.next_event);
-		assert_true(path_draw_next_event(&c, &z, &y, &pdf));
-		enum sight sight = sight_of(&z, &y);
+		assert_true(path_sample_next_event(&c, &z, &y, &pdf));
+		enum sight sight = classify_sight(&z, &y);
 		count[sight]++;
 		found[sight] += halfvec_refract(&c, &z, &y, &r);
 	}
@@ -331,38 +333,39 @@ static void test_not_where_straight(void **state)
 	world_free(w);
 }
 
-static void test_what_lies_between(void **state)
+static void surfaces_between_decide_whether_refraction_joins(void **state)
 {
 	(void)state;
 	char panes[4096] = "";
 #define PANE(bsdf)                                                                                                         \
 	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/></transform>" bsdf \
 	"</shape>"
-	assert_int_equal(joined_by(PANE(GLASS)), 1);
-	assert_int_equal(joined_by(""), 0);
-	assert_int_equal(joined_by(PANE("<bsdf type='thindielectric'/>")), 0);
-	assert_int_equal(joined_by(PANE("<bsdf type='roughdielectric'/>")), 0);
-	assert_int_equal(joined_by(PANE("<bsdf type='conductor'/>")), 0);
-	assert_int_equal(joined_by(PANE(GLASS) BALL("x='0' y='1' z='0'", ".5", "<bsdf type='diffuse'/>")), 0);
-	for (unsigned i = 0; i <= PATH_REFRACTED_MAX; i++) {
+	assert_int_equal(count_joining_surfaces(PANE(GLASS)), 1);
+	assert_int_equal(count_joining_surfaces(""), 0);
+	assert_int_equal(count_joining_surfaces(PANE("<bsdf type='thindielectric'/>")), 0);
+	assert_int_equal(count_joining_surfaces(PANE("<bsdf type='roughdielectric'/>")), 0);
+	assert_int_equal(count_joining_surfaces(PANE("<bsdf type='conductor'/>")), 0);
+	assert_int_equal(count_joining_surfaces(PANE(GLASS) BALL("x='0' y='1' z='0'", ".5", "<bsdf type='diffuse'/>")),
+			 0);
+	for (unsigned i = 0; i <= PATH_REFRACTED_VERTICES_MAX; i++) {
 		size_t used = strlen(panes);
 		snprintf(
 			panes + used, sizeof panes - used,
 			"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/>"
 			"<translate y='%g'/></transform>" GLASS "</shape>",
 			0.1 * i);
-		assert_int_equal(joined_by(panes), i < PATH_REFRACTED_MAX ? i + 1 : 0);
+		assert_int_equal(count_joining_surfaces(panes), i < PATH_REFRACTED_VERTICES_MAX ? i + 1 : 0);
 	}
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lamps),
-		cmocka_unit_test(test_around_a_wall),
-		cmocka_unit_test(test_one_of_several),
-		cmocka_unit_test(test_not_where_straight),
-		cmocka_unit_test(test_what_lies_between),
+		cmocka_unit_test(refracted_connections_arrive_at_lamps),
+		cmocka_unit_test(refracted_sun_passes_a_wall),
+		cmocka_unit_test(one_of_several_refracted_paths_is_made_by_technique_1),
+		cmocka_unit_test(points_that_see_each_other_are_not_joined_by_refraction),
+		cmocka_unit_test(surfaces_between_decide_whether_refraction_joins),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,11 +18,11 @@
 #include <cmocka.h>
 
 static struct constraint k[FULL_PATH_VERTICES_MAX];
-static struct constraint_system system_;
+static struct constraint_system tested_system;
 static struct dense dense;
 /* The solver under test, and the size of its rounding errors. */
 static const struct constraint_solver *solver = &constraint_double;
-static double rounding = 0x1p-53;
+static double solver_rounding = 0x1p-53;
 
 static mat2 random_block(struct dice *d, double scale)
 {
@@ -40,7 +40,7 @@ static void random_system(struct dice *d, unsigned b, unsigned c, double centre)
 }
 
 /* The block that is eliminated first has rank 1 or 0. */
-static void first_block_singular(struct dice *d, unsigned b, unsigned c)
+static void make_first_block_singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
 	vec2 p = {dice_between(d, -1, 1), dice_between(d, -1, 1)}, q = {dice_between(d, -1, 1), dice_between(d, -1, 1)};
@@ -49,7 +49,7 @@ static void first_block_singular(struct dice *d, unsigned b, unsigned c)
 }
 
 /* A later block of the elimination vanishes: an image of x_{b-1} lies on a vertex in between. */
-static void focus(struct dice *d, unsigned b, unsigned c)
+static void make_focus(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
 	mat2 l = k[b - 1].b, adjugate = mat2_adjugate(l);
@@ -57,7 +57,7 @@ static void focus(struct dice *d, unsigned b, unsigned c)
 }
 
 /* A singular matrix: some vector is mapped to 0. */
-static void singular(struct dice *d, unsigned b, unsigned c)
+static void make_singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
 	vec2 x[FULL_PATH_VERTICES_MAX] = {{0, 0}};
@@ -76,7 +76,7 @@ static void singular(struct dice *d, unsigned b, unsigned c)
 
 /* Scales rows and columns, as if slopes at different vertices and lengths at different distances had different units.
  */
-static void rescale(struct dice *d, unsigned b, unsigned c, int most)
+static void rescale_randomly(struct dice *d, unsigned b, unsigned c, int most)
 {
 	double row[FULL_PATH_VERTICES_MAX][2], column[FULL_PATH_VERTICES_MAX + 1][2];
 	for (unsigned j = 0; j < FULL_PATH_VERTICES_MAX; j++)
@@ -94,13 +94,13 @@ static void rescale(struct dice *d, unsigned b, unsigned c, int most)
 	}
 }
 
-enum make { RANDOM, HEAVY_CENTRE, WEAK_CENTRE, FIRST_SINGULAR, FOCUS, SCALED, SCALED_FOCUS };
-struct kind {
+enum system_recipe { RANDOM, HEAVY_CENTRE, WEAK_CENTRE, FIRST_SINGULAR, FOCUS, SCALED, SCALED_FOCUS };
+struct system_kind {
 	const char *name;
-	enum make make;
-	unsigned least, most; /* range of the number of inner vertices */
+	enum system_recipe recipe;
+	unsigned min_vertices, max_vertices; /* range of the number of inner vertices */
 };
-static const struct kind kinds[] = {
+static const struct system_kind kinds[] = {
 	{"one vertex", RANDOM, 1, 1},
 	{"random, 2-6 vertices", RANDOM, 2, 6},
 	{"random, 31 vertices", RANDOM, 31, 31},
@@ -112,9 +112,9 @@ static const struct kind kinds[] = {
 	{"intermediate focus, scaled", SCALED_FOCUS, 3, 8},
 };
 
-static void make_system(const struct kind *kind, struct dice *d, unsigned b, unsigned c)
+static void make_system(const struct system_kind *kind, struct dice *d, unsigned b, unsigned c)
 {
-	switch (kind->make) {
+	switch (kind->recipe) {
 	case RANDOM:
 	case SCALED:
 		random_system(d, b, c, 1);
@@ -126,35 +126,35 @@ static void make_system(const struct kind *kind, struct dice *d, unsigned b, uns
 		random_system(d, b, c, 1e-3);
 		break;
 	case FIRST_SINGULAR:
-		first_block_singular(d, b, c);
+		make_first_block_singular(d, b, c);
 		break;
 	case FOCUS:
 	case SCALED_FOCUS:
-		focus(d, b, c);
+		make_focus(d, b, c);
 		break;
 	}
-	if (kind->make == SCALED || kind->make == SCALED_FOCUS)
-		rescale(d, b, c, 8);
+	if (kind->recipe == SCALED || kind->recipe == SCALED_FOCUS)
+		rescale_randomly(d, b, c, 8);
 }
 
-struct worst {
+struct max_errors {
 	double ratio, error, bound;
 };
 
-static void note(struct worst *w, double error, double condition)
+static void note_error(struct max_errors *w, double error, double condition)
 {
-	double bound = fmax(1e-12, 100 * rounding * condition);
+	double bound = fmax(1e-12, 100 * solver_rounding * condition);
 	/* In float, the error bound can exceed the first-order analysis; then nothing can be tested. */
 	if (solver == &constraint_single && bound > 0.1)
 		return;
 	if (!(error / bound <= w->ratio))
-		*w = (struct worst){error / bound, error, bound};
+		*w = (struct max_errors){error / bound, error, bound};
 }
 
 /* Compares each unknown relative to itself, with the condition for errors of the size of the entries. */
-static void compare_solution(const vec2 *dh, const vec2 *dx, unsigned c, struct worst *w)
+static void compare_solution(const vec2 *dh, const vec2 *dx, unsigned c, struct max_errors *w)
 {
-	long double x[DENSE_MOST] = {0};
+	long double x[DENSE_SIZE_MAX] = {0};
 	for (unsigned r = 0; r < dense.n; r++)
 		for (unsigned i = 0; i < dense.n; i++)
 			x[r] += dense.inverse[r][i] * (long double)(i & 1 ? dh[c + 1 + i / 2].y : dh[c + 1 + i / 2].x);
@@ -162,14 +162,14 @@ static void compare_solution(const vec2 *dh, const vec2 *dx, unsigned c, struct 
 		long double bound = 0;
 		for (unsigned i = 0; i < dense.n; i++)
 			for (unsigned j = 0; j < dense.n; j++)
-				bound += fabsl(dense.inverse[r][i]) * dense.size[i][j] * fabsl(x[j]);
+				bound += fabsl(dense.inverse[r][i]) * dense.scale[i][j] * fabsl(x[j]);
 		double actual = r & 1 ? dx[c + 1 + r / 2].y : dx[c + 1 + r / 2].x;
-		note(w, (double)(fabsl(x[r] - (long double)actual) / fabsl(x[r])), (double)(bound / fabsl(x[r])));
+		note_error(w, (double)(fabsl(x[r] - (long double)actual) / fabsl(x[r])), (double)(bound / fabsl(x[r])));
 	}
 }
 
 /* D_j is a block of the inverse: compared entry by entry in the same way. */
-static void compare_differentials(const mat2 *dj, unsigned b, unsigned c, struct worst *w)
+static void compare_differentials(const mat2 *dj, unsigned b, unsigned c, struct max_errors *w)
 {
 	unsigned row = dense.n - 2;
 	for (unsigned j = c + 1; j < b; j++) {
@@ -179,11 +179,11 @@ static void compare_differentials(const mat2 *dj, unsigned b, unsigned c, struct
 			long double bound = 0;
 			for (unsigned p = 0; p < dense.n; p++)
 				for (unsigned q = 0; q < dense.n; q++)
-					bound += fabsl(dense.inverse[r][p]) * dense.size[p][q] *
+					bound += fabsl(dense.inverse[r][p]) * dense.scale[p][q] *
 						 fabsl(dense.inverse[q][s]);
 			long double expected = dense.inverse[r][s];
-			note(w, (double)(fabsl(expected - (long double)actual[i]) / fabsl(expected)),
-			     (double)(bound / fabsl(expected)));
+			note_error(w, (double)(fabsl(expected - (long double)actual[i]) / fabsl(expected)),
+				   (double)(bound / fabsl(expected)));
 		}
 	}
 }
@@ -204,13 +204,13 @@ static double long_log_transfer(unsigned b, unsigned c, double *condition)
 }
 
 /* Returns whether the system was pivoted; counts in *refused the systems that are singular in float. */
-static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct worst *w, size_t *refused)
+static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct max_errors *w, size_t *refused)
 {
 	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
 	mat2 dj[FULL_PATH_VERTICES_MAX];
 	dense_fill(&dense, k, b, c);
 	assert_true(dense_invert(&dense));
-	enum constraint_result end = solver->factor(k, b, c, &system_);
+	enum constraint_result end = solver->factor(k, b, c, &tested_system);
 	if (solver == &constraint_single && end != CONSTRAINT_OK) {
 		++*refused;
 		return 0;
@@ -218,22 +218,23 @@ static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct wo
 	assert_int_equal(end, CONSTRAINT_OK);
 	for (unsigned j = c + 1; j < b; j++)
 		dh[j] = (vec2){dice_between(d, -1, 1), dice_between(d, -1, 1)};
-	solver->solve(k, &system_, dh, dx);
+	solver->solve(k, &tested_system, dh, dx);
 	compare_solution(dh, dx, c, w);
 	double condition, t = long_log_transfer(b, c, &condition);
-	note(w, fabs(system_.log_det - (double)dense.log_det), dense_det_condition(&dense) + fabs(system_.log_det));
-	note(w, fabs(system_.log_transfer - t), condition + fabs(system_.log_det) + fabs(t));
+	note_error(w, fabs(tested_system.log_det - (double)dense.log_det),
+		   dense_det_condition(&dense) + fabs(tested_system.log_det));
+	note_error(w, fabs(tested_system.log_transfer - t), condition + fabs(tested_system.log_det) + fabs(t));
 	end = solver->differentials(k, b, c, dj);
 	if (solver == &constraint_single && end != CONSTRAINT_OK) {
 		++*refused;
-		return system_.is_pivoted;
+		return tested_system.is_pivoted;
 	}
 	assert_int_equal(end, CONSTRAINT_OK);
 	compare_differentials(dj, b, c, w);
-	return system_.is_pivoted;
+	return tested_system.is_pivoted;
 }
 
-static bool row(const char *name, const struct worst *w)
+static bool print_row(const char *name, const struct max_errors *w)
 {
 	bool ok = w->ratio <= 1;
 	if (getenv("HSLT_TEST_ROWS") || !ok)
@@ -243,79 +244,80 @@ static bool row(const char *name, const struct worst *w)
 
 static void compare_all(void)
 {
-	bool good = true;
+	bool all_passed = true;
 	for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
 		struct dice d = dice_for_test(kinds[i].name);
-		struct worst w = {0, 0, 0};
-		size_t pivoted = 0, refused = 0, count = dice_scaled_count(kinds[i].most > 12 ? 10 : 300);
+		struct max_errors w = {0, 0, 0};
+		size_t pivoted = 0, refused = 0, count = dice_scaled_count(kinds[i].max_vertices > 12 ? 10 : 300);
 		for (size_t s = 0; s < count; s++) {
-			unsigned inside = kinds[i].least + dice_below(&d, kinds[i].most - kinds[i].least + 1);
-			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_VERTICES_MAX - 1 - inside)),
-				 b = c + inside + 1;
+			unsigned vertex_count = kinds[i].min_vertices +
+						dice_below(&d, kinds[i].max_vertices - kinds[i].min_vertices + 1);
+			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_VERTICES_MAX - 1 - vertex_count)),
+				 b = c + vertex_count + 1;
 			make_system(&kinds[i], &d, b, c);
 			pivoted += compare_system(&d, b, c, &w, &refused);
 		}
-		good = row(kinds[i].name, &w) && good;
+		all_passed = print_row(kinds[i].name, &w) && all_passed;
 		print_message("%s: %.2g of the bound, %zu of %zu with pivots, %zu refused\n", kinds[i].name, w.ratio,
 			      pivoted, count, refused);
 		assert_true(refused <= count / 10 && w.ratio > 1e-4);
 		if (solver == &constraint_single)
 			continue;
-		if (kinds[i].make == FIRST_SINGULAR || kinds[i].make == FOCUS || kinds[i].make == SCALED_FOCUS)
+		if (kinds[i].recipe == FIRST_SINGULAR || kinds[i].recipe == FOCUS || kinds[i].recipe == SCALED_FOCUS)
 			assert_int_equal(pivoted, count);
-		else if (kinds[i].make == RANDOM && kinds[i].most <= 6)
+		else if (kinds[i].recipe == RANDOM && kinds[i].max_vertices <= 6)
 			assert_true(pivoted < count / 3 + 1);
 	}
-	assert_true(good);
+	assert_true(all_passed);
 }
 
-static void test_dense(void **state)
+static void solver_agrees_with_dense_elimination(void **state)
 {
 	(void)state;
 	compare_all();
 }
 
-static void test_dense_in_float(void **state)
+static void float_solver_agrees_with_dense_elimination(void **state)
 {
 	(void)state;
 	solver = &constraint_single;
-	rounding = 0x1p-24;
+	solver_rounding = 0x1p-24;
 	compare_all();
 	solver = &constraint_double;
-	rounding = 0x1p-53;
+	solver_rounding = 0x1p-53;
 }
 
-static void test_singular(void **state)
+static void singular_systems_are_refused(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("singular systems");
 	size_t count = dice_scaled_count(2000);
 	mat2 dj[FULL_PATH_VERTICES_MAX];
 	for (size_t s = 0; s < count; s++) {
-		unsigned inside = 1 + dice_below(&d, 8), c = dice_below(&d, 4), b = c + inside + 1;
-		singular(&d, b, c);
+		unsigned vertex_count = 1 + dice_below(&d, 8), c = dice_below(&d, 4), b = c + vertex_count + 1;
+		make_singular(&d, b, c);
 		if (s & 1)
-			rescale(&d, b, c, 8);
-		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_SINGULAR);
+			rescale_randomly(&d, b, c, 8);
+		assert_int_equal(constraint_double.factor(k, b, c, &tested_system), CONSTRAINT_SINGULAR);
 		assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
 		/* A slightly perturbed system is not singular. */
 		for (unsigned j = c + 1; j < b; j++)
 			k[j].b = (mat2){k[j].b.xx * (1 + 1e-6 * dice_uniform(&d)),
 					k[j].b.xy * (1 - 1e-6 * dice_uniform(&d)), k[j].b.yx,
 					k[j].b.yy * (1 - 1e-6 * dice_uniform(&d))};
-		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_OK);
+		assert_int_equal(constraint_double.factor(k, b, c, &tested_system), CONSTRAINT_OK);
 	}
 }
 
 /* Entries of any size, some of them equal: no operation is invalid, and accepted results are finite. */
-static void extremes_of(const struct constraint_solver *solver_, const double *values)
+static void check_extremes(const struct constraint_solver *solver_, const double *values)
 {
 	struct dice d = dice_for_test("extreme systems");
 	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
 	mat2 dj[FULL_PATH_VERTICES_MAX];
 	size_t refused = 0, count = dice_scaled_count(20000);
 	for (size_t s = 0; s < count; s++) {
-		unsigned inside = 1 + dice_below(&d, s % 50 ? 6 : 31), b = inside + 1, few = s % 2 ? 12 : 9;
+		unsigned vertex_count = 1 + dice_below(&d, s % 50 ? 6 : 31), b = vertex_count + 1, few = s % 2 ? 12 : 9;
 		for (unsigned j = 1; j < b; j++) {
 			double *entry = &k[j].a.xx;
 			for (int q = 0; q < 12; q++)
@@ -323,11 +325,11 @@ static void extremes_of(const struct constraint_solver *solver_, const double *v
 			dh[j] = (vec2){1, -0.5};
 		}
 		feclearexcept(FE_INVALID);
-		bool ok = solver_->factor(k, b, 0, &system_) == CONSTRAINT_OK;
+		bool ok = solver_->factor(k, b, 0, &tested_system) == CONSTRAINT_OK;
 		refused += !ok;
 		if (ok) {
-			solver_->solve(k, &system_, dh, dx);
-			assert_true(isfinite(system_.log_det) && !isnan(system_.log_transfer));
+			solver_->solve(k, &tested_system, dh, dx);
+			assert_true(isfinite(tested_system.log_det) && !isnan(tested_system.log_transfer));
 			for (unsigned j = 1; j < b; j++)
 				if (solver_ == &constraint_single)
 					assert_true(!isnan(dx[j].x + fabs(dx[j].y)));
@@ -343,50 +345,50 @@ static void extremes_of(const struct constraint_solver *solver_, const double *v
 	assert_true(refused > count / 10 && refused < count);
 }
 
-static void test_extremes(void **state)
+static void extreme_entries_give_finite_results_or_refusals(void **state)
 {
 	(void)state;
 	const double values[] = {0, 1e-310, 1e-200, 1e-69, 1e-20, 1, 1, 1, 1e20, 1e69, 1e200, INFINITY};
 	const double in_float[] = {0, 1e-40, 1e-16, 1e-14, 1e-7, 1, 1, 1, 1e6, 1e11, 1e13, INFINITY};
-	extremes_of(&constraint_double, values);
-	extremes_of(&constraint_single, values);
-	extremes_of(&constraint_single, in_float);
+	check_extremes(&constraint_double, values);
+	check_extremes(&constraint_single, values);
+	check_extremes(&constraint_single, in_float);
 }
 
 /* Decisions and results do not depend on the units: scaling by a power of two does not change the choice of pivots or
  * the transfer. */
-static void test_units(void **state)
+static void scaling_by_powers_of_two_changes_nothing(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("units of the system");
 	for (size_t s = 0; s < dice_scaled_count(500); s++) {
 		unsigned b = 2 + dice_below(&d, 6);
-		struct dice same = d;
+		struct dice dice_copy = d;
 		random_system(&d, b, 0, 1);
-		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
-		bool pivoted = system_.is_pivoted;
-		double transfer = system_.log_transfer;
-		random_system(&same, b, 0, 1);
+		assert_int_equal(constraint_double.factor(k, b, 0, &tested_system), CONSTRAINT_OK);
+		bool pivoted = tested_system.is_pivoted;
+		double transfer = tested_system.log_transfer;
+		random_system(&dice_copy, b, 0, 1);
 		for (unsigned j = 1; j < b; j++) {
 			k[j].a = mat2_scale(0x1p-60, k[j].a);
 			k[j].b = mat2_scale(0x1p-60, k[j].b);
 			k[j].c = mat2_scale(0x1p-60, k[j].c);
 		}
-		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
-		assert_int_equal(system_.is_pivoted, pivoted);
-		assert_true(fabs(system_.log_transfer - transfer) < 1e-11 * (1 + b * 85));
+		assert_int_equal(constraint_double.factor(k, b, 0, &tested_system), CONSTRAINT_OK);
+		assert_int_equal(tested_system.is_pivoted, pivoted);
+		assert_true(fabs(tested_system.log_transfer - transfer) < 1e-11 * (1 + b * 85));
 	}
 }
 
 /* Computes the half vectors of a chain of triangles whose vertices were moved by `offset`. */
-static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2],
-			 unsigned edges, quad h[][2])
+static void compute_chain_half_vectors(const struct quad_vertex *v, const struct quad_problem *q,
+				       const quad offset[][2], unsigned edges, quad h[][2])
 {
-	struct quad_place p[FULL_PATH_VERTICES_MAX];
+	struct quad_point_frame p[FULL_PATH_VERTICES_MAX];
 	for (unsigned j = 0; j <= edges; j++)
-		p[j] = quad_at(&v[j], offset[j][0], offset[j][1]);
+		p[j] = quad_moved_frame(&v[j], offset[j][0], offset[j][1]);
 	for (unsigned j = 1; j < edges; j++)
-		quad_half(&q[j], &p[j - 1], h[j]);
+		quad_half_vector(&q[j], &p[j - 1], h[j]);
 }
 
 /* Newton's iteration with a constant matrix: so close to the solution it gains ten digits per iteration. */
@@ -396,7 +398,7 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 	quad h[FULL_PATH_VERTICES_MAX][2];
 	vec2 dh[FULL_PATH_VERTICES_MAX], dx[FULL_PATH_VERTICES_MAX];
 	for (int turn = 0; turn < 6; turn++) {
-		chain_halves(v, q, (const quad(*)[2])offset, edges, h);
+		compute_chain_half_vectors(v, q, (const quad(*)[2])offset, edges, h);
 		double scale = 0;
 		for (unsigned j = 1; j < edges; j++)
 			for (int i = 0; i < 2; i++)
@@ -406,7 +408,7 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 		for (unsigned j = 1; j < edges; j++)
 			dh[j] = (vec2){(double)((target[j][0] - h[j][0]) / (quad)scale),
 				       (double)((target[j][1] - h[j][1]) / (quad)scale)};
-		constraint_double.solve(k, &system_, dh, dx);
+		constraint_double.solve(k, &tested_system, dh, dx);
 		for (unsigned j = 1; j < edges; j++) {
 			offset[j][0] += (quad)scale * (quad)dx[j].x;
 			offset[j][1] += (quad)scale * (quad)dx[j].y;
@@ -416,7 +418,7 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 
 /* Returns the derivative of x_{b-1} (b: the camera's end) with respect to coordinate i of the end x_0 (what = 0) or
  * of h_what. */
-static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
+static vec2 derivative_by_quad(const struct hand *h, unsigned what, int i)
 {
 	unsigned edges = h->x.edges;
 	struct quad_vertex v[FULL_PATH_VERTICES_MAX];
@@ -425,10 +427,10 @@ static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 	const quad still[FULL_PATH_VERTICES_MAX][2] = {{0, 0}};
 	const double step = 1e-13;
 	for (unsigned j = 0; j <= edges; j++)
-		v[j] = quad_of_surface(h, j);
+		v[j] = quad_vertex_from_surface(h, j);
 	for (unsigned j = 1; j < edges; j++)
-		q[j] = quad_problem_of(h, j);
-	chain_halves(v, q, still, edges, base);
+		q[j] = quad_problem_from_hand(h, j);
+	compute_chain_half_vectors(v, q, still, edges, base);
 	for (int side = 0; side < 2; side++) {
 		quad offset[FULL_PATH_VERTICES_MAX][2] = {{0, 0}}, target[FULL_PATH_VERTICES_MAX][2],
 		     move = side ? -step : step;
@@ -447,7 +449,7 @@ static vec2 change_by_quad(const struct hand *h, unsigned what, int i)
 
 /* The differences are exact to 1e-20, and the condition of the paths is below 1e4: the tolerance is 100 eps times
  * this condition. */
-static void test_solved_again(void **state)
+static void derivatives_agree_with_paths_solved_again(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("paths solved again");
@@ -457,22 +459,22 @@ static void test_solved_again(void **state)
 	size_t pivoted = 0;
 	for (size_t made = 0; made < dice_scaled_count(100);) {
 		unsigned edges = 2 + dice_below(&d, 4);
-		if (!hand_chain(&h, edges, 0.2, &d))
+		if (!hand_make_chain(&h, edges, 0.2, &d))
 			continue;
 		constraints_compute(&h.w, &h.x, edges, 0, k);
-		if (constraint_double.factor(k, edges, 0, &system_) != CONSTRAINT_OK)
+		if (constraint_double.factor(k, edges, 0, &tested_system) != CONSTRAINT_OK)
 			continue;
 		dense_fill(&dense, k, edges, 0);
 		assert_true(dense_invert(&dense));
 		if (dense_det_condition(&dense) > 1e4)
 			continue;
 		made++;
-		pivoted += system_.is_pivoted;
-		mat2 t = mat2_of_columns(change_by_quad(&h, 0, 0), change_by_quad(&h, 0, 1));
-		worst_transfer = fmax(worst_transfer, fabs(log(fabs(mat2_det(t))) - system_.log_transfer));
+		pivoted += tested_system.is_pivoted;
+		mat2 t = mat2_of_columns(derivative_by_quad(&h, 0, 0), derivative_by_quad(&h, 0, 1));
+		worst_transfer = fmax(worst_transfer, fabs(log(fabs(mat2_det(t))) - tested_system.log_transfer));
 		assert_int_equal(constraint_double.differentials(k, edges, 0, dj), CONSTRAINT_OK);
 		for (unsigned j = 1; j < edges; j++) {
-			mat2 e = mat2_of_columns(change_by_quad(&h, j, 0), change_by_quad(&h, j, 1));
+			mat2 e = mat2_of_columns(derivative_by_quad(&h, j, 0), derivative_by_quad(&h, j, 1));
 			worst_differential =
 				fmax(worst_differential, mat2_largest(mat2_sub(e, dj[j])) / mat2_largest(e));
 		}
@@ -485,9 +487,12 @@ static void test_solved_again(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_dense),	 cmocka_unit_test(test_dense_in_float),
-		cmocka_unit_test(test_singular), cmocka_unit_test(test_extremes),
-		cmocka_unit_test(test_units),	 cmocka_unit_test(test_solved_again),
+		cmocka_unit_test(solver_agrees_with_dense_elimination),
+		cmocka_unit_test(float_solver_agrees_with_dense_elimination),
+		cmocka_unit_test(singular_systems_are_refused),
+		cmocka_unit_test(extreme_entries_give_finite_results_or_refusals),
+		cmocka_unit_test(scaling_by_powers_of_two_changes_nothing),
+		cmocka_unit_test(derivatives_agree_with_paths_solved_again),
 	};
 	return cmocka_run_group_tests_name("system", tests, NULL, NULL);
 }

@@ -29,7 +29,7 @@ typedef struct {
 	long double x, y, z;
 } wide;
 
-static wide widen(vec3 v)
+static wide vec3_to_wide(vec3 v)
 {
 	return (wide){(long double)v.x, (long double)v.y, (long double)v.z};
 }
@@ -55,32 +55,35 @@ static wide wide_cross(wide a, wide b)
 }
 
 /* Returns a point of the shape in world space; only instances have a transform. */
-static wide placed(const struct geom_shape *g, wide p)
+static wide wide_in_world(const struct geom_shape *g, wide p)
 {
 	const struct placement *m = g->placement;
-	return m ? wide_add(wide_add(wide_add(widen(m->origin), p.x, widen(m->x)), p.y, widen(m->y)), p.z, widen(m->z))
+	return m ? wide_add(wide_add(wide_add(vec3_to_wide(m->origin), p.x, vec3_to_wide(m->x)), p.y,
+				     vec3_to_wide(m->y)),
+			    p.z, vec3_to_wide(m->z))
 		 : p;
 }
 
 /* Transforms a normal by cofactors, without inverting the matrix. */
-static wide placed_normal(const struct geom_shape *g, wide n)
+static wide wide_normal_in_world(const struct geom_shape *g, wide n)
 {
 	const struct placement *m = g->placement;
 	if (!m)
 		return n;
-	wide x = widen(m->x), y = widen(m->y), z = widen(m->z), a = wide_cross(y, z), zero = {0, 0, 0};
+	wide x = vec3_to_wide(m->x), y = vec3_to_wide(m->y), z = vec3_to_wide(m->z), a = wide_cross(y, z),
+	     zero = {0, 0, 0};
 	wide r = wide_add(wide_add(wide_add(zero, n.x, a), n.y, wide_cross(z, x)), n.z, wide_cross(x, y));
 	return wide_unit(wide_dot(a, x) < 0 ? wide_add(zero, -1, r) : r);
 }
 
 /* Computes the position, shading normal and first tangent of a vertex from its shape, with the vertex's own
  * coordinates on the primitive. */
-static void shape_says(const struct world *w, const struct path_vertex *v, wide *p, wide *n, wide *s)
+static void evaluate_shape(const struct world *w, const struct path_vertex *v, wide *p, wide *n, wide *s)
 {
 	const struct geom_shape *g = &w->shapes[v->x.prim.shape];
 	if (g->is_sphere) {
-		wide out = wide_unit(wide_add(widen(v->x.p), -1, widen(g->center)));
-		*p = wide_add(widen(g->center), (long double)g->radius, out);
+		wide out = wide_unit(wide_add(vec3_to_wide(v->x.p), -1, vec3_to_wide(g->center)));
+		*p = wide_add(vec3_to_wide(g->center), (long double)g->radius, out);
 		*n = wide_add((wide){0, 0, 0}, (long double)g->normal_sign, out);
 	} else {
 		const uint32_t *i = g->index[v->x.prim.prim];
@@ -91,41 +94,41 @@ static void shape_says(const struct world *w, const struct path_vertex *v, wide 
 		*p = m;
 		for (int k = 0; k < 3; k++) {
 			const float *at = g->position[i[k]];
-			q[k] = placed(g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]});
+			q[k] = wide_in_world(g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]});
 			*p = wide_add(*p, b[k], q[k]);
 		}
 		wide flat = wide_unit(wide_cross(wide_add(q[1], -1, q[0]), wide_add(q[2], -1, q[0])));
 		for (int k = 0; k < 3 && g->normal; k++) {
 			const float *at = g->normal[i[k]];
-			m = wide_add(
-				m, b[k],
-				placed_normal(g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]}));
+			m = wide_add(m, b[k],
+				     wide_normal_in_world(
+					     g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]}));
 		}
 		*n = wide_dot(m, flat) > 0 ? wide_unit(m) : flat;
 	}
-	wide d = widen(v->x.axis);
+	wide d = vec3_to_wide(v->x.axis);
 	d = wide_add(d, -wide_dot(d, *n), *n);
-	*s = wide_dot(d, d) > 0 ? wide_unit(d) : widen(v->x.sh.s);
+	*s = wide_dot(d, d) > 0 ? wide_unit(d) : vec3_to_wide(v->x.sh.s);
 }
 
-static wide direction(const struct path_vertex *a, const struct path_vertex *b)
+static wide wide_direction(const struct path_vertex *a, const struct path_vertex *b)
 {
 	if (b->kind == VERTEX_INFINITE)
-		return widen(b->x.p);
-	return wide_unit(wide_add(widen(b->x.p), -1, widen(a->x.p)));
+		return vec3_to_wide(b->x.p);
+	return wide_unit(wide_add(vec3_to_wide(b->x.p), -1, vec3_to_wide(a->x.p)));
 }
 
 /* Computes the half vector at vertex j; fails unless the vertex lies on its shape and scatters in its mode. */
-static void measure(const struct world *w, const struct full_path *y, unsigned j, long double h[2])
+static void measure_half_vector(const struct world *w, const struct full_path *y, unsigned j, long double h[2])
 {
 	const struct path_vertex *v = &y->v[j];
-	wide p, n, s, i = direction(v, &y->v[j - 1]), o = direction(v, &y->v[j + 1]);
-	shape_says(w, v, &p, &n, &s);
-	wide off = wide_add(p, -1, widen(v->x.p));
-	assert_true(sqrtl(wide_dot(off, off)) < 1e-14L);
+	wide p, n, s, i = wide_direction(v, &y->v[j - 1]), o = wide_direction(v, &y->v[j + 1]);
+	evaluate_shape(w, v, &p, &n, &s);
+	wide deviation = wide_add(p, -1, vec3_to_wide(v->x.p));
+	assert_true(sqrtl(wide_dot(deviation, deviation)) < 1e-14L);
 	long double ni = wide_dot(i, n), no = wide_dot(o, n), eta = 1;
 	assert_true((ni * no > 0) == !(v->mode & BSDF_TRANSMIT));
-	assert_true(ni * wide_dot(i, widen(v->x.ng)) > 0 && no * wide_dot(o, widen(v->x.ng)) > 0);
+	assert_true(ni * wide_dot(i, vec3_to_wide(v->x.ng)) > 0 && no * wide_dot(o, vec3_to_wide(v->x.ng)) > 0);
 	bool matched = false;
 	if (v->mode & BSDF_TRANSMIT) {
 		eta = (long double)bsdf_eta(v->bsdf, &y->wl);
@@ -138,18 +141,20 @@ static void measure(const struct world *w, const struct full_path *y, unsigned j
 	h[1] = wide_dot(sum, wide_cross(n, s)) / below;
 }
 
-static struct ray_end end_of(const struct path_vertex *v)
+static struct ray_end make_ray_end(const struct path_vertex *v)
 {
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
 /* Results of a run over one world. */
 struct tally {
-	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
-	size_t stays, left, again, elsewhere; /* walks to where the path is; walks with half the tolerance */
+	size_t walks, arrived, returned_strictly, returned, ends[WALK_ITERATION_LIMIT + 1],
+		back_ends[WALK_ITERATION_LIMIT + 1];
+	size_t stays, stays_failed, repeats,
+		repeats_elsewhere; /* walks to where the path is; walks with half the tolerance */
 	uint64_t iterations, rays, occluded, seams;
-	double worst;	   /* residual in tolerances */
-	double worst_stay; /* largest move of a walk to the path's own half vectors */
+	double max_residual;	  /* residual in tolerances */
+	double max_stay_distance; /* largest move of a walk to the path's own half vectors */
 };
 
 static struct path_context context_of(const struct world *w, uint64_t *counters)
@@ -192,24 +197,24 @@ static void move_end(struct path_context *c, struct dice *d, struct full_path *y
 {
 	if (b == y->edges)
 		return;
-	struct path_vertex *at = &y->v[b];
+	struct path_vertex *end_vertex = &y->v[b];
 	const struct path_vertex *from = &y->v[b + 1];
-	vec3 w = vec3_normalize(vec3_sub(at->x.p, from->x.p));
+	vec3 w = vec3_normalize(vec3_sub(end_vertex->x.p, from->x.p));
 	w = vec3_normalize(vec3_madd(w, 0.005 * gauss(d), dice_direction(d)));
-	struct ray_end start = end_of(from);
+	struct ray_end start = make_ray_end(from);
 	struct ray_hit hit;
 	if (!accel_closest(c->w->accel, &start, w, 0, INFINITY, &hit))
 		return;
-	if (&c->w->bsdfs[c->w->shape_bindings[hit.prim.shape].bsdf] != at->bsdf)
+	if (&c->w->bsdfs[c->w->shape_bindings[hit.prim.shape].bsdf] != end_vertex->bsdf)
 		return;
-	surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, w, &hit, &at->x);
+	surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, w, &hit, &end_vertex->x);
 }
 
 /* Returns a step like those of mutations: the width of the lobe, or the step that moves the vertex by about one
  * hundredth of its distance. */
-static double step_of(const struct full_path *x, const struct constraint *k, unsigned j)
+static double halfvec_step_size(const struct full_path *x, const struct constraint *k, unsigned j)
 {
-	if (x->v[j].delta)
+	if (x->v[j].is_delta)
 		return 0;
 	double alpha = fmin(x->v[j].bsdf->min_alpha, 1), reach = 0.01 * sqrt(x->edge[j].distance2);
 	return fmin(alpha / sqrt(M_PI), reach * sqrt(mat2_norm2(k[j].b)));
@@ -220,13 +225,13 @@ static void check_residuals(const struct world *w, const struct full_path *y, un
 {
 	for (unsigned j = end + 1; j < b; j++) {
 		long double h[2];
-		measure(w, y, j, h);
-		double off = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
+		measure_half_vector(w, y, j, h);
+		double deviation = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
 		/* Next to an index of 1 the directions nearly cancel; a walk cannot see the digits that double loses.
 		 */
 		vec3 half = vec3_sub(vec3_scale(full_path_eta(y, j), y->edge[j].w), y->edge[j - 1].w);
 		double rounding = 0x1p-52 / fabs(vec3_dot(half, y->v[j].x.sh.n));
-		t->worst = fmax(t->worst, (off - rounding) / (scale * target[j].tolerance));
+		t->max_residual = fmax(t->max_residual, (deviation - rounding) / (scale * target[j].tolerance));
 	}
 }
 
@@ -249,7 +254,7 @@ static void check_arrival(struct path_context *c, const struct full_path *x, str
 	}
 }
 
-static struct walk_scratch s;
+static struct walk_scratch scratch;
 static struct accuracy_settings accuracy;
 
 /* Walks back from y to x: to x_b and the half vectors of x. */
@@ -260,11 +265,11 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 	z = *y;
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
-		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
+		target[j].h = x->v[j].is_delta ? (vec2){0, 0} : k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	enum walk_result back = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE_ALL, &s);
-	t->back_ends[back]++;
-	if (back != WALK_OK)
+	enum walk_result reverse_result = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE_ALL, &scratch);
+	t->back_ends[reverse_result]++;
+	if (reverse_result != WALK_OK)
 		return;
 	double moved = 0, off = 0;
 	bool each = true;
@@ -276,21 +281,21 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 		each = each && o <= 1e-3 * m;
 	}
 	t->returned += off <= 1e-3 * moved;
-	t->strict += each;
+	t->returned_strictly += each;
 }
 
 /* Returns the largest distance between corresponding inner vertices. */
 static double largest_distance(const struct full_path *x, const struct full_path *y, unsigned b, unsigned end)
 {
-	double most = 0;
+	double max_distance = 0;
 	for (unsigned j = end + 1; j < b; j++)
-		most = fmax(most, vec3_length(vec3_sub(x->v[j].x.p, y->v[j].x.p)));
-	return most;
+		max_distance = fmax(max_distance, vec3_length(vec3_sub(x->v[j].x.p, y->v[j].x.p)));
+	return max_distance;
 }
 
 /* Walks to the path's own half vectors: one iteration, which moves the path by rounding alone. */
-static void walk_nowhere(struct path_context *c, const struct full_path *x, unsigned b, unsigned end,
-			 struct walk_target *target, const struct constraint *k, struct tally *t)
+static void walk_in_place(struct path_context *c, const struct full_path *x, unsigned b, unsigned end,
+			  struct walk_target *target, const struct constraint *k, struct tally *t)
 {
 	static struct full_path y;
 	y = *x;
@@ -298,25 +303,26 @@ static void walk_nowhere(struct path_context *c, const struct full_path *x, unsi
 		target[j].h = k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	t->stays++;
-	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &s) != WALK_OK || s.iterations != 1)
-		t->left++;
+	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &scratch) != WALK_OK ||
+	    scratch.iterations != 1)
+		t->stays_failed++;
 	else
-		t->worst_stay = fmax(t->worst_stay, largest_distance(x, &y, b, end));
+		t->max_stay_distance = fmax(t->max_stay_distance, largest_distance(x, &y, b, end));
 }
 
 /* Walks from the same start with half the tolerance: to the same position y within what the whole tolerance
  * determines. */
-static void walk_again(struct path_context *c, const struct full_path *start, const struct full_path *y, unsigned b,
-		       unsigned end, const struct walk_target *target, struct tally *t)
+static void walk_with_half_tolerance(struct path_context *c, const struct full_path *start, const struct full_path *y,
+				     unsigned b, unsigned end, const struct walk_target *target, struct tally *t)
 {
 	static struct full_path z;
 	z = *start;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.tolerance_scale = 0.5;
-	t->again++;
-	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE_ALL, &s) != WALK_OK ||
+	t->repeats++;
+	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE_ALL, &scratch) != WALK_OK ||
 	    largest_distance(&z, y, b, end) > 0.01 * largest_distance(start, y, b, end))
-		t->elsewhere++;
+		t->repeats_elsewhere++;
 	else
 		check_residuals(c->w, &z, b, end, target, limits.tolerance_scale, t);
 }
@@ -331,11 +337,11 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	constraints_compute(c->w, x, b, end, k);
 	double all = 0;
 	for (unsigned j = end + 1; j < b; j++) {
-		double step = step_of(x, k, j);
+		double step = halfvec_step_size(x, k, j);
 		all += step;
-		target[j].h =
-			x->v[j].delta ? (vec2){0, 0} : (vec2){k[j].h.x + step * gauss(d), k[j].h.y + step * gauss(d)};
-		target[j].tolerance = x->v[j].delta ? 1e-9 : 1e-3 * fmin(step, x->v[j].bsdf->min_alpha);
+		target[j].h = x->v[j].is_delta ? (vec2){0, 0}
+					       : (vec2){k[j].h.x + step * gauss(d), k[j].h.y + step * gauss(d)};
+		target[j].tolerance = x->v[j].is_delta ? 1e-9 : 1e-3 * fmin(step, x->v[j].bsdf->min_alpha);
 	}
 	if (b < x->edges)
 		move_end(c, d, &y, b);
@@ -344,12 +350,12 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	uint64_t before = batch_ray_count(c->counters);
-	enum walk_result e = halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &s);
-	t->rays += batch_ray_count(c->counters) - before;
+	uint64_t rays_before = batch_ray_count(c->counters);
+	enum walk_result e = halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE_ALL, &scratch);
+	t->rays += batch_ray_count(c->counters) - rays_before;
 	t->walks++;
 	t->ends[e]++;
-	t->iterations += s.iterations;
+	t->iterations += scratch.iterations;
 	if (e != WALK_OK)
 		return;
 	t->arrived++;
@@ -358,11 +364,11 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	check_arrival(c, x, &y, b, end, target, limits.tolerance_scale, t);
 	for (unsigned j = end + 1; j < b; j++) { /* the caller gets the constraints at the new path */
 		vec2 h = halfvec_of(&y, j);
-		assert_memory_equal(&h, &s.k[j].h, sizeof h);
+		assert_memory_equal(&h, &scratch.k[j].h, sizeof h);
 	}
-	walk_again(c, &start, &y, b, end, target, t);
+	walk_with_half_tolerance(c, &start, &y, b, end, target, t);
 	walk_back(c, x, &y, b, end, target, k, t);
-	walk_nowhere(c, x, b, end, target, k, t);
+	walk_in_place(c, x, b, end, target, k, t);
 }
 
 /* Prints a row in the format of make test-numerics: topic, case, measured, required, verdict. */
@@ -376,11 +382,11 @@ static void print_row(const char *name, const struct tally *t, double arrive, do
 	       "%.2f rays; worst residual %.3f tolerances; from where it is %zu of %zu leave, by %.1e at most; by half "
 	       "the tolerance %zu of %zu come elsewhere; missed %zu, blocked %zu, mode %zu, singular %zu, "
 	       "diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams %llu\t%.1f %%, %.1f %%, 1.01\tok\n",
-	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok,
-	       (double)t->iterations / n, (double)t->rays / n, t->worst, t->left, t->stays, t->worst_stay, t->elsewhere,
-	       t->again, t->ends[1], t->ends[2], t->ends[3], t->ends[4], t->ends[5], t->ends[6], t->back_ends[1],
-	       t->back_ends[2], t->back_ends[3], t->back_ends[4], t->back_ends[5], t->back_ends[6],
-	       (unsigned long long)t->seams, 100 * arrive, 100 * come_back);
+	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->returned_strictly / ok,
+	       (double)t->iterations / n, (double)t->rays / n, t->max_residual, t->stays_failed, t->stays,
+	       t->max_stay_distance, t->repeats_elsewhere, t->repeats, t->ends[1], t->ends[2], t->ends[3], t->ends[4],
+	       t->ends[5], t->ends[6], t->back_ends[1], t->back_ends[2], t->back_ends[3], t->back_ends[4],
+	       t->back_ends[5], t->back_ends[6], (unsigned long long)t->seams, 100 * arrive, 100 * come_back);
 	fflush(stdout);
 }
 
@@ -393,7 +399,7 @@ static void check_rate(size_t hits, size_t of, double expected)
 	assert_true((double)hits > n * (expected - 0.003) - 5 * sqrt(n * expected * (1 - expected)));
 }
 
-static struct tally walk_in(const char *name, struct world *w, double arrive, double come_back)
+static struct tally run_walks(const char *name, struct world *w, double arrive, double come_back)
 {
 	static struct path_context c;
 	static struct full_path x;
@@ -407,10 +413,10 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 			walk_once(&c, &d, &x, &t);
 	fptrap_unwatch(watched);
 	world_free(w);
-	assert_true(t.worst <= 1.01);
+	assert_true(t.max_residual <= 1.01);
 	assert_int_equal(t.occluded, 0);
-	assert_true(t.left <= t.stays / 1000 && t.worst_stay < 1e-9);
-	assert_true(t.elsewhere <= t.again / 200);
+	assert_true(t.stays_failed <= t.stays / 1000 && t.max_stay_distance < 1e-9);
+	assert_true(t.repeats_elsewhere <= t.repeats / 200);
 	check_rate(t.arrived, t.walks, arrive);
 	check_rate(t.returned, t.arrived, come_back);
 	print_row(name, &t, arrive, come_back);
@@ -437,82 +443,82 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 #define GLASS(alpha) "<bsdf type='roughdielectric'><float name='alpha' value='" alpha "'/></bsdf>"
 #define SKY "<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
 
-static void test_spheres(void **state)
+static void walks_arrive_among_spheres(void **state)
 {
 	(void)state;
-	walk_in("spheres",
-		world_from_text(32, 32,
-				SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
-					BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))),
-		0.908, 0.999);
+	run_walks("spheres",
+		  world_from_text(32, 32,
+				  SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
+					  BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))),
+		  0.908, 0.999);
 }
 
-static void test_rough_glass(void **state)
+static void walks_arrive_in_rough_glass(void **state)
 {
 	(void)state;
-	walk_in("rough glass",
-		world_from_text(32, 32,
-				SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
-					BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")),
-		0.891, 0.996);
+	run_walks("rough glass",
+		  world_from_text(32, 32,
+				  SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
+					  BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")),
+		  0.891, 0.996);
 }
 
-static void test_smooth_glass(void **state)
+static void walks_arrive_in_smooth_glass(void **state)
 {
 	(void)state;
-	walk_in("smooth glass",
-		world_from_text(
-			32, 32,
-			SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-				BALL(".9", "-.5", "0",
-				     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
-					FLOOR(METAL(".1"))),
-		0.907, 0.998);
+	run_walks("smooth glass",
+		  world_from_text(
+			  32, 32,
+			  SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+				  BALL(".9", "-.5", "0",
+				       "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
+					  FLOOR(METAL(".1"))),
+		  0.907, 0.998);
 }
 
-static void test_sky(void **state)
+static void walks_arrive_under_a_sky(void **state)
 {
 	(void)state;
-	walk_in("sky",
-		world_from_text(32, 32,
-				SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-					BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))),
-		0.909, 0.993);
+	run_walks("sky",
+		  world_from_text(32, 32,
+				  SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+					  BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))),
+		  0.909, 0.993);
 }
 
 /* At smooth glass in a medium of nearly the same index, half vectors magnify the rounding of directions a million
  * times. */
-static void test_nearly_matched(void **state)
+static void walks_arrive_at_nearly_matched_indices(void **state)
 {
 	(void)state;
-	walk_in("nearly matched",
-		world_from_text(
-			32, 32,
-			SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL(
-				"-.3", "-.2", ".3",
-				"<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
-				"<float name='ext_ior' value='1'/></bsdf>")
-				BALL(".9", "-.5", "0",
-				     "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
-				     "<float name='ext_ior' value='1'/></bsdf>")
-					BALL("0", "-.5", "-1",
-					     "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
-					     "<float name='ext_ior' value='1'/></bsdf>") FLOOR(METAL(".1"))),
-		0.65, 0.983);
+	run_walks("nearly matched",
+		  world_from_text(
+			  32, 32,
+			  SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL(
+				  "-.3", "-.2", ".3",
+				  "<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
+				  "<float name='ext_ior' value='1'/></bsdf>")
+				  BALL(".9", "-.5", "0",
+				       "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
+				       "<float name='ext_ior' value='1'/></bsdf>")
+					  BALL("0", "-.5", "-1",
+					       "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
+					       "<float name='ext_ior' value='1'/></bsdf>") FLOOR(METAL(".1"))),
+		  0.65, 0.983);
 }
 
 /* A pole of each sphere faces the camera, which sees little else. */
-static void test_poles(void **state)
+static void walks_arrive_at_poles_of_spheres(void **state)
 {
 	(void)state;
-	walk_in("poles",
-		world_from_text(32, 32,
-				"<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
-				"<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
-				"<integer name='width' value='32'/><integer name='height' value='32'/>"
-				"<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
-					BALL("0", "0", "-2", METAL(".05"))),
-		0.839, 0.989);
+	run_walks("poles",
+		  world_from_text(32, 32,
+				  "<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
+				  "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+				  "<integer name='width' value='32'/><integer name='height' value='32'/>"
+				  "<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
+					  BALL("0", "0", "-2", METAL(".05"))),
+		  0.839, 0.989);
 }
 
 /* Bumps with interpolated normals, n x n squares over [-2,2]^2. */
@@ -545,13 +551,13 @@ static struct world *bumpy_world(int n, const char *bsdf, const char *instances)
 	return world_from_files(32, 32, files);
 }
 
-static void test_meshes(void **state)
+static void walks_arrive_on_bumpy_meshes(void **state)
 {
 	(void)state;
-	walk_in("coarse bumps", bumpy_world(12, METAL(".1"), ""), 0.772, 0.951);
-	struct tally t = walk_in("fine bumps", bumpy_world(60, METAL(".1"), ""), 0.771, 0.952);
+	run_walks("coarse bumps", bumpy_world(12, METAL(".1"), ""), 0.772, 0.951);
+	struct tally t = run_walks("fine bumps", bumpy_world(60, METAL(".1"), ""), 0.771, 0.952);
 	assert_true(t.seams > t.arrived / 10);
-	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>", ""), 0.975, 0.993);
+	run_walks("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>", ""), 0.975, 0.993);
 	/* Two instances: the bottom, and a mirrored and squeezed one over it. */
 	struct world *w =
 		bumpy_world(40, "<bsdf type='dielectric'/>",
@@ -559,36 +565,40 @@ static void test_meshes(void **state)
 			    "<scale x='-1.2' y='1' z='0.9'/></transform></shape><shape type='instance'><ref id='g'/>"
 			    "<transform name='to_world'><translate y='-0.5'/></transform></shape>");
 	assert_int_equal(w->sharing_shape_count, 2);
-	walk_in("instances of water", w, 0.99, 0.998);
+	run_walks("instances of water", w, 0.99, 0.998);
 }
 
 /* Steps are shortened more often than by default, so that the search is exercised; the arrival rate is two percentage
  * points higher. */
-static void as_measured(void)
+static void use_frequent_step_shortening(void)
 {
 	accuracy = accuracy_settings_default;
 	accuracy.least_step = 0.03;
 }
 
 /* The same walks with matrices in float: as many arrive, as close to their targets, and as many come back. */
-static void test_in_float(void **state)
+static void walks_in_float_arrive_as_often(void **state)
 {
 	accuracy.precision = SETTING_SINGLE;
-	test_spheres(state);
-	test_rough_glass(state);
-	test_smooth_glass(state);
-	test_nearly_matched(state);
-	as_measured();
+	walks_arrive_among_spheres(state);
+	walks_arrive_in_rough_glass(state);
+	walks_arrive_in_smooth_glass(state);
+	walks_arrive_at_nearly_matched_indices(state);
+	use_frequent_step_shortening();
 }
 
 int main(void)
 {
-	as_measured();
+	use_frequent_step_shortening();
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_spheres),	       cmocka_unit_test(test_rough_glass),
-		cmocka_unit_test(test_smooth_glass),   cmocka_unit_test(test_sky),
-		cmocka_unit_test(test_poles),	       cmocka_unit_test(test_meshes),
-		cmocka_unit_test(test_nearly_matched), cmocka_unit_test(test_in_float),
+		cmocka_unit_test(walks_arrive_among_spheres),
+		cmocka_unit_test(walks_arrive_in_rough_glass),
+		cmocka_unit_test(walks_arrive_in_smooth_glass),
+		cmocka_unit_test(walks_arrive_under_a_sky),
+		cmocka_unit_test(walks_arrive_at_poles_of_spheres),
+		cmocka_unit_test(walks_arrive_on_bumpy_meshes),
+		cmocka_unit_test(walks_arrive_at_nearly_matched_indices),
+		cmocka_unit_test(walks_in_float_arrive_as_often),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

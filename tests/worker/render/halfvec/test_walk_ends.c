@@ -57,7 +57,7 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 }
 
 /* Walks from x to half vectors that differ by h from its own, to 1e-9. */
-static enum walk_result walk_by(const vec2 *h, bool visible, struct walk_limits limits)
+static enum walk_result walk_by_halfvecs(const vec2 *h, bool visible, struct walk_limits limits)
 {
 	struct walk_target target[FULL_PATH_VERTICES_MAX];
 	constraints_compute(c.w, &x, x.edges, 0, k);
@@ -68,7 +68,7 @@ static enum walk_result walk_by(const vec2 *h, bool visible, struct walk_limits 
 }
 
 /* Computes the differences h that move vertex 1 by about d (scene units) and no other vertex. */
-static void ask_move(const struct world *w, vec3 d, vec2 *h)
+static void halfvecs_for_move(const struct world *w, vec3 d, vec2 *h)
 {
 	constraints_compute(w, &x, x.edges, 0, k);
 	vec3 du, dv, m = vec3_scale(w->scale, d);
@@ -91,10 +91,10 @@ static void ask_move(const struct world *w, vec3 d, vec2 *h)
 	"<ref id='" material "'/></shape>"
 /* clang-format on */
 
-static struct walk_limits normal;
+static struct walk_limits default_limits;
 
 /* At the end of the walk a ball hides the light; the ball has the floor's own material or another one. */
-static void test_occluder(void **state)
+static void occluded_walk_fails_whatever_the_material(void **state)
 {
 	(void)state;
 	for (int same = 0; same < 2; same++) {
@@ -107,21 +107,21 @@ static void test_occluder(void **state)
 		lay_path(w, (vec3[]){{0, 1, 1}, {0.5, 0, 0}, {0, 1, -1}}, 3);
 		vec2 h[3];
 		/* vertex 1 moves to (0.2, 0, 0), where the middle of the edge to the light lies at the ball's centre */
-		ask_move(w, (vec3){-0.3, 0, 0}, h);
+		halfvecs_for_move(w, (vec3){-0.3, 0, 0}, h);
 		struct path_vertex light = x.v[0];
-		assert_int_equal(walk_by(h, true, normal), WALK_OK);
+		assert_int_equal(walk_by_halfvecs(h, true, default_limits), WALK_OK);
 		assert_int_equal(counters[COUNT_RAYS_SHADOW] + counters[COUNT_RAYS_CLOSEST], 0);
 		struct ray_end a = {y.v[1].x.p, y.v[1].x.ng, y.v[1].x.prim}, b = {y.v[0].x.p, {0, 0, 0}, PRIM_NONE};
 		assert_true(accel_occluded(w->accel, &a, &b));
-		assert_int_equal(walk_by(h, false, normal), WALK_BLOCKED);
+		assert_int_equal(walk_by_halfvecs(h, false, default_limits), WALK_BLOCKED);
 		assert_memory_equal(&light.x, &y.v[0].x, sizeof light.x);
-		ask_move(w, (vec3){0.3, 0, 0}, h);
-		assert_int_equal(walk_by(h, false, normal), WALK_OK);
+		halfvecs_for_move(w, (vec3){0.3, 0, 0}, h);
+		assert_int_equal(walk_by_halfvecs(h, false, default_limits), WALK_OK);
 		world_free(w);
 	}
 }
 
-static void test_names(void **state)
+static void each_failure_has_its_name(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(32, 32,
@@ -129,38 +129,39 @@ static void test_names(void **state)
 						  FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
 	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
 	vec2 h[3];
-	struct walk_limits once = normal;
-	once.max_iterations = 1;
+	struct walk_limits one_iteration = default_limits;
+	one_iteration.max_iterations = 1;
 	/* Beyond the border of the floor; the walk's own rays cannot reach this position. */
-	ask_move(w, (vec3){40, 0, 0}, h);
-	assert_int_equal(walk_by(h, false, once), WALK_MISSED);
+	halfvecs_for_move(w, (vec3){40, 0, 0}, h);
+	assert_int_equal(walk_by_halfvecs(h, false, one_iteration), WALK_MISSED);
 	assert_int_equal(counters[COUNT_RAYS_CLOSEST], 1);
 	/* Far away, but on the floor: one iteration is not enough. */
-	ask_move(w, (vec3){0.3, 0, 0.4}, h);
-	assert_int_equal(walk_by(h, false, once), WALK_ITERATIONS);
+	halfvecs_for_move(w, (vec3){0.3, 0, 0.4}, h);
+	assert_int_equal(walk_by_halfvecs(h, false, one_iteration), WALK_ITERATION_LIMIT);
 	assert_int_equal(s.iterations, 1);
-	assert_int_equal(walk_by(h, false, normal), WALK_OK);
+	assert_int_equal(walk_by_halfvecs(h, false, default_limits), WALK_OK);
 	assert_in_range(s.iterations, 2, 8);
 	/* The camera moves below the floor, so that the reflection becomes impossible. */
 	struct path_vertex camera = x.v[2];
 	vec3 mirrored = in_world(w, (vec3){0, -1, 1});
-	ask_move(w, (vec3){0, 0, 0}, h);
+	halfvecs_for_move(w, (vec3){0, 0, 0}, h);
 	constraints_compute(w, &x, 2, 0, k);
 	struct walk_target target[3] = {{{0, 0}, 0}, {k[1].h, 1e-9}, {{0, 0}, 0}};
 	y = x;
 	y.v[2].x.p = mirrored;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_MODE);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &default_limits, WALK_STALE_ALL, &s),
+			 WALK_MODE_CHANGED);
 	y.v[2] = camera;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_OK);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &default_limits, WALK_STALE_ALL, &s), WALK_OK);
 	/* The fixed end coincides with a vertex. */
 	y.v[2].x.p = y.v[1].x.p;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE_ALL, &s), WALK_SINGULAR);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &default_limits, WALK_STALE_ALL, &s), WALK_SINGULAR);
 	world_free(w);
 }
 
 /* The reverse walk, from the same start and with the same limit of iterations, must find every path that a forward
  * walk can propose, although its tolerances need more iterations; and no other path. */
-static void test_few_iterations(void **state)
+static void reverse_walk_finds_each_forward_proposal(void **state)
 {
 	(void)state;
 	enum { WALKS = 200 };
@@ -170,24 +171,24 @@ static void test_few_iterations(void **state)
 	unsigned later = 0;
 	for (int i = 0; i < WALKS; i++) {
 		vec2 h[3];
-		struct walk_limits few = normal;
-		ask_move(w, (vec3){dice_uniform(&d) - 0.5, 0, dice_uniform(&d) - 0.5}, h);
-		assert_int_equal(walk_by(h, false, normal), WALK_OK);
-		few.max_iterations = s.iterations;
-		assert_int_equal(walk_by(h, true, few), WALK_OK);
-		later += s.iterations > few.max_iterations;
-		if (few.max_iterations == 1)
+		struct walk_limits few_iterations = default_limits;
+		halfvecs_for_move(w, (vec3){dice_uniform(&d) - 0.5, 0, dice_uniform(&d) - 0.5}, h);
+		assert_int_equal(walk_by_halfvecs(h, false, default_limits), WALK_OK);
+		few_iterations.max_iterations = s.iterations;
+		assert_int_equal(walk_by_halfvecs(h, true, few_iterations), WALK_OK);
+		later += s.iterations > few_iterations.max_iterations;
+		if (few_iterations.max_iterations == 1)
 			continue;
-		few.max_iterations--;
-		assert_int_equal(walk_by(h, false, few), WALK_ITERATIONS);
-		assert_int_equal(walk_by(h, true, few), WALK_ITERATIONS);
+		few_iterations.max_iterations--;
+		assert_int_equal(walk_by_halfvecs(h, false, few_iterations), WALK_ITERATION_LIMIT);
+		assert_int_equal(walk_by_halfvecs(h, true, few_iterations), WALK_ITERATION_LIMIT);
 	}
 	assert_in_range(later, 1, WALKS - 1);
 	world_free(w);
 }
 
 /* Beyond the silhouette of a ball lies another material. */
-static void test_other_material(void **state)
+static void walk_onto_another_material_fails(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -198,13 +199,13 @@ static void test_other_material(void **state)
 				 "<ref id='other'/></shape><emitter type='constant'/>"); /* dark materials are black */
 	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
 	vec2 h[3];
-	struct walk_limits once = normal;
-	once.max_iterations = 1;
-	ask_move(w, (vec3){-2, 0, 0}, h);
-	assert_int_equal(walk_by(h, false, once), WALK_BLOCKED);
+	struct walk_limits one_iteration = default_limits;
+	one_iteration.max_iterations = 1;
+	halfvecs_for_move(w, (vec3){-2, 0, 0}, h);
+	assert_int_equal(walk_by_halfvecs(h, false, one_iteration), WALK_BLOCKED);
 	/* No point of the ball has this half vector: the residual stops shrinking before the silhouette. */
 	h[1] = (vec2){50, 30};
-	assert_int_not_equal(walk_by(h, false, normal), WALK_OK);
+	assert_int_not_equal(walk_by_halfvecs(h, false, default_limits), WALK_OK);
 	world_free(w);
 }
 
@@ -221,7 +222,7 @@ static vec3 image_point(double a, double away, double *distance)
 
 /* The half vector at the first mirror does not change as the vertex there moves: its block is singular, the matrix is
  * not. */
-static void test_focus(void **state)
+static void walk_passes_a_singular_block(void **state)
 {
 	(void)state;
 	const double a = 0.4, away = 1.2;
@@ -240,18 +241,18 @@ static void test_focus(void **state)
 	assert_int_equal(constraint_double.factor(k, 3, 0, &s.system), CONSTRAINT_OK);
 	assert_true(s.system.is_pivoted);
 	struct dice d = dice_for_test("walks at a focus");
-	size_t ends[WALK_ITERATIONS + 1] = {0}, n = dice_scaled_count(2000);
+	size_t ends[WALK_ITERATION_LIMIT + 1] = {0}, n = dice_scaled_count(2000);
 	double iterations = 0;
 	for (size_t i = 0; i < n; i++) {
 		vec2 h[4];
 		for (unsigned j = 1; j < 3; j++)
 			h[j] = (vec2){dice_between(&d, -0.01, 0.01), dice_between(&d, -0.01, 0.01)};
-		enum walk_result e = walk_by(h, false, normal);
+		enum walk_result e = walk_by_halfvecs(h, false, default_limits);
 		ends[e]++;
 		iterations += s.iterations;
 		for (unsigned j = 1; j < 3 && e == WALK_OK; j++) {
-			vec2 off = vec2_sub(halfvec_of(&y, j), vec2_add(k[j].h, h[j]));
-			assert_true(vec2_dot(off, off) <= 1.01e-18);
+			vec2 deviation = vec2_sub(halfvec_of(&y, j), vec2_add(k[j].h, h[j]));
+			assert_true(vec2_dot(deviation, deviation) <= 1.01e-18);
 		}
 	}
 	print_message("focus: %zu of %zu arrive in %.2f iterations, %zu singular\n", ends[WALK_OK], n,
@@ -263,7 +264,7 @@ static void test_focus(void **state)
 
 /* The camera's image falls on the light: moving the vertex does not change the half vector within the plane, so there
  * is no step. */
-static void test_singular(void **state)
+static void walk_without_a_step_is_singular(void **state)
 {
 	(void)state;
 	const double a = 0.4, away = 1.2;
@@ -275,18 +276,21 @@ static void test_singular(void **state)
 	assert_true(fabs(mat2_det(k[1].b)) < 1e-12 * mat2_norm2(k[1].b));
 	vec2 h[3] = {{0, 0}, {0.01, 0.01}, {0, 0}};
 	/* Rounding may leave a nonzero pivot, and then a huge step that leads nowhere. */
-	enum walk_result e = walk_by(h, false, normal);
+	enum walk_result e = walk_by_halfvecs(h, false, default_limits);
 	assert_true(e == WALK_SINGULAR || e == WALK_DIVERGED);
 	world_free(w);
 }
 
 int main(void)
 {
-	normal = walk_limits_of(&accuracy_settings_default);
+	default_limits = walk_limits_of(&accuracy_settings_default);
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_occluder),       cmocka_unit_test(test_names),
-		cmocka_unit_test(test_few_iterations), cmocka_unit_test(test_other_material),
-		cmocka_unit_test(test_focus),	       cmocka_unit_test(test_singular),
+		cmocka_unit_test(occluded_walk_fails_whatever_the_material),
+		cmocka_unit_test(each_failure_has_its_name),
+		cmocka_unit_test(reverse_walk_finds_each_forward_proposal),
+		cmocka_unit_test(walk_onto_another_material_fails),
+		cmocka_unit_test(walk_passes_a_singular_block),
+		cmocka_unit_test(walk_without_a_step_is_singular),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,7 +37,7 @@ static struct image decode_ok(const void *bytes, size_t size, bool raw, struct a
 	return img;
 }
 
-static void refuses(const void *bytes, size_t size, const char *text)
+static void expect_refused(const void *bytes, size_t size, const char *text)
 {
 	struct arena arena = {0};
 	struct image img;
@@ -49,7 +49,7 @@ static void refuses(const void *bytes, size_t size, const char *text)
 	arena_fini(&arena);
 }
 
-static double linear(double x)
+static double expected_linear(double x)
 {
 	return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
 }
@@ -68,7 +68,7 @@ static void check_png(enum sample_pixels kind, int bits, int interlaced, bool ra
 				unsigned v = sample_value(x, y, kind == SAMPLE_PALETTE ? 0 : (int)k);
 				if (kind == SAMPLE_PALETTE)
 					v = k == 0 ? v : k == 1 ? 255 - v : 7;
-				double want = raw ? v / 255.0 : linear(v / 255.0);
+				double want = raw ? v / 255.0 : expected_linear(v / 255.0);
 				if (!(fabs(img.pixels[(y * 13 + x) * channels + k] - want) < 1e-6))
 					fail_msg("kind %d, %d bits, (%zu, %zu)", kind, bits, x, y);
 			}
@@ -76,7 +76,7 @@ static void check_png(enum sample_pixels kind, int bits, int interlaced, bool ra
 	free(png);
 }
 
-static void test_png(void **state)
+static void test_png_of_every_kind_is_decoded(void **state)
 {
 	(void)state;
 	for (int raw = 0; raw < 2; raw++)
@@ -91,7 +91,7 @@ static void test_png(void **state)
 }
 
 /* One channel of each pixel, and alpha, which is 1 in images without alpha and never decoded as a colour. */
-static void test_channels(void **state)
+static void test_single_channels_are_selected(void **state)
 {
 	(void)state;
 	static const struct {
@@ -113,7 +113,7 @@ static void test_channels(void **state)
 				double v = sample_value(i % 13, i / 13, kinds[n].kind == SAMPLE_PALETTE ? 0 : k);
 				if (kinds[n].kind == SAMPLE_PALETTE)
 					v = k == 0 ? v : k == 1 ? 255 - v : 7;
-				double want = channel != IMAGE_ALPHA	     ? linear(v / 255)
+				double want = channel != IMAGE_ALPHA	     ? expected_linear(v / 255)
 					      : kinds[n].kind == SAMPLE_RGBA ? v / 255
 									     : 1;
 				if (!(fabs((double)img.pixels[i] - want) < 1e-6))
@@ -139,13 +139,13 @@ static void test_channels(void **state)
 	arena_fini(&arena);
 }
 
-static void test_bad_png(void **state)
+static void test_invalid_png_is_refused(void **state)
 {
 	(void)state;
 	size_t size;
 	unsigned char *png = sample_png(13, 9, SAMPLE_RGB, 8, 0, &size);
 	for (size_t n = 0; n < size; n++)
-		refuses(png, n, n < 8 ? "unknown image format" : "i: PNG: ");
+		expect_refused(png, n, n < 8 ? "unknown image format" : "i: PNG: ");
 	unsigned char *copy = malloc(size);
 	for (size_t at = 8; at < size; at++) { /* every chunk has a checksum */
 		memcpy(copy, png, size);
@@ -162,7 +162,7 @@ static void test_bad_png(void **state)
 }
 
 /* Returns a PNG of one pixel whose header claims side x side pixels. */
-static unsigned char *promising_png(unsigned side, int color, size_t *size)
+static unsigned char *make_oversized_png(unsigned side, int color, size_t *size)
 {
 	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, size), high = (unsigned char)(side >> 8),
 		      low = (unsigned char)side;
@@ -181,25 +181,25 @@ static unsigned char *promising_png(unsigned side, int color, size_t *size)
 	return small;
 }
 
-static void refuses_png(unsigned side, int color, const char *text)
+static void expect_png_refused(unsigned side, int color, const char *text)
 {
 	size_t size;
-	unsigned char *png = promising_png(side, color, &size);
-	refuses(png, size, text);
+	unsigned char *png = make_oversized_png(side, color, &size);
+	expect_refused(png, size, text);
 	free(png);
 }
 
 /* A header that promises pixels without data for them is refused before memory is allocated, and so is one with more
  * pixels than a scene may have. */
-static void test_png_bomb(void **state)
+static void test_oversized_png_is_refused(void **state)
 {
 	(void)state;
-	refuses_png(8192, 2, "i: too short for 8192 x 8192 pixels");
-	refuses_png(16000, 2, "i: 16000 x 16000 pixels; at most 134217728");
+	expect_png_refused(8192, 2, "i: too short for 8192 x 8192 pixels");
+	expect_png_refused(16000, 2, "i: 16000 x 16000 pixels; at most 134217728");
 }
 
 /* The size in a frame's header; a file of this size may be well compressed. */
-static void test_jpeg_bomb(void **state)
+static void test_oversized_jpeg_is_refused(void **state)
 {
 	(void)state;
 	static const unsigned char orange[] = {220, 130, 40};
@@ -208,9 +208,9 @@ static void test_jpeg_bomb(void **state)
 	while (jpeg[at + 1] != 0xc0)
 		at += 2 + ((size_t)jpeg[at + 2] << 8 | jpeg[at + 3]);
 	memcpy(jpeg + at + 5, "\x2e\xe0\x2e\xe0", 4);
-	refuses(jpeg, size, "i: 12000 x 12000 pixels; at most 134217728");
+	expect_refused(jpeg, size, "i: 12000 x 12000 pixels; at most 134217728");
 	memcpy(jpeg + at + 5, "\x75\x30\x75\x30", 4);
-	refuses(jpeg, size, "i: 30000 x 30000 pixels; at most");
+	expect_refused(jpeg, size, "i: 30000 x 30000 pixels; at most");
 	free(jpeg);
 }
 
@@ -226,11 +226,11 @@ static void check_jpeg(const unsigned char *color, int components, int progressi
 			assert_true(fabs(img.pixels[i * img.channels + k] - color[k] / 255.0) < 2.5 / 255);
 	arena_fini(&arena);
 	for (size_t n = 3; n < size - 2; n += 1 + n / 50)
-		refuses(jpeg, n, "i: ");
+		expect_refused(jpeg, n, "i: ");
 	free(jpeg);
 }
 
-static void test_jpeg(void **state)
+static void test_jpeg_of_every_kind_is_decoded(void **state)
 {
 	(void)state;
 	static const unsigned char grey[] = {90}, orange[] = {220, 130, 40}, ink[] = {1, 2, 3, 4};
@@ -239,20 +239,20 @@ static void test_jpeg(void **state)
 	check_jpeg(orange, 3, 1);
 	size_t size;
 	unsigned char *jpeg = sample_jpeg(8, 8, ink, 4, 0, &size);
-	refuses(jpeg, size, "for printing (CMYK)");
+	expect_refused(jpeg, size, "for printing (CMYK)");
 	free(jpeg);
 }
 
-static const char hdr_head[] = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n";
+static const char hdr_header[] = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n";
 
 static size_t make_hdr(unsigned char *out, const char *resolution, const void *pixels, size_t n)
 {
-	size_t size = (size_t)sprintf((char *)out, "%s%s\n", hdr_head, resolution);
+	size_t size = (size_t)sprintf((char *)out, "%s%s\n", hdr_header, resolution);
 	memcpy(out + size, pixels, n);
 	return size + n;
 }
 
-static void test_hdr(void **state)
+static void test_hdr_is_decoded(void **state)
 {
 	(void)state;
 	unsigned char file[512];
@@ -265,7 +265,7 @@ static void test_hdr(void **state)
 	for (int i = 0; i < 9; i++)
 		assert_true(img.pixels[i] == want[i]);
 	for (size_t n = 11; n < size; n++)
-		refuses(file, n, "i: Radiance HDR: ");
+		expect_refused(file, n, "i: Radiance HDR: ");
 	/* Runs: red 8 x 128; green 3 x 1, then 2 3 4 5 6; blue 8 x 0; exponent 8 x 136. */
 	static const unsigned char runs[] = {2, 2, 0, 8, 136, 128, 131, 1, 5, 2, 3, 4, 5, 6, 136, 0, 136, 136};
 	size = make_hdr(file, "-Y 1 +X 8", runs, sizeof runs);
@@ -274,29 +274,30 @@ static void test_hdr(void **state)
 		assert_true(img.pixels[3 * x] == 128 && img.pixels[3 * x + 1] == (x < 3 ? 1 : (float)(x - 1)) &&
 			    img.pixels[3 * x + 2] == 0);
 	for (size_t n = 11; n < size; n++)
-		refuses(file, n, "i: Radiance HDR: ");
+		expect_refused(file, n, "i: Radiance HDR: ");
 	arena_fini(&arena);
 }
 
-static void test_bad_hdr(void **state)
+static void test_invalid_hdr_is_refused(void **state)
 {
 	(void)state;
 	unsigned char file[512];
 	static const unsigned char pixels[64] = {2, 2, 0, 8, 255};
-	refuses(file, make_hdr(file, "+Y 1 +X 3", pixels, 12), "only the resolution line");
-	refuses(file, make_hdr(file, "-Y 1 +X 0", pixels, 12), "only the resolution line");
-	refuses(file, make_hdr(file, "-Y 99999999999999999999 +X 1", pixels, 12), "only the resolution line");
-	refuses(file, make_hdr(file, "-Y 100000 +X 100000", pixels, 12), "pixels; at most");
-	refuses(file, make_hdr(file, "-Y 5000 +X 5000", pixels, 12), "too short for");
-	refuses(file, make_hdr(file, "-Y 8192 +X 16384", pixels, 12), "too short for 16384 x 8192 pixels");
-	refuses(file, make_hdr(file, "-Y 8193 +X 16384", pixels, 12), "pixels; at most 134217728");
-	refuses(file, make_hdr(file, "-Y 9223372036854775000 +X 9223372036854775000", pixels, 12), "pixels; at most");
-	refuses(file, make_hdr(file, "-Y 1 +X 8", pixels, 64), "run lengths that do not fill");
-	refuses(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "a scan line whose width is not");
+	expect_refused(file, make_hdr(file, "+Y 1 +X 3", pixels, 12), "only the resolution line");
+	expect_refused(file, make_hdr(file, "-Y 1 +X 0", pixels, 12), "only the resolution line");
+	expect_refused(file, make_hdr(file, "-Y 99999999999999999999 +X 1", pixels, 12), "only the resolution line");
+	expect_refused(file, make_hdr(file, "-Y 100000 +X 100000", pixels, 12), "pixels; at most");
+	expect_refused(file, make_hdr(file, "-Y 5000 +X 5000", pixels, 12), "too short for");
+	expect_refused(file, make_hdr(file, "-Y 8192 +X 16384", pixels, 12), "too short for 16384 x 8192 pixels");
+	expect_refused(file, make_hdr(file, "-Y 8193 +X 16384", pixels, 12), "pixels; at most 134217728");
+	expect_refused(file, make_hdr(file, "-Y 9223372036854775000 +X 9223372036854775000", pixels, 12),
+		       "pixels; at most");
+	expect_refused(file, make_hdr(file, "-Y 1 +X 8", pixels, 64), "run lengths that do not fill");
+	expect_refused(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "a scan line whose width is not");
 	static const unsigned char old[] = {9, 9, 9, 9, 1, 1, 1, 3};
-	refuses(file, make_hdr(file, "-Y 1 +X 2", old, 8), "old run-length encoding");
+	expect_refused(file, make_hdr(file, "-Y 1 +X 2", old, 8), "old run-length encoding");
 	static const char xyze[] = "#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n....";
-	refuses(xyze, sizeof xyze - 1, "only FORMAT=32-bit_rle_rgbe");
+	expect_refused(xyze, sizeof xyze - 1, "only FORMAT=32-bit_rle_rgbe");
 }
 
 enum { EXR_WIDTH = 16, EXR_HEIGHT = 8, EXR_PIXELS = EXR_WIDTH * EXR_HEIGHT };
@@ -322,7 +323,7 @@ static unsigned char *make_exr(const char *const *names, uint32_t channels, cons
 	return bytes;
 }
 
-static void test_exr(void **state)
+static void test_exr_channels_are_decoded(void **state)
 {
 	(void)state;
 	static const char *const rgb[] = {"R", "G", "B"}, *const y[] = {"Y"}, *const odd[] = {"R", "G", "Z"};
@@ -335,28 +336,28 @@ static void test_exr(void **state)
 	for (int i = 0; i < EXR_PIXELS; i++)
 		for (int k = 0; k < 3; k++)
 			assert_true(img.pixels[3 * i + k] == value[k] * (float)(i + 1));
-	refuses(exr, size / 2, "i: ");
+	expect_refused(exr, size / 2, "i: ");
 	mem_free(exr);
 	exr = make_exr(rgb, 3, value, &size);
 	for (size_t i = 0; i < size - 40; i++) /* xMin yMin xMax yMax follow the name, the type and a length */
 		if (memcmp(exr + i, "dataWindow\0box2i", 17) == 0)
 			memcpy(exr + i + 17 + 4 + 8, "\xdf\x2e\0\0\xdf\x2e\0", 8);
-	refuses(exr, size, "i: 12000 x 12000 pixels of 3 channels take 1647 MB decoded; at most 1536 MB");
+	expect_refused(exr, size, "i: 12000 x 12000 pixels of 3 channels take 1647 MB decoded; at most 1536 MB");
 	mem_free(exr);
 	exr = make_exr(y, 1, value, &size);
 	img = decode_ok(exr, size, false, &arena);
 	assert_true(img.channels == 1 && img.pixels[7] == 8);
 	mem_free(exr);
 	exr = make_exr(odd, 3, value, &size);
-	refuses(exr, size, "OpenEXR without channel B");
+	expect_refused(exr, size, "OpenEXR without channel B");
 	mem_free(exr);
 	exr = make_exr(rgb, 3, bad, &size);
-	refuses(exr, size, "pixel (0, 0) is not finite");
+	expect_refused(exr, size, "pixel (0, 0) is not finite");
 	mem_free(exr);
 	arena_fini(&arena);
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	static const unsigned char orange[] = {220, 130, 40}, flat[] = {128, 64, 0, 129};
@@ -392,11 +393,16 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_channels), cmocka_unit_test(test_png),
-		cmocka_unit_test(test_bad_png),	 cmocka_unit_test(test_png_bomb),
-		cmocka_unit_test(test_jpeg),	 cmocka_unit_test(test_hdr),
-		cmocka_unit_test(test_bad_hdr),	 cmocka_unit_test(test_jpeg_bomb),
-		cmocka_unit_test(test_exr),	 cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_single_channels_are_selected),
+		cmocka_unit_test(test_png_of_every_kind_is_decoded),
+		cmocka_unit_test(test_invalid_png_is_refused),
+		cmocka_unit_test(test_oversized_png_is_refused),
+		cmocka_unit_test(test_jpeg_of_every_kind_is_decoded),
+		cmocka_unit_test(test_hdr_is_decoded),
+		cmocka_unit_test(test_invalid_hdr_is_refused),
+		cmocka_unit_test(test_oversized_jpeg_is_refused),
+		cmocka_unit_test(test_exr_channels_are_decoded),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,16 +18,16 @@
 
 enum { WIDTH = 13, HEIGHT = 7 };
 
-static uint8_t level_at(int x, int y, int k)
+static uint8_t channel_level(int x, int y, int k)
 {
 	return (uint8_t)(k == 3 ? 255 - 30 * y : 20 * x + 9 * y + 5 * k);
 }
 
-static void draw(uint8_t *rgba)
+static void fill_pixels(uint8_t *rgba)
 {
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
 		for (int k = 0; k < 4; k++)
-			rgba[4 * i + k] = level_at(i % WIDTH, i / WIDTH, k);
+			rgba[4 * i + k] = channel_level(i % WIDTH, i / WIDTH, k);
 }
 
 static int decode(const void *bytes, size_t size, bool raw, enum image_channel channel, struct arena *a,
@@ -36,11 +36,11 @@ static int decode(const void *bytes, size_t size, bool raw, enum image_channel c
 	return image_decode(bytes, size, "i", raw, channel, a, out, e);
 }
 
-static void test_lossless(void **state)
+static void test_lossless_images_are_exact(void **state)
 {
 	(void)state;
 	uint8_t rgba[4 * WIDTH * HEIGHT], *file = NULL;
-	draw(rgba);
+	fill_pixels(rgba);
 	for (int i = 0; i < WIDTH * HEIGHT; i++) /* the encoder clears the colours of transparent pixels */
 		rgba[4 * i + 3] = (uint8_t)(rgba[4 * i + 3] | 1);
 	size_t size = WebPEncodeLosslessRGBA(rgba, WIDTH, HEIGHT, 4 * WIDTH, &file);
@@ -67,7 +67,7 @@ static void test_lossless(void **state)
 	WebPFree(file);
 }
 
-static void test_lossy(void **state)
+static void test_lossy_images_are_close(void **state)
 {
 	(void)state;
 	uint8_t rgb[3 * 64 * 64], *file = NULL;
@@ -88,7 +88,7 @@ static void test_lossy(void **state)
 	WebPFree(file);
 }
 
-static void refuses(const void *bytes, size_t size, const char *text)
+static void expect_refused(const void *bytes, size_t size, const char *text)
 {
 	struct arena a = {0};
 	struct image img;
@@ -99,18 +99,18 @@ static void refuses(const void *bytes, size_t size, const char *text)
 }
 
 /* Prefixes and single changed bytes give an image of the same size or an error message. */
-static void test_damaged(void **state)
+static void test_damaged_files_are_decoded_or_refused(void **state)
 {
 	(void)state;
 	uint8_t rgba[4 * WIDTH * HEIGHT], *file = NULL;
 	struct dice d = dice_for_test("damaged WebP");
-	draw(rgba);
+	fill_pixels(rgba);
 	size_t size = WebPEncodeRGBA(rgba, WIDTH, HEIGHT, 4 * WIDTH, 50, &file);
 	uint8_t *copy = mem_alloc(size, 1);
-	refuses("RIFF\4\0\0\0WAVE", 12, "a RIFF file that is not a WebP image");
-	refuses("RIFF", 4, "a RIFF file that is not a WebP image");
+	expect_refused("RIFF\4\0\0\0WAVE", 12, "a RIFF file that is not a WebP image");
+	expect_refused("RIFF", 4, "a RIFF file that is not a WebP image");
 	for (size_t n = 12; n < size; n += 1 + n / 9)
-		refuses(file, n, "WebP: damaged");
+		expect_refused(file, n, "WebP: damaged");
 	for (int i = 0; i < 400; i++) {
 		struct arena a = {0};
 		struct image img;
@@ -125,8 +125,8 @@ static void test_damaged(void **state)
 	static const uint8_t moving[] = "RIFF\x1a\0\0\0WEBPVP8X\x0a\0\0\0\x02\0\0\0\x0c\0\0\x06\0\0ANIM",
 			     large[] = "RIFF\x1a\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0\xff\xff\xff\xff\xff\xff"
 				       "VP8 ";
-	refuses(moving, 34, "an animation");
-	refuses(large, 34, "WebP: damaged");
+	expect_refused(moving, 34, "an animation");
+	expect_refused(large, 34, "WebP: damaged");
 	mem_free(copy);
 	WebPFree(file);
 }
@@ -134,9 +134,9 @@ static void test_damaged(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lossless),
-		cmocka_unit_test(test_lossy),
-		cmocka_unit_test(test_damaged),
+		cmocka_unit_test(test_lossless_images_are_exact),
+		cmocka_unit_test(test_lossy_images_are_close),
+		cmocka_unit_test(test_damaged_files_are_decoded_or_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

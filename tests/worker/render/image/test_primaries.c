@@ -24,7 +24,7 @@ static const struct primaries bt709 = {{0.64f, 0.30f, 0.15f, 0.3127f}, {0.33f, 0
 			      acescg = {{0.713f, 0.165f, 0.128f, 0.32168f}, {0.293f, 0.830f, 0.044f, 0.33767f}},
 			      xyz = {{1, 0, 0, 1 / 3.0f}, {0, 1, 0, 1 / 3.0f}};
 
-static void expect(const char *what, const struct primaries *p, double expected[3][3], double tolerance)
+static void expect_matrix(const char *what, const struct primaries *p, double expected[3][3], double tolerance)
 {
 	double m[3][3];
 	assert_true(primaries_to_bt709(p, m));
@@ -35,7 +35,7 @@ static void expect(const char *what, const struct primaries *p, double expected[
 }
 
 /* Applies the inverse of the BT.709 matrix (from XYZ) to the columns of another matrix. */
-static void from_xyz(const double columns[3][3], double m[3][3])
+static void convert_from_xyz(const double columns[3][3], double m[3][3])
 {
 	for (int j = 0; j < 3; j++) {
 		double rgb[3];
@@ -45,7 +45,7 @@ static void from_xyz(const double columns[3][3], double m[3][3])
 	}
 }
 
-static void test_matrices(void **state)
+static void test_matrices_match_known_primaries(void **state)
 {
 	(void)state;
 	double same[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, m[3][3];
@@ -54,18 +54,18 @@ static void test_matrices(void **state)
 			    ap1[3][3] = {{0.6624541811, 0.2722287168, -0.0055746495},
 					 {0.1340042065, 0.6740817658, 0.0040607335},
 					 {0.1561876870, 0.0536895174, 1.0103391003}};
-	expect("BT.709", &bt709, same, 1e-14);
-	expect("BT.2020", &bt2020, of_bt2020, 6e-5);
+	expect_matrix("BT.709", &bt709, same, 1e-14);
+	expect_matrix("BT.2020", &bt2020, of_bt2020, 6e-5);
 	/* The white of the published matrices from XYZ differs in the fourth digit. */
-	from_xyz(axes, m);
-	expect("XYZ", &xyz, m, 1e-3);
-	from_xyz(ap1, m);
-	expect("ACEScg", &acescg, m, 5e-4);
+	convert_from_xyz(axes, m);
+	expect_matrix("XYZ", &xyz, m, 1e-3);
+	convert_from_xyz(ap1, m);
+	expect_matrix("ACEScg", &acescg, m, 5e-4);
 	assert_true(primaries_are_bt709(&bt709));
 	assert_false(primaries_are_bt709(&bt2020));
 }
 
-static void test_no_colours(void **state)
+static void test_invalid_primaries_are_refused(void **state)
 {
 	(void)state;
 	static const struct primaries none[] = {
@@ -118,7 +118,7 @@ static int decode(const struct primaries *p, const float *colour, struct arena *
 	return r;
 }
 
-static void test_files(void **state)
+static void test_primaries_of_exr_files_are_applied(void **state)
 {
 	(void)state;
 	static const float colour[3] = {0.8f, 0.3f, 0.1f}, huge[3] = {3e38f, 0, 0};
@@ -143,9 +143,9 @@ static void test_files(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_matrices),
-		cmocka_unit_test(test_no_colours),
-		cmocka_unit_test(test_files),
+		cmocka_unit_test(test_matrices_match_known_primaries),
+		cmocka_unit_test(test_invalid_primaries_are_refused),
+		cmocka_unit_test(test_primaries_of_exr_files_are_applied),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,46 +17,46 @@
 
 static volatile double zero, result;
 
-static void invalid(void)
+static void perform_invalid_operation(void)
 {
 	result = zero / zero;
 }
 
-static void ours_seen_on_entering_a_library(void)
+static void invalid_before_a_library(void)
 {
 	fptrap_watch();
-	invalid();
+	perform_invalid_operation();
 	fptrap_leave_library(fptrap_enter_library());
 	_exit(0);
 }
 
-static void ours_seen_at_the_end(void)
+static void invalid_before_the_watch_ends(void)
 {
-	bool before = fptrap_watch();
+	bool was_watching = fptrap_watch();
 	fptrap_leave_library(fptrap_enter_library());
-	invalid();
-	fptrap_unwatch(before);
+	perform_invalid_operation();
+	fptrap_unwatch(was_watching);
 }
 
-static void in_a_library(void)
+static void invalid_within_a_library(void)
 {
-	bool before = fptrap_watch();
+	bool was_watching = fptrap_watch();
 	unsigned left = fptrap_enter_library();
-	invalid();
+	perform_invalid_operation();
 	fptrap_leave_library(left);
 	fptrap_leave_library(fptrap_enter_library());
-	fptrap_unwatch(before);
+	fptrap_unwatch(was_watching);
 }
 
-static void not_watched(void)
+static void invalid_while_unwatched(void)
 {
-	invalid();
+	perform_invalid_operation();
 	fptrap_leave_library(fptrap_enter_library());
 	fptrap_unwatch(fptrap_watch());
 }
 
 /* Returns the signal that ends a child running f, or 0. */
-static int signal_of(void (*f)(void))
+static int signal_of_child(void (*f)(void))
 {
 	pid_t child = fork();
 	assert_true(child >= 0);
@@ -70,52 +70,53 @@ static int signal_of(void (*f)(void))
 	return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
 }
 
-static void test_signals(void **state)
+static void invalid_operation_of_our_code_ends_the_program(void **state)
 {
 	(void)state;
 #if defined(__x86_64__)
-	assert_int_equal(signal_of(ours_seen_on_entering_a_library), SIGFPE);
-	assert_int_equal(signal_of(ours_seen_at_the_end), SIGFPE);
+	assert_int_equal(signal_of_child(invalid_before_a_library), SIGFPE);
+	assert_int_equal(signal_of_child(invalid_before_the_watch_ends), SIGFPE);
 #endif
-	assert_int_equal(signal_of(in_a_library), 0);
-	assert_int_equal(signal_of(not_watched), 0);
+	assert_int_equal(signal_of_child(invalid_within_a_library), 0);
+	assert_int_equal(signal_of_child(invalid_while_unwatched), 0);
 }
 
 /* Returns whether f ends at the catch point. */
 static bool is_caught(void (*f)(void))
 {
-	jmp_buf back;
-	if (setjmp(back))
+	jmp_buf catch_point;
+	if (setjmp(catch_point))
 		return true;
-	jmp_buf *before = fptrap_catch(&back);
-	assert_null(before);
+	jmp_buf *outer_catch_point = fptrap_catch(&catch_point);
+	assert_null(outer_catch_point);
 	f();
 	fptrap_catch(NULL);
 	return false;
 }
 
-static void ours_within_the_watch(void)
+static void invalid_within_the_watch(void)
 {
-	bool before = fptrap_watch();
-	invalid();
-	fptrap_unwatch(before);
+	bool was_watching = fptrap_watch();
+	perform_invalid_operation();
+	fptrap_unwatch(was_watching);
 }
 
-static void test_caught(void **state)
+static void invalid_operation_returns_to_the_catch_point(void **state)
 {
 	(void)state;
 #if defined(__x86_64__)
-	assert_true(is_caught(ours_within_the_watch));
-	assert_true(is_caught(ours_seen_at_the_end));
+	assert_true(is_caught(invalid_within_the_watch));
+	assert_true(is_caught(invalid_before_the_watch_ends));
 	assert_null(fptrap_catch(NULL)); /* once only: the next invalid operation raises a signal again */
-	assert_int_equal(signal_of(ours_within_the_watch), SIGFPE);
+	assert_int_equal(signal_of_child(invalid_within_the_watch), SIGFPE);
 #endif
-	assert_false(is_caught(in_a_library));
-	assert_false(is_caught(not_watched));
+	assert_false(is_caught(invalid_within_a_library));
+	assert_false(is_caught(invalid_while_unwatched));
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_signals), cmocka_unit_test(test_caught)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(invalid_operation_of_our_code_ends_the_program),
+					   cmocka_unit_test(invalid_operation_returns_to_the_catch_point)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

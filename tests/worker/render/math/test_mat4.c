@@ -44,7 +44,7 @@ static void test_products_apply_right_first(void **state)
 	assert_vec3(mat4_vector(&m, (vec3){1, 1, 1}), 2, 2, 2, 0);
 }
 
-static void test_rotation(void **state)
+static void rotations_turn_by_known_angles(void **state)
 {
 	(void)state;
 	mat4 m = mat4_rotate((vec3){0, 0, 2}, 90);
@@ -59,15 +59,15 @@ static void test_rotation(void **state)
 	assert_vec3(mat4_vector(&m, (vec3){1, 0, 0}), sqrt(0.75), 0.5, 0, 1e-15);
 }
 
-static void test_inverse(void **state)
+static void inverse_undoes_a_random_matrix(void **state)
 {
 	(void)state;
 	for (uint64_t i = 0; i < 200; i++) {
 		mat4 m = random_matrix(i), inverse;
 		assert_true(mat4_invert(m, &inverse));
-		mat4 one = mat4_mul(m, inverse);
+		mat4 product = mat4_mul(m, inverse);
 		for (int k = 0; k < 16; k++)
-			assert_near(one.m[k / 4][k % 4], k % 5 == 0, 1e-10);
+			assert_near(product.m[k / 4][k % 4], k % 5 == 0, 1e-10);
 	}
 	mat4 flat = mat4_scale((vec3){1, 0, 1}), inverse;
 	assert_false(mat4_invert(flat, &inverse));
@@ -91,7 +91,7 @@ static void test_normals_stay_perpendicular(void **state)
 	}
 }
 
-static void test_look_at(void **state)
+static void look_at_has_known_values(void **state)
 {
 	(void)state;
 	mat4 m = mat4_look_at((vec3){0, -9, 3.5}, (vec3){0, 0, 3.5}, (vec3){0, 0, 1});
@@ -105,11 +105,9 @@ static void test_look_at(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_products_apply_right_first),
-		cmocka_unit_test(test_rotation),
-		cmocka_unit_test(test_inverse),
-		cmocka_unit_test(test_normals_stay_perpendicular),
-		cmocka_unit_test(test_look_at),
+		cmocka_unit_test(test_products_apply_right_first), cmocka_unit_test(rotations_turn_by_known_angles),
+		cmocka_unit_test(inverse_undoes_a_random_matrix),  cmocka_unit_test(test_normals_stay_perpendicular),
+		cmocka_unit_test(look_at_has_known_values),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

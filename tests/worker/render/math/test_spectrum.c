@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 /* The sums that the publishers give as a check. */
-static void test_published_sums(void **state)
+static void matching_functions_have_their_published_sums(void **state)
 {
 	(void)state;
 	double sum[3] = {0}, white[3] = {0};
@@ -38,7 +38,7 @@ static void test_published_sums(void **state)
 
 /* Returns the unnormalised density at a tabulated wavelength: the sum of the magnitudes of the matching functions of
  * linear Rec. 709. */
-static double curve(int i)
+static double unnormalised_density(int i)
 {
 	double rgb[3];
 	rec709_from_xyz(cie_observer[i], rgb);
@@ -51,41 +51,42 @@ static double share_below(double nm)
 {
 	double total = 0, below = 0;
 	for (int i = 0; i + 1 < CIE_COUNT; i++) {
-		double area = 0.5 * (curve(i) + curve(i + 1));
+		double area = 0.5 * (unnormalised_density(i) + unnormalised_density(i + 1));
 		total += area;
 		below += area * fmin(1, fmax(0, nm - CIE_FIRST_NM - i));
 	}
 	return 0.95 * below / total + 0.05 * (nm - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
 }
 
-static const double hard_us[] = {0, 0x1p-53, 1e-4, 0.1, 0.25, 0.5 - 0x1p-54, 0.5, 0.75, 0.9, 1 - 0x1p-53};
-enum { HARD_US = sizeof hard_us / sizeof *hard_us };
+static const double corner_case_us[] = {0, 0x1p-53, 1e-4, 0.1, 0.25, 0.5 - 0x1p-54, 0.5, 0.75, 0.9, 1 - 0x1p-53};
+enum { CORNER_CASE_US = sizeof corner_case_us / sizeof *corner_case_us };
 
 /* The shares below the four wavelengths are a quarter apart, and the share below the hero wavelength is u. */
-static void test_wavelengths_in_range_and_apart(void **state)
+static void wavelengths_are_a_quarter_of_the_density_apart(void **state)
 {
 	(void)state;
-	for (size_t n = 0; n < HARD_US; n++) {
-		struct wavelengths w = wavelengths_sample(hard_us[n]);
+	for (size_t n = 0; n < CORNER_CASE_US; n++) {
+		struct wavelengths w = wavelengths_sample(corner_case_us[n]);
 		assert_false(w.is_grey);
-		assert_true(w.u == hard_us[n]);
+		assert_true(w.u == corner_case_us[n]);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
-			double want = hard_us[n] + 0.25 * i;
+			double want = corner_case_us[n] + 0.25 * i;
 			assert_true(w.nm[i] >= WAVELENGTH_MIN && w.nm[i] <= WAVELENGTH_MAX);
 			assert_true(fabs(share_below(w.nm[i]) - (want - floor(want))) < 1e-12);
 		}
 	}
 }
 
-static void test_density_of_wavelengths(void **state)
+static void density_is_the_derivative_of_the_share(void **state)
 {
 	(void)state;
 	double sum = 0, total = 0;
 	for (int i = 0; i + 1 < CIE_COUNT; i++)
-		total += 0.5 * (curve(i) + curve(i + 1));
+		total += 0.5 * (unnormalised_density(i) + unnormalised_density(i + 1));
 	for (int i = 0; i + 1 < CIE_COUNT; i++) {
 		double nm = CIE_FIRST_NM + i, pdf = wavelength_pdf(nm + 0.5);
-		double want = 0.95 * 0.5 * (curve(i) + curve(i + 1)) / total + 0.05 / (CIE_COUNT - 1);
+		double want = 0.95 * 0.5 * (unnormalised_density(i) + unnormalised_density(i + 1)) / total +
+			      0.05 / (CIE_COUNT - 1);
 		assert_true(wavelength_pdf(nm) == pdf && wavelength_pdf(nm + 0.999) == pdf);
 		assert_true(fabs(pdf / want - 1) < 1e-9);
 		sum += pdf;
@@ -114,25 +115,25 @@ static void test_white_has_little_colour_noise(void **state)
 			square[k] += rgb[k] * rgb[k] / N;
 		}
 	}
-	const double most[3] = {0.07, 0.03, 0.02};
+	const double max_variance[3] = {0.07, 0.03, 0.02};
 	for (int k = 0; k < 3; k++) {
 		double variance = square[k] / (sum[k] * sum[k]) - 1;
 		print_message("channel %d: relative variance %.4f\n", k, variance);
-		assert_true(variance < most[k]);
+		assert_true(variance < max_variance[k]);
 	}
 }
 
 /* A smooth spectrum far from flat, and its colour by the trapezoid rule at 1 nm. */
-static double bump(double nm)
+static double bump_spectrum(double nm)
 {
 	return 0.2 + 3 * exp(-(nm - 610) * (nm - 610) / 1800);
 }
 
-static void test_few_wavelengths(void **state)
+static void fewer_wavelengths_start_at_the_hero(void **state)
 {
 	(void)state;
-	for (size_t n = 0; n < HARD_US; n++) {
-		double u = hard_us[n];
+	for (size_t n = 0; n < CORNER_CASE_US; n++) {
+		double u = corner_case_us[n];
 		struct wavelengths all = wavelengths_sample_distinct(u, 4), old = wavelengths_sample(u);
 		struct wavelengths one = wavelengths_sample_distinct(u, 1), two = wavelengths_sample_distinct(u, 2);
 		assert_memory_equal(all.nm, old.nm, sizeof all.nm);
@@ -146,19 +147,19 @@ static void test_few_wavelengths(void **state)
 }
 
 /* The mean over u, by the midpoint rule, is the colour itself. */
-static void unbiased_of(unsigned count)
+static void check_mean_xyz(unsigned count)
 {
 	enum { N = 40000 };
 	double exact[3] = {0}, mean[3] = {0};
 	for (int i = 0; i < CIE_COUNT; i++)
 		for (int k = 0; k < 3; k++)
-			exact[k] += cie_observer[i][k] * bump(CIE_FIRST_NM + i) / CIE_Y_SUM;
+			exact[k] += cie_observer[i][k] * bump_spectrum(CIE_FIRST_NM + i) / CIE_Y_SUM;
 	for (int n = 0; n < N; n++) {
 		double xyz[3];
 		struct wavelengths w = wavelengths_sample_distinct((n + 0.5) / N, count);
 		spectrum s;
 		for (int k = 0; k < SPECTRUM_LANES; k++)
-			s.v[k] = bump(w.nm[k]);
+			s.v[k] = bump_spectrum(w.nm[k]);
 		spectrum_to_xyz(s, &w, xyz);
 		for (int k = 0; k < 3; k++)
 			mean[k] += xyz[k] / N;
@@ -172,14 +173,14 @@ static void unbiased_of(unsigned count)
 static void test_xyz_is_unbiased(void **state)
 {
 	(void)state;
-	unbiased_of(4);
-	unbiased_of(2);
-	unbiased_of(1);
+	check_mean_xyz(4);
+	check_mean_xyz(2);
+	check_mean_xyz(1);
 }
 
 /* X + Y + Z in one step, for lanes that are wavelengths and for lanes that are R, G and B, where the fourth lane does
  * not count. */
-static void test_intensity_weights(void **state)
+static void intensity_is_x_plus_y_plus_z_in_one_step(void **state)
 {
 	(void)state;
 	const struct wavelengths all[] = {
@@ -200,7 +201,7 @@ static void test_intensity_weights(void **state)
 
 /* The mean of lanes, also if their sum exceeds the largest double; where the sum is finite, the mean is a quarter of
  * it, bit by bit. */
-static void test_mean(void **state)
+static void mean_of_lanes_does_not_overflow(void **state)
 {
 	(void)state;
 	assert_true(spectrum_mean(spectrum_constant(DBL_MAX)) == DBL_MAX);
@@ -213,10 +214,14 @@ static void test_mean(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_published_sums),	       cmocka_unit_test(test_wavelengths_in_range_and_apart),
-		cmocka_unit_test(test_density_of_wavelengths), cmocka_unit_test(test_white_has_little_colour_noise),
-		cmocka_unit_test(test_few_wavelengths),	       cmocka_unit_test(test_xyz_is_unbiased),
-		cmocka_unit_test(test_intensity_weights),      cmocka_unit_test(test_mean),
+		cmocka_unit_test(matching_functions_have_their_published_sums),
+		cmocka_unit_test(wavelengths_are_a_quarter_of_the_density_apart),
+		cmocka_unit_test(density_is_the_derivative_of_the_share),
+		cmocka_unit_test(test_white_has_little_colour_noise),
+		cmocka_unit_test(fewer_wavelengths_start_at_the_hero),
+		cmocka_unit_test(test_xyz_is_unbiased),
+		cmocka_unit_test(intensity_is_x_plus_y_plus_z_in_one_step),
+		cmocka_unit_test(mean_of_lanes_does_not_overflow),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

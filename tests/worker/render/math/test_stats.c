@@ -18,7 +18,7 @@ static void assert_p(double p, double expected)
 		fail_msg("p = %.8g, published %g", p, expected);
 }
 
-static void test_published_quantiles(void **state)
+static void p_values_agree_with_published_quantiles(void **state)
 {
 	(void)state;
 	assert_p(stats_chi2_p(3.841459, 1), 0.05);
@@ -34,7 +34,7 @@ static void test_published_quantiles(void **state)
 	assert_true(stats_student_t_p(0, 5) == 1 && stats_student_t_p(INFINITY, 5) == 0);
 }
 
-static void test_counts(void **state)
+static void counts_are_tested_by_chi_square(void **state)
 {
 	(void)state;
 	const double expected[5] = {100, 100, 1, 1, 98};
@@ -73,7 +73,7 @@ static void test_p_values_are_uniform(void **state)
 	assert_true(stats_counts_p(t, tenths, 10) > 1e-6);
 }
 
-static void test_seeds(void **state)
+static void seed_is_a_hash_of_the_name(void **state)
 {
 	(void)state;
 	assert_true(stats_seed("") == 0xcbf29ce484222325u && stats_seed("a") == 0xaf63dc4c8601ec8cu);
@@ -82,10 +82,10 @@ static void test_seeds(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_published_quantiles),
-		cmocka_unit_test(test_counts),
+		cmocka_unit_test(p_values_agree_with_published_quantiles),
+		cmocka_unit_test(counts_are_tested_by_chi_square),
 		cmocka_unit_test(test_p_values_are_uniform),
-		cmocka_unit_test(test_seeds),
+		cmocka_unit_test(seed_is_a_hash_of_the_name),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,7 +38,8 @@ static double density_at(double x, double y, double z, uint32_t channel)
 #define DENSITY "<volume type='gridvolume' name='sigma_t'><string name='filename' value='d.vol'/>" AT "</volume>"
 #define S_OF(text) "<volume type='constvolume' name='S'><string name='value' value='" text "'/></volume>"
 
-static const struct memory_file *scene_of(const char *version, const char *type, const char *sigma_t, const char *phase)
+static const struct memory_file *make_scene_files(const char *version, const char *type, const char *sigma_t,
+						  const char *phase)
 {
 	static char xml[4096];
 	static struct memory_file files[4];
@@ -93,7 +94,7 @@ static void check_depths(const struct world *w, const char *name)
 	assert_true(most < 1e-5);
 }
 
-static void test_grids(void **state)
+static void test_depths_through_grids_are_exact(void **state)
 {
 	(void)state;
 	static const struct {
@@ -106,8 +107,8 @@ static void test_grids(void **state)
 	for (uint32_t channels = 1; channels <= 3; channels += 2)
 		for (int k = 0; k < 2; k++) {
 			vol_make(&density, side, channels, density_at);
-			const struct memory_file *files = scene_of("3.0.0", "heterogeneous", cases[k].sigma_t,
-								   "<phase type='sggx'>" MATRICES "</phase>");
+			const struct memory_file *files = make_scene_files("3.0.0", "heterogeneous", cases[k].sigma_t,
+									   "<phase type='sggx'>" MATRICES "</phase>");
 			struct world *w = world_from_files(8, 8, files);
 			check_depths(w, cases[k].name);
 			world_free(w);
@@ -115,18 +116,19 @@ static void test_grids(void **state)
 }
 
 /* At the centre of a cell, the matrix is that of the file, in world axes. */
-static void test_values(void **state)
+static void test_matrices_are_in_world_axes(void **state)
 {
 	(void)state;
 	static const uint32_t side[3] = {2, 2, 2};
 	vol_make(&matrices, side, 6, matrix_at);
 	vol_make(&density, side, 1, density_at);
-	struct world *w = world_from_files(8, 8,
-					   scene_of("3.0.0", "heterogeneous",
-						    "<volume type='gridvolume' name='sigma_t'><string name='filename' "
-						    "value='d.vol'/></volume>",
-						    "<phase type='sggx'><volume type='gridvolume' name='S'><string "
-						    "name='filename' value='s.vol'/></volume></phase>"));
+	struct world *w =
+		world_from_files(8, 8,
+				 make_scene_files("3.0.0", "heterogeneous",
+						  "<volume type='gridvolume' name='sigma_t'><string name='filename' "
+						  "value='d.vol'/></volume>",
+						  "<phase type='sggx'><volume type='gridvolume' name='S'><string "
+						  "name='filename' value='s.vol'/></volume></phase>"));
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	for (int k = 0; k < 8; k++) {
 		double x = k & 1, y = k >> 1 & 1, z = k >> 2;
@@ -145,7 +147,7 @@ static void test_values(void **state)
 }
 
 /* A constant matrix, given by six numbers and by a grid of one point, in both kinds of media. */
-static void test_even(void **state)
+static void test_constant_matrices_agree(void **state)
 {
 	(void)state;
 	static const char *const kinds[] = {
@@ -161,9 +163,10 @@ static void test_even(void **state)
 	vec3 d = {0.36, 0.48, 0.8};
 	double area = sqrt(0.5 * 0.1296 + 0.3 * 0.2304 + 0.4 * 0.64 + 0.2 * 0.1728 - 0.1 * 0.288 + 0.04 * 0.384);
 	for (int k = 0; k < 4; k++) {
-		struct world *w = world_from_files(8, 8,
-						   scene_of("3.0.0", k & 1 ? "heterogeneous" : "homogeneous",
-							    "<float name='sigma_t' value='3'/>", kinds[k >> 1]));
+		struct world *w =
+			world_from_files(8, 8,
+					 make_scene_files("3.0.0", k & 1 ? "heterogeneous" : "homogeneous",
+							  "<float name='sigma_t' value='3'/>", kinds[k >> 1]));
 		vec3 p = in_world(w, (vec3){0.5, 0.5, 0.5});
 		double found = medium_extinction(&w->media[0], p, d, &wl).v[0] * w->scale;
 		assert_true(fabs(found / (3 * area) - 1) < 1e-6);
@@ -178,7 +181,7 @@ static void test_even(void **state)
 #define ONE "1,1,1,0,0,0"
 #define FILE_OF(more) "<volume type='gridvolume' name='S'><string name='filename' value='s.vol'/>" more "</volume>"
 
-static void test_refused(void **state)
+static void test_invalid_flakes_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -215,27 +218,28 @@ static void test_refused(void **state)
 	vol_make(&matrices, (const uint32_t[3]){4, 3, 5}, 6, matrix_at);
 	vol_make(&density, (const uint32_t[3]){4, 3, 4}, 1, density_at);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		world_check_files_refused(scene_of("3.0.0", cases[i].type, cases[i].sigma_t, cases[i].phase),
+		world_check_files_refused(make_scene_files("3.0.0", cases[i].type, cases[i].sigma_t, cases[i].phase),
 					  cases[i].why);
-	world_check_files_refused(scene_of("0.6.0", "homogeneous", "<float name='sigma_t' value='1'/>", FLAKES("")),
-				  "a scene of 0.6 has no \"sggx\"");
+	world_check_files_refused(
+		make_scene_files("0.6.0", "homogeneous", "<float name='sigma_t' value='1'/>", FLAKES("")),
+		"a scene of 0.6 has no \"sggx\"");
 	matrices.value[6 * 7 + 2] = -1;
 	vol_write(&matrices);
-	world_check_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
+	world_check_files_refused(make_scene_files("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
 				  "is not positive definite");
 	matrices.value[6 * 7 + 2] = 1e13F;
 	vol_write(&matrices);
-	world_check_files_refused(scene_of("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
+	world_check_files_refused(make_scene_files("3.0.0", "heterogeneous", "", FLAKES(FILE_OF(""))),
 				  "S: its values go from ");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_grids),
-		cmocka_unit_test(test_values),
-		cmocka_unit_test(test_even),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_depths_through_grids_are_exact),
+		cmocka_unit_test(test_matrices_are_in_world_axes),
+		cmocka_unit_test(test_constant_matrices_agree),
+		cmocka_unit_test(test_invalid_flakes_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

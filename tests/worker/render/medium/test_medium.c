@@ -17,31 +17,32 @@
 
 #include <cmocka.h>
 
-static const vec3 nowhere = {0, 0, 0}; /* any point */
+static const vec3 any_point = {0, 0, 0}; /* any point */
 static const vec3 along_z = {0, 0, 1};
 
-static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
+static spectrum spectral_transmittance(const struct medium *m, double distance, const struct wavelengths *w)
 {
 	const struct medium_lanes lanes = medium_lanes_along(m, along_z, w);
-	return spectrum_transmittance(medium_optical_depth(&lanes, &(struct grid_ray){nowhere, along_z, 0, distance}));
+	return spectrum_transmittance(
+		medium_optical_depth(&lanes, &(struct grid_ray){any_point, along_z, 0, distance}));
 }
 
 static double transmittance_through(double sigma, double per_length, double distance)
 {
 	const struct medium m = {.first.color = color_constant(sigma),
 				 .second.color = color_constant(0),
-				 .absorbs = true,
+				 .is_absorbing = true,
 				 .per_length = per_length,
 				 .phase.ops = phase_registry[0]};
 	const struct wavelengths w = wavelengths_sample(0.3);
-	spectrum t = let_through(&m, distance, &w);
+	spectrum t = spectral_transmittance(&m, distance, &w);
 	for (int i = 1; i < SPECTRUM_LANES; i++)
 		assert_true(t.v[i] == t.v[0]);
 	return t.v[0];
 }
 
 /* (1 - sigma d / n)^n = exp(-sigma d) (1 - (sigma d)^2 / 2n + ...). */
-static void test_layers(void **state)
+static void test_transmittance_is_the_limit_of_layers(void **state)
 {
 	(void)state;
 	enum { LAYERS = 1 << 20 };
@@ -54,7 +55,7 @@ static void test_layers(void **state)
 	}
 }
 
-static void test_ends(void **state)
+static void test_extreme_transmittances_are_exact(void **state)
 {
 	(void)state;
 	assert_true(transmittance_through(0, 1, INFINITY) == 1);
@@ -66,7 +67,7 @@ static void test_ends(void **state)
 }
 
 /* Coefficients that depend on the wavelength, some of them 0, given in both ways. */
-static const struct wavelengths four = {.nm = {450, 500, 550, 600}};
+static const struct wavelengths four_wavelengths = {.nm = {450, 500, 550, 600}};
 static const double nm[] = {450, 500, 550, 600};
 static const double sigma_a[] = {0.5, 0, 1, 0}, sigma_s[] = {1.5, 0.25, 3, 0};
 static const double sigma_t[] = {2, 0.25, 4, 0}, albedo[] = {0.75, 1, 0.75, 0.5};
@@ -76,30 +77,31 @@ static struct medium coloured_medium(bool by_albedo)
 	return (struct medium){.first.color = color_from_samples(4, nm, by_albedo ? sigma_t : sigma_a, false, false),
 			       .second.color = color_from_samples(4, nm, by_albedo ? albedo : sigma_s, false, false),
 			       .uses_albedo = by_albedo,
-			       .absorbs = true,
-			       .scatters = true,
+			       .is_absorbing = true,
+			       .is_scattering = true,
 			       .per_length = 2,
 			       .phase.ops = phase_registry[0]};
 }
 
-static void test_coefficients(void **state)
+static void test_coefficients_agree_with_albedo(void **state)
 {
 	(void)state;
 	for (int by_albedo = 0; by_albedo <= 1; by_albedo++) {
 		struct medium m = coloured_medium(by_albedo);
-		spectrum s = medium_scattering(&m, nowhere, along_z, &four), left = let_through(&m, 0.3, &four);
+		spectrum s = medium_scattering(&m, any_point, along_z, &four_wavelengths),
+			 left = spectral_transmittance(&m, 0.3, &four_wavelengths);
 		for (int i = 0; i < SPECTRUM_LANES; i++) {
 			assert_true(fabs(s.v[i] - 2 * sigma_s[i]) < 1e-12);
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_t[i])) < 1e-12);
 		}
-		m.absorbs = false;
-		left = let_through(&m, 0.3, &four);
+		m.is_absorbing = false;
+		left = spectral_transmittance(&m, 0.3, &four_wavelengths);
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_s[i])) < 1e-12);
-		m.absorbs = true;
-		m.scatters = false;
-		assert_true(spectrum_is_zero(medium_scattering(&m, nowhere, along_z, &four)));
-		left = let_through(&m, 0.3, &four);
+		m.is_absorbing = true;
+		m.is_scattering = false;
+		assert_true(spectrum_is_zero(medium_scattering(&m, any_point, along_z, &four_wavelengths)));
+		left = spectral_transmittance(&m, 0.3, &four_wavelengths);
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_a[i])) < 1e-12);
 	}
@@ -123,15 +125,15 @@ static void check_rgb(const char *version, const char *inner, double red_s, doub
 {
 	struct world *w = world_with(version, inner);
 	const struct wavelengths rgb = {.is_rgb = true};
-	double s = medium_scattering(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale,
-	       t = medium_extinction(&w->media[0], nowhere, along_z, &rgb).v[0] * w->scale;
+	double s = medium_scattering(&w->media[0], any_point, along_z, &rgb).v[0] * w->scale,
+	       t = medium_extinction(&w->media[0], any_point, along_z, &rgb).v[0] * w->scale;
 	if (fabs(s - red_s) > 1e-9 || fabs(t - red_t) > 1e-9)
 		fail_msg("%s: sigma_s %g and sigma_t %g, not %g and %g", inner, s, t, red_s, red_t);
 	world_free(w);
 }
 
 /* The defaults of both dialects, and the names of materials in 0.6. */
-static void test_descriptions(void **state)
+static void test_descriptions_follow_the_dialect(void **state)
 {
 	(void)state;
 	check_rgb("3.0.0", "", 0.75, 1);
@@ -173,7 +175,7 @@ static void test_descriptions(void **state)
 	" type='homogeneous'><float name='sigma_s' value='0'/><float name='sigma_a' value='1'/></medium>"
 
 /* Every third shape has a medium of its own inside, every third the shared one outside. */
-static void test_numbers(void **state)
+static void test_shapes_share_media(void **state)
 {
 	(void)state;
 	enum { SHAPES = 300, ROOM = 320 };
@@ -199,9 +201,11 @@ static void test_numbers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_layers),	     cmocka_unit_test(test_ends),
-		cmocka_unit_test(test_coefficients), cmocka_unit_test(test_descriptions),
-		cmocka_unit_test(test_numbers),
+		cmocka_unit_test(test_transmittance_is_the_limit_of_layers),
+		cmocka_unit_test(test_extreme_transmittances_are_exact),
+		cmocka_unit_test(test_coefficients_agree_with_albedo),
+		cmocka_unit_test(test_descriptions_follow_the_dialect),
+		cmocka_unit_test(test_shapes_share_media),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,16 +20,16 @@
 
 #include <cmocka.h>
 
-static const double gs[] = {-0.999, -0.9, -0.3, -1e-9, 0, 1e-9, 0.5, 0.8, 0.999};
-enum { GS = sizeof gs / sizeof *gs };
+static const double g_values[] = {-0.999, -0.9, -0.3, -1e-9, 0, 1e-9, 0.5, 0.8, 0.999};
+enum { GS = sizeof g_values / sizeof *g_values };
 
-static const vec3 nowhere = {0, 0, 0};
+static const vec3 any_point = {0, 0, 0};
 
 typedef double integrand(const struct phase *p, double cosine);
 
 static double density(const struct phase *p, double cosine)
 {
-	return 2 * M_PI * p->ops->eval(p, nowhere, cosine);
+	return 2 * M_PI * p->ops->eval(p, any_point, cosine);
 }
 
 static double density_times_cosine(const struct phase *p, double cosine)
@@ -56,16 +56,16 @@ static void check_directions(const struct phase *p)
 	struct frame straight = frame_around(vec3_neg(wo));
 	for (int i = 0; i < NUMBERS; i++) {
 		vec3 sum = {0, 0, 0};
-		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, nowhere, u), pdf;
+		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, any_point, u), pdf;
 		for (int k = 0; k < NUMBERS; k++) {
 			const double numbers[] = {u, (k + 0.5) / NUMBERS};
-			vec3 wi = phase_sample(p, nowhere, wo, numbers, &pdf), local = frame_to_local(&straight, wi);
+			vec3 wi = phase_sample(p, any_point, wo, numbers, &pdf), local = frame_to_local(&straight, wi);
 			assert_true(fabs(vec3_length(wi) - 1) < 1e-12);
 			assert_true(fabs(local.z - cosine) < 1e-12);
 			sum = vec3_madd(sum, 1, local);
 			/* the cosine is rounded near 1 */
-			assert_true(fabs(phase_eval(p, nowhere, wo, wi) / pdf - 1) < 1e-8);
-			assert_true(phase_eval(p, nowhere, wi, wo) == phase_eval(p, nowhere, wo, wi));
+			assert_true(fabs(phase_eval(p, any_point, wo, wi) / pdf - 1) < 1e-8);
+			assert_true(phase_eval(p, any_point, wi, wo) == phase_eval(p, any_point, wo, wi));
 		}
 		assert_true(fabs(sum.x) + fabs(sum.y) < 1e-9);
 	}
@@ -76,18 +76,18 @@ static void check_share(const struct phase *p, double bound, unsigned parts)
 	enum { NUMBERS = 1 << 12 };
 	unsigned below = 0;
 	for (int i = 0; i < NUMBERS; i++)
-		below += p->ops->sample(p, nowhere, (i + 0.5) / NUMBERS) < bound;
+		below += p->ops->sample(p, any_point, (i + 0.5) / NUMBERS) < bound;
 	assert_true(fabs(integral(p, density, bound) - (double)below / NUMBERS) < 1e-6 + (double)parts / NUMBERS);
 }
 
 /* parts: number of parts between which u chooses first; 0: none. */
-static void check(const struct phase *p, double mean, unsigned parts)
+static void check_phase(const struct phase *p, double mean, unsigned parts)
 {
 	enum { NUMBERS = 20 };
 	assert_true(fabs(integral(p, density, 1) - 1) < 1e-6);
 	assert_true(fabs(integral(p, density_times_cosine, 1) - mean) < 1e-6);
 	for (int i = 0; i < NUMBERS; i++) {
-		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, nowhere, u);
+		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, any_point, u);
 		assert_true(cosine >= -1 && cosine <= 1);
 		if (parts)
 			check_share(p, 2 * u - 1, parts);
@@ -95,10 +95,10 @@ static void check(const struct phase *p, double mean, unsigned parts)
 			assert_true(fabs(integral(p, density, cosine) - u) < 1e-6);
 	}
 	for (int end = -1; end <= 1; end += 2)
-		assert_true(isfinite(p->ops->eval(p, nowhere, end)) && p->ops->eval(p, nowhere, end) >= 0);
+		assert_true(isfinite(p->ops->eval(p, any_point, end)) && p->ops->eval(p, any_point, end) >= 0);
 	/* on the side without the peak, terms of size 1 cancel to (1 - g)^2 */
-	assert_true(fabs(p->ops->sample(p, nowhere, 0)) <= 1 + 1e-9 &&
-		    fabs(p->ops->sample(p, nowhere, 1 - 0x1p-53)) <= 1 + 1e-9);
+	assert_true(fabs(p->ops->sample(p, any_point, 0)) <= 1 + 1e-9 &&
+		    fabs(p->ops->sample(p, any_point, 1 - 0x1p-53)) <= 1 + 1e-9);
 	check_directions(p);
 }
 
@@ -107,7 +107,7 @@ static void check(const struct phase *p, double mean, unsigned parts)
 static void make_phase(struct phase *p, const struct scene_node *n)
 {
 	static struct arena arena;
-	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .world_scale = 1};
+	const struct volume_build build = {.arena = &arena, .is_dialect_3 = true, .world_scale = 1};
 	struct error e;
 	if (phase_create(p, n, &build, &e))
 		fail_msg("%s", e.text);
@@ -132,22 +132,22 @@ static void make_phase(struct phase *p, const struct scene_node *n)
 		__VA_ARGS__                                                  \
 	}
 
-static void test_simple(void **state)
+static void test_simple_functions_are_normalized(void **state)
 {
 	(void)state;
 	struct phase p;
 	make_phase(&p, &NODE("isotropic"));
-	check(&p, 0, 0);
+	check_phase(&p, 0, 0);
 	make_phase(&p, &NODE("rayleigh"));
-	check(&p, 0, 0);
+	check_phase(&p, 0, 0);
 	for (int k = 0; k < GS; k++) {
-		make_phase(&p, &NODE("hg", NUMBER("g", gs[k])));
-		check(&p, gs[k], 0);
+		make_phase(&p, &NODE("hg", NUMBER("g", g_values[k])));
+		check_phase(&p, g_values[k], 0);
 	}
 }
 
 /* Returns the mean cosine of a table with equidistant values. */
-static double mean_of_table(const double *value, int count)
+static double mean_cosine_of_table(const double *value, int count)
 {
 	double h = 2.0 / (count - 1), sum = 0, moment = 0;
 	for (int i = 0; i + 1 < count; i++) {
@@ -158,7 +158,7 @@ static double mean_of_table(const double *value, int count)
 	return moment / sum;
 }
 
-static void test_tables(void **state)
+static void test_tables_are_interpolated(void **state)
 {
 	(void)state;
 	static const struct {
@@ -174,17 +174,17 @@ static void test_tables(void **state)
 	struct phase p;
 	for (size_t i = 0; i < sizeof tables / sizeof *tables; i++) {
 		make_phase(&p, &NODE("tabphase", TEXT("values", tables[i].text)));
-		check(&p, mean_of_table(tables[i].value, tables[i].count), 0);
+		check_phase(&p, mean_cosine_of_table(tables[i].value, tables[i].count), 0);
 	}
 	/* The order of values: the last one is for the cosine 1, forward scattering. */
 	make_phase(&p, &NODE("tabphase", TEXT("values", "1,2,5")));
-	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, -1}, (vec3){0, 0, 1}) * 2 * M_PI - 1) < 1e-15);
-	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, 1}, (vec3){0, 0, 1}) * 2 * M_PI - 0.2) < 1e-15);
-	assert_true(fabs(p.ops->eval(&p, nowhere, -0.5) * 2 * M_PI - 0.3) < 1e-15);
+	assert_true(fabs(phase_eval(&p, any_point, (vec3){0, 0, -1}, (vec3){0, 0, 1}) * 2 * M_PI - 1) < 1e-15);
+	assert_true(fabs(phase_eval(&p, any_point, (vec3){0, 0, 1}, (vec3){0, 0, 1}) * 2 * M_PI - 0.2) < 1e-15);
+	assert_true(fabs(p.ops->eval(&p, any_point, -0.5) * 2 * M_PI - 0.3) < 1e-15);
 }
 
 /* The Henyey-Greenstein function as a fine table. */
-static void test_fine_table(void **state)
+static void test_fine_table_matches_henyey_greenstein(void **state)
 {
 	(void)state;
 	enum { VALUES = 4097 };
@@ -194,19 +194,19 @@ static void test_fine_table(void **state)
 	make_phase(&hg, &NODE("hg", NUMBER("g", 0.6)));
 	for (int i = 0; i < VALUES; i++)
 		length += (size_t)snprintf(text + length, sizeof text - length, "%.17g ",
-					   hg.ops->eval(&hg, nowhere, -1 + i * (2.0 / (VALUES - 1))));
+					   hg.ops->eval(&hg, any_point, -1 + i * (2.0 / (VALUES - 1))));
 	make_phase(&table, &NODE("tabphase", TEXT("values", text)));
 	for (int i = 0; i < 1000; i++) {
 		double u = (i + 0.5) / 1000, cosine = 2 * u - 1;
-		double wanted = hg.ops->eval(&hg, nowhere, cosine), drawn = hg.ops->sample(&hg, nowhere, u);
+		double wanted = hg.ops->eval(&hg, any_point, cosine), drawn = hg.ops->sample(&hg, any_point, u);
 		/* The error is an eighth of the squared width times the second derivative over the value, which is at
 		 * most 211. */
-		assert_true(fabs(table.ops->eval(&table, nowhere, cosine) / wanted - 1) < 8e-6);
-		assert_true(fabs(table.ops->sample(&table, nowhere, u) - drawn) < 2e-6);
+		assert_true(fabs(table.ops->eval(&table, any_point, cosine) / wanted - 1) < 8e-6);
+		assert_true(fabs(table.ops->sample(&table, any_point, u) - drawn) < 2e-6);
 	}
 }
 
-static void test_parts(void **state)
+static void test_mixtures_are_sums_of_their_parts(void **state)
 {
 	(void)state;
 	struct phase p;
@@ -214,12 +214,12 @@ static void test_parts(void **state)
 				table = NODE("tabphase", TEXT("values", "0,1,0")), even = NODE("isotropic");
 	for (int k = 0; k <= 4; k++) {
 		make_phase(&p, &NODE("blendphase", NUMBER("weight", k / 4.0), INSIDE(2, &forwards, &backwards)));
-		check(&p, 0.8 * (1 - k / 4.0) - 0.5 * k / 4.0, 2);
+		check_phase(&p, 0.8 * (1 - k / 4.0) - 0.5 * k / 4.0, 2);
 		assert_true(p.absorbed_share == 0);
 	}
 	const struct scene_node blend = NODE("blendphase", INSIDE(2, &forwards, &table));
 	make_phase(&p, &blend);
-	check(&p, 0.4, 2);
+	check_phase(&p, 0.4, 2);
 	static const struct {
 		const char *weights;
 		double mean, absorbed;
@@ -230,13 +230,13 @@ static void test_parts(void **state)
 	for (size_t i = 0; i < sizeof mixtures / sizeof *mixtures; i++) {
 		make_phase(&p, &NODE("mixturephase", TEXT("weights", mixtures[i].weights),
 				     INSIDE(3, &backwards, &even, &blend)));
-		check(&p, mixtures[i].mean, 4);
+		check_phase(&p, mixtures[i].mean, 4);
 		assert_true(fabs(p.absorbed_share - mixtures[i].absorbed) < 1e-15);
 	}
 }
 
 /* The defaults of a node without properties, and without a node. */
-static void test_defaults(void **state)
+static void test_missing_properties_have_defaults(void **state)
 {
 	(void)state;
 	struct phase p;
@@ -246,14 +246,17 @@ static void test_defaults(void **state)
 	assert_string_equal(p.ops->decl.type, "hg");
 	assert_true(p.g == 0.8);
 	make_phase(&p, &NODE("rayleigh"));
-	assert_true(fabs(p.ops->eval(&p, nowhere, 1) / p.ops->eval(&p, nowhere, 0) - 2) < 1e-15);
+	assert_true(fabs(p.ops->eval(&p, any_point, 1) / p.ops->eval(&p, any_point, 0) - 2) < 1e-15);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_simple), cmocka_unit_test(test_tables),	cmocka_unit_test(test_fine_table),
-		cmocka_unit_test(test_parts),  cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_simple_functions_are_normalized),
+		cmocka_unit_test(test_tables_are_interpolated),
+		cmocka_unit_test(test_fine_table_matches_henyey_greenstein),
+		cmocka_unit_test(test_mixtures_are_sums_of_their_parts),
+		cmocka_unit_test(test_missing_properties_have_defaults),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

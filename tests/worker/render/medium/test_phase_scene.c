@@ -17,14 +17,14 @@
 static struct vol grid;
 static const vec3 along_z = {0, 0, 1};
 
-static double along_x(double x, double y, double z, uint32_t channel)
+static double ramp_along_x(double x, double y, double z, uint32_t channel)
 {
 	(void)y, (void)z;
 	return 0.25 + 0.5 * x + 0.125 * channel;
 }
 
 /* A sphere of a medium that scatters by `phase`; g.vol is `grid`. */
-static const struct memory_file *scene_of(const char *phase)
+static const struct memory_file *make_scene_files(const char *phase)
 {
 	static char xml[2048];
 	static struct memory_file files[3];
@@ -50,14 +50,14 @@ static const struct memory_file *scene_of(const char *phase)
 
 /* Two values along x, at the centres of the halves of the unit cube: the weight is interpolated between them, and
  * constant beyond. */
-static void test_weight_on_grid(void **state)
+static void test_weights_on_grids_are_interpolated(void **state)
 {
 	(void)state;
 	static const struct {
 		double x, weight;
 	} places[] = {{-1, 0.25}, {0.1, 0.25}, {0.25, 0.25}, {0.5, 0.5}, {0.6, 0.6}, {0.75, 0.75}, {0.9, 0.75}};
-	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, along_x);
-	struct world *w = world_from_files(8, 8, scene_of(BLEND(ON_GRID)));
+	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 1, ramp_along_x);
+	struct world *w = world_from_files(8, 8, make_scene_files(BLEND(ON_GRID)));
 	const struct phase *p = &w->media[0].phase;
 	vec3 wo = {0, 0.6, 0.8}, wi = {0, 0, -1}; /* the cosine of the scattering angle is 0.8 */
 	double even = 1 / (4 * M_PI), forwards = even * 0.75 / pow(0.45, 1.5);
@@ -77,11 +77,11 @@ static void test_weight_on_grid(void **state)
 	world_free(w);
 }
 
-static void test_what_weights_leave(void **state)
+static void test_missing_weight_is_absorbed(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	struct world *w = world_from_files(8, 8, scene_of(MIXTURE(".2; .5", FORWARDS TABLE)));
+	struct world *w = world_from_files(8, 8, make_scene_files(MIXTURE(".2; .5", FORWARDS TABLE)));
 	const struct medium *m = &w->media[0];
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(medium_scattering(m, o, along_z, &wl).v[0] * w->scale - 0.7 * 2) < 1e-12);
@@ -93,17 +93,17 @@ static void test_what_weights_leave(void **state)
 }
 
 /* A weight above 1 selects the second part alone. */
-static void test_weight_above_one(void **state)
+static void test_weight_above_one_selects_the_second_part(void **state)
 {
 	(void)state;
-	struct world *w = world_from_files(8, 8, scene_of(BLEND("<float name='weight' value='1.5'/>")));
+	struct world *w = world_from_files(8, 8, make_scene_files(BLEND("<float name='weight' value='1.5'/>")));
 	const struct phase *p = &w->media[0].phase;
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(p->ops->eval(p, o, 0.4) - 0.75 / (4 * M_PI * pow(0.85, 1.5))) < 1e-12);
 	world_free(w);
 }
 
-static void test_refused(void **state)
+static void test_invalid_phases_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -130,23 +130,23 @@ static void test_refused(void **state)
 		{"<phase type='tabphase'><string name='values' value='0,0,0'/></phase>", "values: all are 0"},
 		{"<phase type='hg'>" FORWARDS "</phase>", "a phase without a name has no place in <phase type=\"hg\">"},
 	};
-	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 3, along_x);
+	vol_make(&grid, (const uint32_t[3]){2, 1, 1}, 3, ramp_along_x);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		world_check_files_refused(scene_of(cases[i].phase), cases[i].why);
+		world_check_files_refused(make_scene_files(cases[i].phase), cases[i].why);
 	char many[2000] = "<phase type='mixturephase'>";
 	for (int i = 0; i < 17; i++)
 		strcat(many, "<phase type='isotropic'/>");
 	strcat(many, "</phase>");
-	world_check_files_refused(scene_of(many), "more than 16 phase functions inside");
+	world_check_files_refused(make_scene_files(many), "more than 16 phase functions inside");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_weight_on_grid),
-		cmocka_unit_test(test_what_weights_leave),
-		cmocka_unit_test(test_weight_above_one),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_weights_on_grids_are_interpolated),
+		cmocka_unit_test(test_missing_weight_is_absorbed),
+		cmocka_unit_test(test_weight_above_one_selects_the_second_part),
+		cmocka_unit_test(test_invalid_phases_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@
 #define EXPLICIT_DIRECTION 0.02
 
 /* Returns log |n.i| |d omega_i / d h_par| at vertex j, with the cosine `n_i` for |n.i|. */
-static inline double explicit_log_turn(const struct full_path *x, unsigned j, double n_i)
+static inline double explicit_log_halfvec_jacobian(const struct full_path *x, unsigned j, double n_i)
 {
 	vec2 h = halfvec_of(x, j);
 	if (full_path_eta(x, j) == 1 && (x->v[j].mode & BSDF_TRANSMIT)) /* h is (i + o)_xy, of area |n.i| d omega */
@@ -42,7 +42,7 @@ static inline double explicit_log_gauss(double dx, double dy, double sigma)
 }
 
 /* Returns the half vector of x_j turned into the frame of y_j (sec. 4), by angles. */
-static inline vec2 explicit_turned(const struct full_path *x, const struct full_path *y, unsigned j)
+static inline vec2 explicit_turned_halfvec(const struct full_path *x, const struct full_path *y, unsigned j)
 {
 	vec2 h = halfvec_of(x, j);
 	vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
@@ -55,15 +55,15 @@ static inline vec2 explicit_turned(const struct full_path *x, const struct full_
 }
 
 /* Returns the logarithm of the factor from density per solid angle, at y_{j+1}, to density per area at y_j. */
-static inline double explicit_log_arrive(const struct full_path *y, unsigned j)
+static inline double explicit_log_area_factor(const struct full_path *y, unsigned j)
 {
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
 /* Returns the logarithm of the further factor of a vertex in a medium, from the density of the distance; adds to
  * *choice the logarithm of the density of the distance's logarithm. */
-static inline double explicit_log_event(const struct full_path *x, const struct full_path *y, unsigned j,
-					double *choice)
+static inline double explicit_log_distance_factor(const struct full_path *x, const struct full_path *y, unsigned j,
+						  double *choice)
 {
 	if (y->v[j].kind != VERTEX_MEDIUM)
 		return 0;
@@ -74,7 +74,7 @@ static inline double explicit_log_event(const struct full_path *x, const struct 
 }
 
 /* Returns the logarithm of the density per solid angle of the direction in which y leaves a scattering event. */
-static inline double explicit_log_leave(const struct full_path *x, const struct full_path *y, unsigned j)
+static inline double explicit_log_direction_density(const struct full_path *x, const struct full_path *y, unsigned j)
 {
 	struct frame a = frame_around(x->edge[j].w), b = frame_around(y->edge[j].w);
 	vec3 from = frame_to_world(&b, frame_to_local(&a, vec3_neg(x->edge[j - 1].w))), to = vec3_neg(y->edge[j - 1].w);
@@ -84,42 +84,42 @@ static inline double explicit_log_leave(const struct full_path *x, const struct 
 
 /* The part of the path traced from the camera. *log_choices: the symmetric choices alone, of the film point and of
  * the half vectors. */
-static inline double explicit_log_traced(const struct path_context *c, const struct full_path *x,
-					 const struct full_path *y, unsigned b, double *log_choices)
+static inline double explicit_log_traced_part(const struct path_context *c, const struct full_path *x,
+					      const struct full_path *y, unsigned b, double *log_choices)
 {
 	unsigned k = y->edges;
-	struct camera now;
-	const struct camera *camera = world_camera(c->w, &y->v[k].x, &now);
+	struct camera camera_at_x;
+	const struct camera *camera = world_camera_at(c->w, &y->v[k].x, &camera_at_x);
 	*log_choices = 0;
 	if (b == k)
 		return 0;
 	*log_choices = explicit_log_gauss(y->film[0] - x->film[0], y->film[1] - x->film[1],
 					  EXPLICIT_FILM * fmin(camera->width, camera->height));
 	double sum = log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) +
-		     explicit_log_arrive(y, k - 1) + explicit_log_event(x, y, k - 1, log_choices);
+		     explicit_log_area_factor(y, k - 1) + explicit_log_distance_factor(x, y, k - 1, log_choices);
 	for (unsigned j = k - 1; j > b; j--) {
 		const struct path_vertex *v = &y->v[j];
 		if (v->kind == VERTEX_MEDIUM) {
-			*log_choices += explicit_log_leave(x, y, j);
-		} else if (v->delta) {
+			*log_choices += explicit_log_direction_density(x, y, j);
+		} else if (v->is_delta) {
 			/* the density is 1 per solid angle projected on the geometric normal */
 			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
 		} else {
-			vec2 h = halfvec_of(y, j), from = explicit_turned(x, y, j);
+			vec2 h = halfvec_of(y, j), from = explicit_turned_halfvec(x, y, j);
 			double sigma = EXPLICIT_HALFVEC * 0.5 *
 				       (fmin(x->v[j].bsdf->min_alpha, 1) + fmin(v->bsdf->min_alpha, 1));
 			*log_choices += explicit_log_gauss(h.x - from.x, h.y - from.y, sigma);
-			sum -= explicit_log_turn(y, j, 1);
+			sum -= explicit_log_halfvec_jacobian(y, j, 1);
 		}
-		sum += explicit_log_arrive(y, j - 1) + explicit_log_event(x, y, j - 1, log_choices);
+		sum += explicit_log_area_factor(y, j - 1) + explicit_log_distance_factor(x, y, j - 1, log_choices);
 	}
 	return sum + *log_choices;
 }
 
 /* The part between the ends b and c, at y, with steps dh drawn at x; dh NULL: no steps. */
-static inline double explicit_log_between(const struct path_context *c, const struct full_path *x,
-					  const struct full_path *y, unsigned b, unsigned c_end, const vec2 *dh,
-					  double sign)
+static inline double explicit_log_walked_part(const struct path_context *c, const struct full_path *x,
+					      const struct full_path *y, unsigned b, unsigned c_end, const vec2 *dh,
+					      double sign)
 {
 	static struct constraint at_x[FULL_PATH_VERTICES_MAX], at_y[FULL_PATH_VERTICES_MAX];
 	static struct constraint_system system;
@@ -134,8 +134,8 @@ static inline double explicit_log_between(const struct path_context *c, const st
 		halfvec_compute_steps(c, x, at_x, b, c_end, step);
 	}
 	for (unsigned j = c_end + 1; j < b; j++) {
-		if (y->v[j].delta)
-			sum += explicit_log_turn(y, j, vec3_dot(y->v[j].x.ng, y->edge[j - 1].w));
+		if (y->v[j].is_delta)
+			sum += explicit_log_halfvec_jacobian(y, j, vec3_dot(y->v[j].x.ng, y->edge[j - 1].w));
 		else if (dh)
 			sum += halfvec_step_log_pdf(&step[j], vec2_scale(sign, dh[j]));
 	}
@@ -143,12 +143,12 @@ static inline double explicit_log_between(const struct path_context *c, const st
 }
 
 /* Returns the logarithm of the probability of b and c, if the strategy draws them by the heuristic; otherwise 0. */
-static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
-					 const struct mutation_forced_choice *how, const struct full_path *x,
-					 unsigned b, unsigned c_end)
+static inline double explicit_log_selection(const struct path_context *c, const char *strategy,
+					    const struct mutation_forced_choice *forced, const struct full_path *x,
+					    unsigned b, unsigned c_end)
 {
 	double weight[FULL_PATH_VERTICES_MAX], p = 1;
-	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
+	bool hslt = strcmp(strategy, "hslt") == 0 && forced->b < 0, light = strcmp(strategy, "light") == 0;
 	if (hslt || light) {
 		heuristic_roughness.weigh_b(c, x, weight);
 		/* c = 0 is fixed, so b lies above it. */
@@ -169,7 +169,7 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 		 * hit. */
 		double found = c->w->emitters[x->v[0].emitter].is_delta ? 0 : 0.1, all = found;
 		for (unsigned i = 1; i < x->edges; i++)
-			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);
+			all += !x->v[i].is_delta && (i == 1 || !x->v[i - 1].is_delta);
 		p = (b == 0 ? found : 1) / all;
 	}
 	return log(p);

@@ -45,8 +45,8 @@
 		"</shape>"
 
 struct test_scene {
-	const char *name, *text;
-	bool mesh; /* the scene uses ball.obj, a file in memory */
+	const char *name, *xml;
+	bool uses_mesh; /* the scene uses ball.obj, a file in memory */
 };
 
 static const struct test_scene test_scenes[] = {
@@ -103,7 +103,7 @@ static const struct test_scene test_scenes[] = {
 enum { TEST_SCENES = sizeof test_scenes / sizeof *test_scenes };
 
 /* Writes a ball of 8 by 4 faces with the normals of a sphere; returns the size. */
-static inline size_t ball_obj(char *text, size_t size)
+static inline size_t write_ball_obj(char *text, size_t size)
 {
 	enum { AROUND = 8, UP = 4 };
 	size_t n = 0;
@@ -126,18 +126,19 @@ static inline size_t ball_obj(char *text, size_t size)
 	return n;
 }
 
-static inline struct world *test_world(const char *name)
+static inline struct world *make_test_world(const char *name)
 {
 	static char xml[1 << 14], obj[1 << 14];
 	for (int i = 0; i < TEST_SCENES; i++) {
 		const struct test_scene *s = &test_scenes[i];
 		if (strcmp(s->name, name) != 0)
 			continue;
-		if (!s->mesh)
-			return world_from_text(32, 32, "%s", s->text);
-		int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->text);
-		const struct memory_file files[] = {
-			{"test.xml", xml, (size_t)n}, {"ball.obj", obj, ball_obj(obj, sizeof obj)}, {NULL, NULL, 0}};
+		if (!s->uses_mesh)
+			return world_from_text(32, 32, "%s", s->xml);
+		int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->xml);
+		const struct memory_file files[] = {{"test.xml", xml, (size_t)n},
+						    {"ball.obj", obj, write_ball_obj(obj, sizeof obj)},
+						    {NULL, NULL, 0}};
 		return world_from_files(32, 32, files);
 	}
 	return NULL;

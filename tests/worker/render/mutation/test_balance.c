@@ -22,13 +22,13 @@ enum { TRIALS = 64 };
 
 /* Proposals from each start. Strategies that choose b and c for themselves get more than forced ones; strategies that
  * the room uses by default get so many that all rooms together find a fault of 2 %. */
-enum { REPEAT = 2, REPEAT_DEFAULT = 8, REPEAT_MORE = 14, REPEAT_RARE = 25, MOST_STARTS = 256 };
+enum { REPEAT = 2, REPEAT_DEFAULT = 8, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_MAX = 256 };
 /* Starting paths of the proposals: in each room, and for a strategy that only a single room uses. */
 enum { STARTS = 32, STARTS_RARE = 240 };
-#define MUST_FIND 0.02
+#define FAULT_TO_FIND 0.02
 
 /* Results of the strategies in default use, pooled over all rooms. */
-static struct balance_pool pool[BATCH_STRATEGIES * 2];
+static struct balance_pool pooled_results[BATCH_STRATEGIES * 2];
 
 static bool is_default(const struct world *w, const struct mutation_ops *ops)
 {
@@ -41,26 +41,28 @@ static unsigned repeats_of(const struct world *w, const struct mutation_ops *ops
 {
 	if (!is_default(w, ops))
 		return REPEAT;
-	bool noisy = ops->independent || strcmp(ops->name, "light") == 0; /* few rooms have a lamp that can be moved */
+	bool noisy =
+		ops->is_independent || strcmp(ops->name, "light") == 0; /* few rooms have a lamp that can be moved */
 	return noisy ? REPEAT_MORE : REPEAT_DEFAULT;
 }
 
 /* Repeats the trial with so many more starts that the room alone finds a fault of 2 %, estimated from the power of a
  * short trial; takes a minute per room. */
-static void check_alone(const struct world *w, const struct room *room, const struct balance_trial *few)
+static void check_room_alone(const struct world *w, const struct room *room, const struct balance_trial *short_trial)
 {
 	static struct balance_trial t;
-	struct balance_verdict v = balance_judge(few);
-	double times = pow(v.power / MUST_FIND, 2) * few->proposals_per_start / REPEAT_MORE;
-	size_t more = (size_t)fmin(ceil(1.2 * times), MOST_STARTS);
+	struct balance_verdict v = balance_judge(short_trial);
+	double times = pow(v.power / FAULT_TO_FIND, 2) * short_trial->proposals_per_start / REPEAT_MORE;
+	size_t start_count = (size_t)fmin(ceil(1.2 * times), STARTS_MAX);
 	do {
-		t = (struct balance_trial){.ops = few->ops, .setting = {-1, -1}, .proposals_per_start = REPEAT_MORE};
-		balance_run(w, room->name, &t, 1, dice_scaled_count(STARTS) * more, 800 * more);
+		t = (struct balance_trial){
+			.ops = short_trial->ops, .setting = {-1, -1}, .proposals_per_start = REPEAT_MORE};
+		balance_run(w, room->name, &t, 1, dice_scaled_count(STARTS) * start_count, 800 * start_count);
 		v = balance_judge(&t);
-		more *= 2;
-	} while (more <= MOST_STARTS && v.power > MUST_FIND && v.is_balanced);
+		start_count *= 2;
+	} while (start_count <= STARTS_MAX && v.power > FAULT_TO_FIND && v.is_balanced);
 	balance_print(room->name, &t, &v);
-	assert_true(v.is_balanced && (v.power <= MUST_FIND || dice_scaled_count(STARTS) < STARTS));
+	assert_true(v.is_balanced && (v.power <= FAULT_TO_FIND || dice_scaled_count(STARTS) < STARTS));
 }
 
 /* Only one room has an aperture: it must find alone what for other strategies all rooms find together. */
@@ -74,7 +76,7 @@ static void pool_rare(const struct world *w, const struct room *room, const stru
 }
 
 /* Each b and c is forced in three rooms; with FULL=1 in all, and in a room selected by ROOM. */
-static bool is_forced_here(const char *room)
+static bool is_forced_in_room(const char *room)
 {
 	return test_is_full() || getenv("ROOM") || strcmp(room, "rough glass") == 0 ||
 	       strcmp(room, "bent normals") == 0 || strcmp(room, "prism") == 0;
@@ -87,7 +89,7 @@ static size_t all_trials(const struct world *w, const char *room, struct balance
 		t[n++] = (struct balance_trial){.ops = mutation_registry[i],
 						.setting = {-1, -1},
 						.proposals_per_start = repeats_of(w, mutation_registry[i])};
-	if (!is_forced_here(room))
+	if (!is_forced_in_room(room))
 		return n;
 	const struct mutation_ops *hslt = mutation_find("hslt", 4);
 	t[n++] = (struct balance_trial){.ops = hslt, .setting = {0, 0}, .proposals_per_start = 1};
@@ -119,35 +121,35 @@ static void check_room(const struct room *room)
 	for (size_t i = 0; mutation_registry[i]; i++) {
 		if (is_default(w, mutation_registry[i])) {
 			if (strcmp(mutation_registry[i]->name, "lens") == 0)
-				pool_rare(w, room, mutation_registry[i], &pool[i]);
+				pool_rare(w, room, mutation_registry[i], &pooled_results[i]);
 			else
-				balance_pool_add(&pool[i], &trials[i]);
+				balance_pool_add(&pooled_results[i], &trials[i]);
 			if (test_is_full())
-				check_alone(w, room, &trials[i]);
+				check_room_alone(w, room, &trials[i]);
 		}
 	}
 	world_free(w);
 	assert_true(faults == 0);
 }
 
-static void test_room(void **state)
+static void proposals_are_balanced_in_the_room(void **state)
 {
 	check_room(*state);
 }
 
 /* Finds a fault that a strategy has in every room. */
-static void test_all_rooms(void **state)
+static void proposals_are_balanced_over_all_rooms(void **state)
 {
 	(void)state;
 	unsigned faults = 0, weak = 0;
 	for (size_t i = 0; mutation_registry[i]; i++) {
-		struct balance_verdict v = balance_pool_judge(&pool[i]);
+		struct balance_verdict v = balance_pool_judge(&pooled_results[i]);
 		if (!(v.power < INFINITY))
 			continue;
 		printf("all rooms      %-22s worst t %+6.2f (%s), finds %5.2f %%%s\n", mutation_registry[i]->name, v.t,
 		       v.function_name, 100 * v.power, v.is_balanced ? "" : " NOT BALANCED");
 		faults += !v.is_balanced;
-		weak += !(v.power <= MUST_FIND) && dice_scaled_count(STARTS) >= STARTS && !getenv("ROOM");
+		weak += !(v.power <= FAULT_TO_FIND) && dice_scaled_count(STARTS) >= STARTS && !getenv("ROOM");
 	}
 	assert_int_equal(faults, 0);
 	assert_int_equal(weak, 0);
@@ -160,7 +162,8 @@ int main(void)
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		if (!only || strcmp(only, r->name) == 0)
-			tests[n++] = (struct CMUnitTest){r->name, test_room, NULL, NULL, (void *)(uintptr_t)r};
-	tests[n++] = (struct CMUnitTest){"all rooms", test_all_rooms, NULL, NULL, NULL};
+			tests[n++] = (struct CMUnitTest){r->name, proposals_are_balanced_in_the_room, NULL, NULL,
+							 (void *)(uintptr_t)r};
+	tests[n++] = (struct CMUnitTest){"all rooms", proposals_are_balanced_over_all_rooms, NULL, NULL, NULL};
 	return _cmocka_run_group_tests("balance", tests, n, NULL, NULL);
 }

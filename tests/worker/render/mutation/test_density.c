@@ -28,9 +28,9 @@ enum { EDGES = 8, TRIALS = 48 };
 
 struct trial {
 	const struct mutation_ops *ops;
-	struct mutation_forced_choice how;
-	unsigned long compared, beyond;
-	double worst, worst_choice;
+	struct mutation_forced_choice forced;
+	unsigned long compared, mismatches;
+	double max_error, max_choice_error;
 };
 
 static struct mutation_ctx m;
@@ -41,15 +41,15 @@ static size_t all_trials(struct trial *t)
 {
 	size_t n = 0;
 	for (size_t i = 0; mutation_registry[i]; i++)
-		if (!mutation_registry[i]->independent)
-			t[n++] = (struct trial){.ops = mutation_registry[i], .how = {-1, -1}};
+		if (!mutation_registry[i]->is_independent)
+			t[n++] = (struct trial){.ops = mutation_registry[i], .forced = {-1, -1}};
 	for (int b = 1; b <= EDGES; b++)
 		for (int end = 0; end < b; end++)
-			t[n++] = (struct trial){.ops = mutation_find("hslt", 4), .how = {b, end}};
+			t[n++] = (struct trial){.ops = mutation_find("hslt", 4), .forced = {b, end}};
 	return n;
 }
 
-static double log_t(const struct trial *t, const struct move *move, const struct full_path *x,
+static double log_t(const struct trial *t, const struct proposal_move *move, const struct full_path *x,
 		    const struct full_path *y, double sign, double *log_choices)
 {
 	unsigned b = move->b, end = move->c;
@@ -57,47 +57,48 @@ static double log_t(const struct trial *t, const struct move *move, const struct
 	if (b > 0 && b == end)
 		return 0;
 	bool steps = strcmp(t->ops->name, "hslt") == 0 || strcmp(t->ops->name, "halfvec") == 0;
-	double sum = explicit_log_choice(&c, t->ops->name, &t->how, x, b, end);
-	sum += explicit_log_traced(&c, x, y, b, log_choices);
-	sum += explicit_log_between(&c, x, y, b, end, steps ? m.scratch.dh : NULL, sign);
+	double sum = explicit_log_selection(&c, t->ops->name, &t->forced, x, b, end);
+	sum += explicit_log_traced_part(&c, x, y, b, log_choices);
+	sum += explicit_log_walked_part(&c, x, y, b, end, steps ? m.scratch.dh : NULL, sign);
 	const struct emitter *em = &c.w->emitters[y->v[0].emitter];
 	if (explicit_moves_emitter(t->ops->name, b, end) && em->ops->point_inverse)
 		sum += log(path_pdf_emitter(&c, &y->v[0]));
 	return sum;
 }
 
-static void compare(struct trial *t, struct full_path *x, struct full_path *y)
+static void compare_proposal(struct trial *t, struct full_path *x, struct full_path *y)
 {
-	struct move move = {0};
+	struct proposal_move move = {0};
 	m.step++;
 	m.counters = strategy_counters;
-	enum proposal_result end = t->ops->propose(t->ops, &m, &t->how, x, y, &move);
-	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, X_TO_Y);
+	enum proposal_result end = t->ops->propose(t->ops, &m, &t->forced, x, y, &move);
+	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, MUTATION_FORWARD);
 	if (to_y > -INFINITY) {
-		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;
-		double there = log_t(t, &move, x, y, 1, &choices), here = log_t(t, &move, y, x, -1, &back);
-		double want = full_path_log_f(&c, y) - full_path_log_f(&c, x) + here - there;
-		double off = fabs(to_y - to_x - want) / fmax(1, fabs(want));
+		double to_x = t->ops->log_weight(&m, x, &move, MUTATION_REVERSE), choices, back;
+		double log_t_forward = log_t(t, &move, x, y, 1, &choices),
+		       log_t_reverse = log_t(t, &move, y, x, -1, &back);
+		double expected = full_path_log_f(&c, y) - full_path_log_f(&c, x) + log_t_reverse - log_t_forward;
+		double error = fabs(to_y - to_x - expected) / fmax(1, fabs(expected));
 		t->compared++;
-		t->beyond += !(off <= TOLERANCE);
-		t->worst = fmax(t->worst, isnan(off) ? INFINITY : off);
+		t->mismatches += !(error <= TOLERANCE);
+		t->max_error = fmax(t->max_error, isnan(error) ? INFINITY : error);
 		double symmetric = fmax(fabs(choices - back), fabs(choices - move.log_symmetric));
-		t->worst_choice = fmax(t->worst_choice, symmetric / fmax(1, fabs(choices)));
+		t->max_choice_error = fmax(t->max_choice_error, symmetric / fmax(1, fabs(choices)));
 	}
 	bool all = y->edges != x->edges;
 	full_path_copy(y, x, all ? 0 : move.first, all ? x->edges : move.last);
 }
 
-static void print(const char *room, const struct trial *t)
+static void print_trial(const char *room, const struct trial *t)
 {
 	char forced[16] = "";
-	if (t->how.b >= 0)
-		snprintf(forced, sizeof forced, "@b%dc%d", t->how.b % 100, t->how.c % 100);
+	if (t->forced.b >= 0)
+		snprintf(forced, sizeof forced, "@b%dc%d", t->forced.b % 100, t->forced.c % 100);
 	printf("%-14s %10s%-6s %7lu ratios, largest difference %.2g (%lu beyond), of symmetric choices %.2g\n", room,
-	       t->ops->name, forced, t->compared, t->worst, t->beyond, t->worst_choice);
+	       t->ops->name, forced, t->compared, t->max_error, t->mismatches, t->max_choice_error);
 }
 
-static void test_ratio(void **state)
+static void ratio_of_f_and_t_is_the_explicit_one(void **state)
 {
 	const struct room *room = *state;
 	static struct trial trials[TRIALS];
@@ -115,12 +116,12 @@ static void test_ratio(void **state)
 				continue;
 			full_path_copy(&y, &x, 0, k);
 			for (size_t j = 0; j < count; j++)
-				if (trials[j].how.b <= (int)k)
-					compare(&trials[j], &x, &y);
+				if (trials[j].forced.b <= (int)k)
+					compare_proposal(&trials[j], &x, &y);
 		}
 	for (size_t i = 0; i < count; i++) {
-		print(room->name, &trials[i]);
-		bad += trials[i].beyond + (trials[i].worst_choice > STEP_TOLERANCE);
+		print_trial(room->name, &trials[i]);
+		bad += trials[i].mismatches + (trials[i].max_choice_error > STEP_TOLERANCE);
 	}
 	starts_fini(&s);
 	world_free(w);
@@ -128,7 +129,7 @@ static void test_ratio(void **state)
 }
 
 /* Light passes between equal indices, through a narrow lobe and a wide one. */
-static struct world *thin_sheet(void)
+static struct world *make_thin_sheet_world(void)
 {
 	return world_from_text(
 		32, 32, "%s",
@@ -140,11 +141,13 @@ static struct world *thin_sheet(void)
 
 int main(void)
 {
-	static const struct room sheet = {"thin sheet", thin_sheet};
+	static const struct room sheet = {"thin sheet", make_thin_sheet_world};
 	struct CMUnitTest tests[ROOMS_MAX] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
-		tests[n++] = (struct CMUnitTest){r->name, test_ratio, NULL, NULL, (void *)(uintptr_t)r};
-	tests[n++] = (struct CMUnitTest){sheet.name, test_ratio, NULL, NULL, (void *)(uintptr_t)&sheet};
+		tests[n++] = (struct CMUnitTest){r->name, ratio_of_f_and_t_is_the_explicit_one, NULL, NULL,
+						 (void *)(uintptr_t)r};
+	tests[n++] = (struct CMUnitTest){sheet.name, ratio_of_f_and_t_is_the_explicit_one, NULL, NULL,
+					 (void *)(uintptr_t)&sheet};
 	return _cmocka_run_group_tests("density", tests, n, NULL, NULL);
 }

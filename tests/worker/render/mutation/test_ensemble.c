@@ -27,7 +27,7 @@ enum { TRIALS = 3000, EDGES = 12 };
 
 static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
-static struct ensemble drawn, around, capped;
+static struct ensemble pair_drawn, pair_around_x, pair_capped;
 static struct full_path x, y;
 
 static void begin(const struct world *w)
@@ -37,7 +37,7 @@ static void begin(const struct world *w)
 }
 
 /* Returns the probability that a sub-path may have `vertices` vertices or more: (5/n)^2 for n > 5, else 1. */
-static double chance_of(unsigned vertices)
+static double length_probability(unsigned vertices)
 {
 	return vertices > 5 ? 25.0 / (vertices * vertices) : 1;
 }
@@ -47,11 +47,12 @@ static bool choose_candidate(unsigned k)
 {
 	double before = 0;
 	for (unsigned j = 0; j < k; j++)
-		before += drawn.candidates[j].intensity;
-	return ensemble_choose(&c, &drawn, (before + 0.5 * drawn.candidates[k].intensity) / drawn.total, &x);
+		before += pair_drawn.candidates[j].intensity;
+	return ensemble_choose(&c, &pair_drawn, (before + 0.5 * pair_drawn.candidates[k].intensity) / pair_drawn.total,
+			       &x);
 }
 
-static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, struct ensemble *out)
+static void draw_pair(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, struct ensemble *out)
 {
 	struct sampler_random s;
 	sampler_random_init(&s, seed, RNG_TEST, i, 0);
@@ -66,9 +67,10 @@ static bool has_candidate(const struct ensemble *e, unsigned edges, double inten
 		const struct candidate *a = &e->candidates[i];
 		if (!whole && a->s == 1 && a->passed_count == 0 && path_vertex_is_refracting(&x.v[1]))
 			continue;
-		double want = whole ? intensity
-				    : intensity / (chance_of(edges + 1 - a->s - a->passed_count) * chance_of(a->s));
-		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
+		double expected = whole ? intensity
+					: intensity / (length_probability(edges + 1 - a->s - a->passed_count) *
+						       length_probability(a->s));
+		if (a->edges == edges && fabs(a->intensity / expected - 1) < 1e-6)
 			return true;
 	}
 	return false;
@@ -80,18 +82,18 @@ static unsigned check_candidates(const char *name)
 {
 	unsigned checked = 0;
 	double before = 0;
-	for (unsigned k = 0; k < around.count; before += around.candidates[k++].intensity) {
-		const struct candidate *a = &around.candidates[k];
+	for (unsigned k = 0; k < pair_around_x.count; before += pair_around_x.candidates[k++].intensity) {
+		const struct candidate *a = &pair_around_x.candidates[k];
 		double log_pdf[FULL_PATH_VERTICES_MAX];
 		/* The path's own point on the emitter differs from the one that the random numbers draw. */
 		bool own = a->s == 1 && a->edges == x.edges;
-		if (own || a->intensity < 1e-6 * around.total ||
-		    !ensemble_choose(&c, &around, (before + 0.5 * a->intensity) / around.total, &y))
+		if (own || a->intensity < 1e-6 * pair_around_x.total ||
+		    !ensemble_choose(&c, &pair_around_x, (before + 0.5 * a->intensity) / pair_around_x.total, &y))
 			continue;
 		for (unsigned i = 0; i <= y.edges; i++)
 			assert_true(y.v[i].x.prim.time == full_path_time(&x));
 		full_path_log_technique_pdfs(&c, &y, log_pdf);
-		double chances = chance_of(y.edges + 1 - a->s - a->passed_count) * chance_of(a->s),
+		double chances = length_probability(y.edges + 1 - a->s - a->passed_count) * length_probability(a->s),
 		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
 		if (!(fabs(a->intensity / want - 1) < 1e-6))
 			fail_msg("%s: %u edges by technique %u: %.9g, not %.9g", name, y.edges, a->s, a->intensity,
@@ -111,20 +113,20 @@ static void check_own_candidate(const char *name)
 	begin(w);
 	const struct ensemble_lengths all = ensemble_max_lengths(&c);
 	for (uint64_t i = 0; i < TRIALS; i++) {
-		draw(seed, i, &all, &drawn);
-		if (drawn.count == 0)
+		draw_pair(seed, i, &all, &pair_drawn);
+		if (pair_drawn.count == 0)
 			continue;
-		unsigned k = (unsigned)(i % drawn.count);
-		const struct candidate own = drawn.candidates[k];
+		unsigned k = (unsigned)(i % pair_drawn.count);
+		const struct candidate own = pair_drawn.candidates[k];
 		const double u[3] = {(double)i / TRIALS, 0.5, 0.5};
 		struct sampler_random s;
 		/* Far out in the tail of a lobe, its two evaluations share no digits. */
-		if (own.intensity < 1e-6 * drawn.total || !choose_candidate(k))
+		if (own.intensity < 1e-6 * pair_drawn.total || !choose_candidate(k))
 			continue;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
 		c.time = (double)i / TRIALS; /* any time, as left by the previous draw */
-		ensemble_draw_containing(&c, &s.base, &x, u, &around);
-		if (!has_candidate(&around, own.edges, own.intensity, false))
+		ensemble_draw_containing(&c, &s.base, &x, u, &pair_around_x);
+		if (!has_candidate(&pair_around_x, own.edges, own.intensity, false))
 			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
 				 (unsigned long long)i, own.edges, own.s, own.intensity);
 		checked++;
@@ -136,7 +138,7 @@ static void check_own_candidate(const char *name)
 	world_free(w);
 }
 
-static void test_own_candidate(void **state)
+static void path_contributes_the_same_in_a_pair_around_it(void **state)
 {
 	(void)state;
 	check_own_candidate("gold");
@@ -151,7 +153,7 @@ static void test_own_candidate(void **state)
 
 /* Where lengths are drawn, the weight of a candidate is the reciprocal of the probability that both sub-paths are
  * long enough for it. */
-static void test_drawn_lengths(void **state)
+static void drawn_lengths_are_weighted_by_their_probability(void **state)
 {
 	(void)state;
 	struct world *w = room_build_named("gold");
@@ -162,22 +164,23 @@ static void test_drawn_lengths(void **state)
 	for (uint64_t i = 0; i < TRIALS; i++) {
 		const double u[2] = {(double)i / TRIALS, (double)(i * 7 % TRIALS) / TRIALS};
 		const struct ensemble_lengths some = ensemble_draw_lengths(&c, u, 1, 1);
-		draw(seed, i, &some, &capped);
-		draw(seed, i, &all, &drawn);
-		for (unsigned k = 0; k < capped.count; k++) {
-			const struct candidate *a = &capped.candidates[k];
+		draw_pair(seed, i, &some, &pair_capped);
+		draw_pair(seed, i, &all, &pair_drawn);
+		for (unsigned k = 0; k < pair_capped.count; k++) {
+			const struct candidate *a = &pair_capped.candidates[k];
 			unsigned t = a->edges + 1 - a->s;
 			assert_true(t <= some.max_camera && a->s <= some.max_light);
-			assert_true(
-				has_candidate(&drawn, a->edges, a->intensity * chance_of(t) * chance_of(a->s), true));
-			checked += chance_of(t) * chance_of(a->s) < 1;
+			assert_true(has_candidate(&pair_drawn, a->edges,
+						  a->intensity * length_probability(t) * length_probability(a->s),
+						  true));
+			checked += length_probability(t) * length_probability(a->s) < 1;
 		}
 	}
 	assert_true(checked > 100);
 	world_free(w);
 }
 
-static void test_chance_of_lengths(void **state)
+static void lengths_have_their_stated_probability(void **state)
 {
 	(void)state;
 	enum { N = 100000 };
@@ -205,7 +208,7 @@ static void test_chance_of_lengths(void **state)
 
 /* The totals of both pairs against pairs drawn with the proposal's own random numbers; the pair around x must not use
  * the numbers of the other pair. */
-static void test_streams_of_a_proposal(void **state)
+static void both_pairs_of_a_proposal_use_their_own_numbers(void **state)
 {
 	(void)state;
 	struct world *w = room_build_named("gold");
@@ -222,29 +225,29 @@ static void test_streams_of_a_proposal(void **state)
 				  .counters = count,
 				  .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; i < TRIALS / 4; i++) {
-		draw(seed, i, &all, &drawn);
-		if (drawn.count == 0 || !choose_candidate(0))
+		draw_pair(seed, i, &all, &pair_drawn);
+		if (pair_drawn.count == 0 || !choose_candidate(0))
 			continue;
-		struct move move = {0};
+		struct proposal_move move = {0};
 		m.step = i;
 		if (ops->propose(ops, &m, &(struct mutation_forced_choice){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
 			continue;
 		double total[2], v[4], r[4];
 		const enum rng_stream stream[2] = {RNG_BIDIRECTIONAL_MUTATION, RNG_CHAIN};
 		struct sampler_random s;
-		mutation_random(&m, BLOCK_VERTEX + 1, v);
+		mutation_draw_uniforms(&m, BLOCK_VERTEX + 1, v);
 		for (int k = 0; k < 2; k++) {
 			sampler_random_init(&s, seed, stream[k], m.chain, m.step);
-			ensemble_draw_containing(&c, &s.base, &x, v, &around);
-			total[k] = around.total;
+			ensemble_draw_containing(&c, &s.base, &x, v, &pair_around_x);
+			total[k] = pair_around_x.total;
 		}
-		assert_true(move.log_density[Y_TO_X] == -log(total[0]));
+		assert_true(move.log_density[MUTATION_REVERSE] == -log(total[0]));
 		same += total[0] == total[1];
-		mutation_random(&m, BLOCK_VERTEX, r);
+		mutation_draw_uniforms(&m, BLOCK_VERTEX, r);
 		const struct ensemble_lengths n = ensemble_draw_lengths(&c, r, 1, 1);
 		sampler_random_init(&s, seed, RNG_CHAIN, m.chain, m.step);
-		ensemble_draw(&c, &s.base, &n, &drawn);
-		assert_true(move.log_density[X_TO_Y] == -log(drawn.total));
+		ensemble_draw(&c, &s.base, &n, &pair_drawn);
+		assert_true(move.log_density[MUTATION_FORWARD] == -log(pair_drawn.total));
 		proposed++;
 	}
 	print_message("%u proposals, in %u the pair around the state does not depend on its numbers\n", proposed, same);
@@ -254,7 +257,7 @@ static void test_streams_of_a_proposal(void **state)
 
 /* The intensity of a sample of hslt's bootstrap is the total of the candidates for its seed: a chain starts at one of
  * them. */
-static void test_bootstrap_is_of_candidates(void **state)
+static void bootstrap_intensity_is_the_total_of_candidates(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -272,10 +275,11 @@ static void test_bootstrap_is_of_candidates(void **state)
 		struct sampler_random s;
 		sampler_random_init(&s, seed, RNG_TEST, i, 0);
 		hslt->evaluate(&c, &s.base, &sample);
-		draw(seed, i, &all, &drawn);
-		if (!(fabs(sample.intensity - drawn.total) <= 1e-9 * drawn.total))
-			fail_msg("sample %u: worth %g, its candidates %g", (unsigned)i, sample.intensity, drawn.total);
-		lit += drawn.total > 0;
+		draw_pair(seed, i, &all, &pair_drawn);
+		if (!(fabs(sample.intensity - pair_drawn.total) <= 1e-9 * pair_drawn.total))
+			fail_msg("sample %u: worth %g, its candidates %g", (unsigned)i, sample.intensity,
+				 pair_drawn.total);
+		lit += pair_drawn.total > 0;
 	}
 	assert_true(lit > TRIALS / 10);
 	world_free(w);
@@ -284,7 +288,7 @@ static void test_bootstrap_is_of_candidates(void **state)
 /* From a point next to the aperture's rim, half of the steps lead out of the aperture and are refused: if they were
  * clamped to the rim, points would gather there. 1,000 steps; a share outside 0.42 to 0.58 has a probability below
  * 1e-6. */
-static void test_aperture_is_left(void **state)
+static void steps_beyond_the_aperture_are_refused(void **state)
 {
 	(void)state;
 	struct world *w = room_build_named("lens");
@@ -311,12 +315,12 @@ static void test_aperture_is_left(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_own_candidate),
-		cmocka_unit_test(test_drawn_lengths),
-		cmocka_unit_test(test_chance_of_lengths),
-		cmocka_unit_test(test_streams_of_a_proposal),
-		cmocka_unit_test(test_bootstrap_is_of_candidates),
-		cmocka_unit_test(test_aperture_is_left),
+		cmocka_unit_test(path_contributes_the_same_in_a_pair_around_it),
+		cmocka_unit_test(drawn_lengths_are_weighted_by_their_probability),
+		cmocka_unit_test(lengths_have_their_stated_probability),
+		cmocka_unit_test(both_pairs_of_a_proposal_use_their_own_numbers),
+		cmocka_unit_test(bootstrap_intensity_is_the_total_of_candidates),
+		cmocka_unit_test(steps_beyond_the_aperture_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

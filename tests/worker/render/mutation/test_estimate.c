@@ -27,38 +27,38 @@ enum { GROUPS = 32, EDGES = 5 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
 /* |t| at this level with 31 degrees of freedom, plus the margin for a power of 95 %. */
-#define FINDS (8.5 + 1.7)
+#define DETECTABLE_T (8.5 + 1.7)
 
 /* Adds to `mean` the means of f / T by number of edges. */
-static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
+static void add_proposal_estimates(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
 {
 	static struct full_path x, y;
 	static uint64_t count[STRATEGY_COUNTERS];
 	m->counters = count;
 	for (size_t i = 0; i < n; i++) {
-		struct move move = {0};
+		struct proposal_move move = {0};
 		x.edges = 0;
 		m->step++;
 		if (ops->propose(ops, m, &(struct mutation_forced_choice){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
-			mean[y.edges] += exp(ops->log_weight(m, &y, &move, X_TO_Y)) / (double)n;
+			mean[y.edges] += exp(ops->log_weight(m, &y, &move, MUTATION_FORWARD)) / (double)n;
 	}
 }
 
 /* Relative differences of all light, pooled over rooms with the weights 1 / error^2. */
 static struct pooled {
-	double certainty, weighted;
+	double weight_sum, weighted_sum;
 } pool;
 static size_t rooms_pooled;
 
 /* Factor by which the samples grow so that a room alone finds 2 %. */
-static size_t more_paths(void)
+static size_t sample_factor(void)
 {
 	return test_is_full() ? 8 : 1;
 }
 
 /* Compares each number of edges, and all together; returns the number of faults. */
-static unsigned compare(const char *room, const char *strategy, double a[GROUPS][EDGES + 1],
-			double b[GROUPS][EDGES + 1])
+static unsigned compare_estimates(const char *room, const char *strategy, double a[GROUPS][EDGES + 1],
+				  double b[GROUPS][EDGES + 1])
 {
 	unsigned faults = 0;
 	double worst = 0;
@@ -79,29 +79,29 @@ static unsigned compare(const char *room, const char *strategy, double a[GROUPS]
 		worst = fmax(worst, fabs(s.mean / s.error));
 	}
 	printf("%-14s %-14s all light %+6.2f %% +- %.2f %%, finds %.1f %%; largest t of a length %.2f\n", room,
-	       strategy, 100 * s.mean / sum, 100 * s.error / sum, 100 * FINDS * s.error / sum, worst);
+	       strategy, 100 * s.mean / sum, 100 * s.error / sum, 100 * DETECTABLE_T * s.error / sum, worst);
 	if (strcmp(strategy, "bidirectional") == 0) {
 		double error = s.error / sum;
-		pool.certainty += 1 / (error * error);
-		pool.weighted += s.mean / sum / (error * error);
+		pool.weight_sum += 1 / (error * error);
+		pool.weighted_sum += s.mean / sum / (error * error);
 		rooms_pooled++;
-		faults += more_paths() > 1 && dice_scaled_count(1000) > 1000 && !(FINDS * error <= 0.02);
+		faults += sample_factor() > 1 && dice_scaled_count(1000) > 1000 && !(DETECTABLE_T * error <= 0.02);
 	}
 	return faults;
 }
 
-static void test_all_rooms(void **state)
+static void independent_proposals_are_unbiased_over_all_rooms(void **state)
 {
 	(void)state;
-	double error = 1 / sqrt(pool.certainty), t = pool.weighted / pool.certainty / error;
+	double error = 1 / sqrt(pool.weight_sum), t = pool.weighted_sum / pool.weight_sum / error;
 	printf("all rooms      bidirectional  all light %+6.2f %% +- %.2f %%, finds %.2f %%\n", 100 * t * error,
-	       100 * error, 100 * FINDS * error);
+	       100 * error, 100 * DETECTABLE_T * error);
 	assert_true(rooms_pooled >= 10);
 	assert_true(stats_student_t_p(t, GROUPS - 1) >= LEVEL);
-	assert_true(FINDS * error <= 0.02 || dice_scaled_count(1000) < 1000);
+	assert_true(DETECTABLE_T * error <= 0.02 || dice_scaled_count(1000) < 1000);
 }
 
-static void test_integral(void **state)
+static void independent_proposals_have_the_integral_of_bdpt(void **state)
 {
 	const struct room *room = *state;
 	static struct path_context c;
@@ -109,7 +109,7 @@ static void test_integral(void **state)
 	static uint64_t counters[BATCH_COUNTERS];
 	static double want[GROUPS][EDGES + 1];
 	struct world *w = room->build();
-	size_t n = dice_scaled_count(1000) * more_paths();
+	size_t n = dice_scaled_count(1000) * sample_factor();
 	unsigned faults = 0;
 	starts_init_context(&c, w, 1, EDGES, counters);
 	m = (struct mutation_ctx){
@@ -123,10 +123,10 @@ static void test_integral(void **state)
 	}
 	for (size_t i = 0; mutation_registry[i]; i++) {
 		double mean[GROUPS][EDGES + 1] = {{0}};
-		for (m.chain = 0; mutation_registry[i]->independent && m.chain < GROUPS; m.chain++)
-			estimate(&m, mutation_registry[i], 2 * n, mean[m.chain]);
-		if (mutation_registry[i]->independent)
-			faults += compare(room->name, mutation_registry[i]->name, mean, want);
+		for (m.chain = 0; mutation_registry[i]->is_independent && m.chain < GROUPS; m.chain++)
+			add_proposal_estimates(&m, mutation_registry[i], 2 * n, mean[m.chain]);
+		if (mutation_registry[i]->is_independent)
+			faults += compare_estimates(room->name, mutation_registry[i]->name, mean, want);
 	}
 	world_free(w);
 	assert_true(faults == 0);
@@ -137,7 +137,9 @@ int main(void)
 	struct CMUnitTest tests[ROOMS_MAX] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
-		tests[n++] = (struct CMUnitTest){r->name, test_integral, NULL, NULL, (void *)(uintptr_t)r};
-	tests[n++] = (struct CMUnitTest){"all rooms", test_all_rooms, NULL, NULL, NULL};
+		tests[n++] = (struct CMUnitTest){r->name, independent_proposals_have_the_integral_of_bdpt, NULL, NULL,
+						 (void *)(uintptr_t)r};
+	tests[n++] =
+		(struct CMUnitTest){"all rooms", independent_proposals_are_unbiased_over_all_rooms, NULL, NULL, NULL};
 	return _cmocka_run_group_tests("estimate", tests, n, NULL, NULL);
 }

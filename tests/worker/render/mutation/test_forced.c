@@ -30,17 +30,17 @@
 enum { STARTS = 120, BOOTSTRAP = 1024 };
 
 /* Mutations to test on paths with this number of edges. */
-struct forced {
+struct length_cases {
 	unsigned edges;
 	const char *mutations;
 };
 
 struct scene_cases {
 	const char *scene;
-	struct forced of[8];
+	struct length_cases lengths[8];
 };
 
-static const struct scene_cases shorter[] = {
+static const struct scene_cases scene_list[] = {
 	{"diffuse", {{3, "hslt@b0 hslt@b3c0 bidirectional independent rejoin hslt"}, {2, "hslt@b2c0"}}},
 	{"glossy", {{3, "hslt@b2c1 hslt@b3c0 bidirectional hslt halfvec rejoin light"}, {4, "hslt@b4c0 hslt@b3c1"}}},
 	{"rough glass",
@@ -57,10 +57,10 @@ static const struct scene_cases shorter[] = {
 	{"dispersion, smooth", {{4, "hslt@b0 hslt@b4c0 wavelength light hslt"}}},
 	{"aperture", {{3, "hslt@b0 hslt@b1c0 hslt@b3c0 lens rejoin"}, {4, "hslt@b4c1 lens"}}},
 };
-enum { SCENES = sizeof shorter / sizeof *shorter };
+enum { SCENES = sizeof scene_list / sizeof *scene_list };
 
-static void print(const char *scene, const struct stationary_options *how, const struct stationary_result *r,
-		  const char *verdict)
+static void print_result(const char *scene, const struct stationary_options *options, const struct stationary_result *r,
+			 const char *verdict)
 {
 	char worst[96] = "nothing differs";
 	if (r->worst_function >= 0)
@@ -68,7 +68,7 @@ static void print(const char *scene, const struct stationary_options *how, const
 			 100 * r->bias[r->worst_function], 100 * r->error[r->worst_function]);
 	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, "
 	       "%.1f %% of vertices; %s (p %.1g); %s\n",
-	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals,
+	       scene, options->max_edges, options->mutation, 100 * (double)r->accepted / (double)r->proposals,
 	       100 * r->accepted_share, 100 * r->detectable_block_bias, 100 * r->detectable_colour_bias,
 	       100 * r->detectable_other_bias, worst, r->p, verdict);
 	if (!getenv("HSLT_TEST_ROWS"))
@@ -80,97 +80,99 @@ static void print(const char *scene, const struct stationary_options *how, const
 
 struct tally {
 	unsigned cases, failed;
-	double worst_block, seconds;
+	double max_block_error, seconds;
 	uint64_t mutations;
 };
 
-/* from: the starts shared by all mutations on paths of this length. chosen: the mutation was listed for this scene,
+/* starts: the starts shared by all mutations on paths of this length. chosen: the mutation was listed for this scene,
  * so that it must be able to move. */
-static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
-		  struct stationary_starts *from, struct tally *t)
+static void check_mutation(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
+			   struct stationary_starts *from, struct tally *t)
 {
 	static struct stationary_result r;
 	/* Independent proposals lie anywhere on the film, so far less of the noise cancels. */
 	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
-	bool fresh = ops && ops->independent, weak;
+	bool fresh = ops && ops->is_independent, weak;
 	uint32_t enough = edges == 2 ? 2 : 1, more = fresh && test_is_full() && edges == 3 ? 16 : enough;
-	struct stationary_options how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_NO_FAULT};
+	struct stationary_options options = {mutation,		 edges, edges, more * STARTS, more * BOOTSTRAP,
+					     STATIONARY_NO_FAULT};
 	if (more == enough)
-		stationary_run_with_starts(w, scene, &how, from, &r);
+		stationary_run_with_starts(w, scene, &options, from, &r);
 	else
-		stationary_run(w, scene, &how, &r);
+		stationary_run(w, scene, &options, &r);
 	for (; (weak = !test_is_scaled() && r.detectable_block_bias > 0.02 && !fresh) && test_is_full() && more < 16;
 	     more *= 2) {
-		how.starts *= 2;
-		how.bootstrap *= 2;
-		stationary_run(w, scene, &how, &r);
+		options.starts *= 2;
+		options.bootstrap *= 2;
+		stationary_run(w, scene, &options, &r);
 	}
 	/* A mutation cannot move what a scene lacks, so only mutations listed for the scene must move. */
 	bool idle = chosen && !test_is_scaled() && r.accepted_share < 0.1;
 	const char *verdict = !stationary_passes(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
-	print(scene, &how, &r, verdict);
+	print_result(scene, &options, &r, verdict);
 	t->cases++;
 	t->failed += strcmp(verdict, "ok") != 0;
-	t->worst_block = fmax(t->worst_block, fresh ? 0 : r.detectable_block_bias);
+	t->max_block_error = fmax(t->max_block_error, fresh ? 0 : r.detectable_block_bias);
 	t->seconds += r.cpu_seconds;
 	t->mutations += r.proposals;
 }
 
-static void check_all(const struct world *w, const char *scene, unsigned k, struct tally *t)
+static void check_all_mutations(const struct world *w, const char *scene, unsigned k, struct tally *t)
 {
 	char text[32];
-	struct stationary_starts from = {.indices = NULL};
-	check(w, scene, k, "hslt@b0", false, &from, t);
+	struct stationary_starts starts = {.indices = NULL};
+	check_mutation(w, scene, k, "hslt@b0", false, &starts, t);
 	for (unsigned b = 1; b <= k; b++)
 		for (unsigned c = 0; c < b; c++) {
 			if (b == k && c + 1 == k)
 				continue;
 			snprintf(text, sizeof text, "hslt@b%uc%u", b, c);
-			check(w, scene, k, text, false, &from, t);
+			check_mutation(w, scene, k, text, false, &starts, t);
 		}
 	for (size_t i = 0; mutation_registry[i]; i++)
-		check(w, scene, k, mutation_registry[i]->name, false, &from, t);
-	stationary_starts_fini(&from);
+		check_mutation(w, scene, k, mutation_registry[i]->name, false, &starts, t);
+	stationary_starts_fini(&starts);
 }
 
-static void check_list(const struct world *w, const char *scene, const struct forced *f, struct tally *t)
+static void check_listed_mutations(const struct world *w, const char *scene, const struct length_cases *f,
+				   struct tally *t)
 {
 	char list[256], *rest = list, *one;
-	struct stationary_starts from = {.indices = NULL};
+	struct stationary_starts starts = {.indices = NULL};
 	snprintf(list, sizeof list, "%s", f->mutations);
 	while ((one = strtok_r(rest, " ", &rest)))
-		check(w, scene, f->edges, one, true, &from, t);
-	stationary_starts_fini(&from);
+		check_mutation(w, scene, f->edges, one, true, &starts, t);
+	stationary_starts_fini(&starts);
 }
 
-static void test_scene(void **state)
+static void mutations_keep_the_distribution_of_paths(void **state)
 {
 	const struct scene_cases *s = *state;
 	const char *only = getenv("SCENE");
 	if (only && strcmp(only, s->scene) != 0)
 		skip();
-	struct world *w = test_world(s->scene);
+	struct world *w = make_test_world(s->scene);
 	struct tally t = {0};
 	assert_non_null(w);
 	stationary_disable_roulette(w);
 	if (test_is_full()) {
 		for (unsigned k = 2; k <= 6; k += k < 4 ? 1 : 2)
-			check_all(w, s->scene, k, &t);
+			check_all_mutations(w, s->scene, k, &t);
 		if (strcmp(s->scene, "rough glass") == 0 || strcmp(s->scene, "specular chain") == 0)
-			check_all(w, s->scene, 8, &t);
+			check_all_mutations(w, s->scene, 8, &t);
 	} else {
-		for (const struct forced *f = s->of; f->mutations; f++)
-			check_list(w, s->scene, f, &t);
+		for (const struct length_cases *f = s->lengths; f->mutations; f++)
+			check_listed_mutations(w, s->scene, f, &t);
 	}
 	printf("%s: %u cases, %u failed, %llu mutations, finds %.2f %% on a quarter of the film, %.0f s of CPU time\n",
-	       s->scene, t.cases, t.failed, (unsigned long long)t.mutations, 100 * t.worst_block, t.seconds);
+	       s->scene, t.cases, t.failed, (unsigned long long)t.mutations, 100 * t.max_block_error, t.seconds);
 	fflush(stdout);
 	world_free(w);
 	assert_int_equal(t.failed, 0);
 }
 
 /* Planted faults in the acceptance probability must be found. */
-static void test_planted(void **state)
+static void planted_acceptance_faults_are_found(void **state)
 {
 	(void)state;
 	static const struct {
@@ -185,17 +187,17 @@ static void test_planted(void **state)
 		{STATIONARY_NO_GEOMETRY, "hslt@b2c1", "the geometry term at x_b left out"},
 	};
 	static struct stationary_result r;
-	struct world *w = test_world("rough glass");
-	struct stationary_starts from = {.indices = NULL};
+	struct world *w = make_test_world("rough glass");
+	struct stationary_starts starts = {.indices = NULL};
 	stationary_disable_roulette(w);
 	for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
-		struct stationary_options how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
-		stationary_run_with_starts(w, "planted", &how, &from, &r);
-		printf("%s, %s: p %.1g by the %s\n", planted[i].what, how.mutation, r.p,
+		struct stationary_options options = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
+		stationary_run_with_starts(w, "planted", &options, &starts, &r);
+		printf("%s, %s: p %.1g by the %s\n", planted[i].what, options.mutation, r.p,
 		       stationary_function_name(r.worst_function));
 		assert_true(test_is_scaled() || !stationary_passes(&r));
 	}
-	stationary_starts_fini(&from);
+	stationary_starts_fini(&starts);
 	world_free(w);
 }
 
@@ -204,9 +206,10 @@ int main(void)
 	struct CMUnitTest tests[SCENES + 1];
 	static struct scene_cases at[SCENES];
 	for (int i = 0; i < SCENES; i++) {
-		at[i] = shorter[i];
-		tests[i] = (struct CMUnitTest){at[i].scene, test_scene, NULL, NULL, &at[i]};
+		at[i] = scene_list[i];
+		tests[i] =
+			(struct CMUnitTest){at[i].scene, mutations_keep_the_distribution_of_paths, NULL, NULL, &at[i]};
 	}
-	tests[SCENES] = (struct CMUnitTest)cmocka_unit_test(test_planted);
+	tests[SCENES] = (struct CMUnitTest)cmocka_unit_test(planted_acceptance_faults_are_found);
 	return cmocka_run_group_tests_name("forced", tests, NULL, NULL);
 }

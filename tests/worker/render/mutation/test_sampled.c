@@ -24,7 +24,7 @@
 
 #include <cmocka.h>
 
-enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 2400 };
+enum { VERTICES_MAX = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK_SAMPLES = 256, STARTS = 2400 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
 /* Largest step, to both sides, of the numbers in [0,1) that give the points on the emitter and on the aperture. */
@@ -32,7 +32,7 @@ enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 
 
 struct example {
 	const char *room, *strategy;
-	struct mutation_forced_choice how;
+	struct mutation_forced_choice forced;
 	unsigned edges, b, c; /* the case that is tested, if b and c are drawn */
 };
 
@@ -68,8 +68,8 @@ struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
 	struct full_path *x, *y;
-	unsigned vertex[FULL_PATH_VERTICES_MAX], count, ends; /* moving vertices; ends: of these, path ends */
-	double mean[MOST], factor[MOST][MOST];		      /* factor: Cholesky's, of the covariance */
+	unsigned vertex[FULL_PATH_VERTICES_MAX], count, ends;	       /* moving vertices; ends: of these, path ends */
+	double mean[VERTICES_MAX], factor[VERTICES_MAX][VERTICES_MAX]; /* factor: Cholesky's, of the covariance */
 	unsigned long failures;
 };
 
@@ -94,7 +94,7 @@ static void list_vertices(struct sampling *s)
 }
 
 /* Position in the plane in which the point on the aperture moves. */
-static void on_aperture(const struct sampling *s, double *z, double *log_plane)
+static void aperture_coordinates(const struct sampling *s, double *z, double *log_plane)
 {
 	const struct camera *camera = &c.w->camera;
 	vec3 d = frame_to_local(&camera->axes, vec3_sub(s->y->v[s->y->edges].x.p, s->x->v[s->x->edges].x.p));
@@ -106,12 +106,12 @@ static void on_aperture(const struct sampling *s, double *z, double *log_plane)
 
 /* Stores positions in the tangent planes of x, and the logarithm of the area in these planes per area of the
  * surfaces. Returns false if a vertex left its plane or sphere. */
-static bool coordinates(const struct sampling *s, double *z, double *log_plane)
+static bool tangent_coordinates(const struct sampling *s, double *z, double *log_plane)
 {
 	*log_plane = 0;
 	for (unsigned i = 0; i < s->count; i++) {
 		if (s->vertex[i] == s->x->edges) {
-			on_aperture(s, &z[2 * i], log_plane);
+			aperture_coordinates(s, &z[2 * i], log_plane);
 			continue;
 		}
 		const struct surface_point *x = &s->x->v[s->vertex[i]].x, *y = &s->y->v[s->vertex[i]].x;
@@ -132,18 +132,18 @@ static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 static enum outcome propose(struct sampling *s, double *z, double *log_density)
 {
 	const struct example *e = s->example;
-	struct move move = {.b = FULL_PATH_VERTICES_MAX};
+	struct proposal_move move = {.b = FULL_PATH_VERTICES_MAX};
 	double log_plane, unused;
 	m.step++;
 	m.counters = strategy_counters;
-	enum proposal_result end = s->ops->propose(s->ops, &m, &e->how, s->x, s->y, &move);
+	enum proposal_result end = s->ops->propose(s->ops, &m, &e->forced, s->x, s->y, &move);
 	enum outcome out = move.b != e->b || move.c != e->c ? OTHER : end ? FAILED : ELSEWHERE;
-	if (out == ELSEWHERE && coordinates(s, z, &log_plane)) {
+	if (out == ELSEWHERE && tangent_coordinates(s, z, &log_plane)) {
 		out = ARRIVED;
 		bool steps = strcmp(e->strategy, "hslt") == 0 || strcmp(e->strategy, "halfvec") == 0;
-		*log_density = explicit_log_choice(&c, e->strategy, &e->how, s->x, e->b, e->c) +
-			       explicit_log_traced(&c, s->x, s->y, e->b, &unused) +
-			       explicit_log_between(&c, s->x, s->y, e->b, e->c, steps ? m.scratch.dh : NULL, 1) -
+		*log_density = explicit_log_selection(&c, e->strategy, &e->forced, s->x, e->b, e->c) +
+			       explicit_log_traced_part(&c, s->x, s->y, e->b, &unused) +
+			       explicit_log_walked_part(&c, s->x, s->y, e->b, e->c, steps ? m.scratch.dh : NULL, 1) -
 			       log_plane;
 		if (explicit_moves_emitter(e->strategy, e->b, e->c)) {
 			const struct path_vertex *v = &s->y->v[0];
@@ -162,7 +162,7 @@ static int bin_of(const struct sampling *s, const double *z, double radius);
 
 /* Returns the radius of the ellipsoid in standard deviations. Ends of the path move uniformly, within 1.7 deviations.
  */
-static double radius_of(const struct sampling *s)
+static double ellipsoid_radius(const struct sampling *s)
 {
 	static const double radii[] = {0, 1.2, 1.6, 2};
 	return s->ends ? 1.5 : radii[s->count];
@@ -170,10 +170,10 @@ static double radius_of(const struct sampling *s)
 
 /* Returns whether the proposals from this start fill the ellipsoid, and each part of it, like a normal distribution:
  * not if they lie on a curve, as at the limb of a sphere. Judged by positions alone, not by densities. */
-static bool fills_ellipsoid(const struct sampling *s, const double z[][MOST], unsigned n)
+static bool fills_ellipsoid(const struct sampling *s, const double z[][VERTICES_MAX], unsigned n)
 {
 	unsigned d = 2 * s->count, bins = d < BITS ? 1u << d : BINS, in[BINS] = {0}, all = 0;
-	double radius = radius_of(s), tail = 0, term = 1;
+	double radius = ellipsoid_radius(s), tail = 0, term = 1;
 	for (unsigned k = 0; k < s->count; k++) { /* chi-square with an even number of degrees of freedom */
 		tail += term;
 		term *= 0.5 * radius * radius / (k + 1);
@@ -196,19 +196,19 @@ static bool fills_ellipsoid(const struct sampling *s, const double z[][MOST], un
  * the ellipsoid. */
 static bool run_pilot(struct sampling *s)
 {
-	static double z[PILOT][MOST];
+	static double z[PILOT][VERTICES_MAX];
 	unsigned n = 0, d = 2 * s->count, failed = 0;
 	double density;
 	for (unsigned i = 0; i < PILOT || n < PILOT / 4; i++) {
 		enum outcome out = propose(s, z[n], &density);
 		failed += out != ARRIVED && out != OTHER;
-		if (failed * 1000 > PILOT || i > 40 * PILOT || (i > LOOK && n == 0))
+		if (failed * 1000 > PILOT || i > 40 * PILOT || (i > LOOK_SAMPLES && n == 0))
 			return false;
 		n += out == ARRIVED;
 		if (n == PILOT)
 			break;
 	}
-	double covariance[MOST][MOST] = {{0}};
+	double covariance[VERTICES_MAX][VERTICES_MAX] = {{0}};
 	memset(s->mean, 0, sizeof s->mean);
 	for (unsigned i = 0; i < n; i++)
 		for (unsigned a = 0; a < d; a++)
@@ -226,13 +226,13 @@ static bool run_pilot(struct sampling *s)
 				return false;
 			s->factor[a][b] = a == b ? sqrt(sum) : sum / s->factor[b][b];
 		}
-	return fills_ellipsoid(s, (const double(*)[MOST])z, n);
+	return fills_ellipsoid(s, (const double(*)[VERTICES_MAX])z, n);
 }
 
 static bool all_smooth(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].delta)
+		if (x->v[j].is_delta)
 			return false;
 	return true;
 }
@@ -241,7 +241,7 @@ static bool all_smooth(const struct full_path *x)
 static int bin_of(const struct sampling *s, const double *z, double radius)
 {
 	unsigned d = 2 * s->count;
-	double u[MOST], r2 = 0;
+	double u[VERTICES_MAX], r2 = 0;
 	int bin = 0;
 	for (unsigned a = 0; a < d; a++) {
 		u[a] = z[a] - s->mean[a];
@@ -255,16 +255,16 @@ static int bin_of(const struct sampling *s, const double *z, double radius)
 	return r2 < radius * radius ? bin : -1;
 }
 
-static void sample(struct sampling *s, const char *name)
+static void compare_samples(struct sampling *s, const char *name)
 {
 	unsigned d = 2 * s->count;
 	size_t n = dice_scaled_count(120000), failures = 0, bins = d < BITS ? 1u << d : BINS;
-	double radius = radius_of(s), volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
+	double radius = ellipsoid_radius(s), volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
 	for (unsigned a = 0; a < d; a++)
 		volume *= s->factor[a][a];
 	double sum[BINS + 1] = {0}, square[BINS + 1] = {0}, worst = 0, error = 0, whole = 0, full_path_error = 0;
 	for (size_t i = 0; i < n; i++) {
-		double z[MOST], density;
+		double z[VERTICES_MAX], density;
 		enum outcome out = propose(s, z, &density);
 		failures += out == FAILED || out == ELSEWHERE;
 		int bin = out == ARRIVED ? bin_of(s, z, radius) : -1;
@@ -295,7 +295,7 @@ static void sample(struct sampling *s, const char *name)
 	assert_true((double)failures < 0.002 * (double)n + 3);
 }
 
-static void test_example(void **state)
+static void proposals_follow_the_stated_density(void **state)
 {
 	const struct example *e = *state;
 	static struct full_path x, y;
@@ -310,7 +310,7 @@ static void test_example(void **state)
 	starts_init(&starts, &c, m.seed, 0, 12000);
 	s = (struct sampling){.example = e, .ops = mutation_find(e->strategy, strlen(e->strategy)), .x = &x, .y = &y};
 	list_vertices(&s);
-	assert_true(s.count >= 1 && 2 * s.count <= MOST);
+	assert_true(s.count >= 1 && 2 * s.count <= VERTICES_MAX);
 	bool found = false;
 	for (unsigned i = 0; i < STARTS && !found; i++) {
 		if (!starts_make_path(&starts, e->edges, ((i * 377) % STARTS + 0.5) / STARTS, &x) || !all_smooth(&x))
@@ -320,7 +320,7 @@ static void test_example(void **state)
 	}
 	if (!found)
 		fail_msg("%s: no start from which all proposals arrive", name);
-	sample(&s, name);
+	compare_samples(&s, name);
 	starts_fini(&starts);
 	world_free(w);
 }
@@ -330,7 +330,7 @@ int main(void)
 	enum { EXAMPLES = sizeof examples / sizeof *examples };
 	struct CMUnitTest tests[EXAMPLES];
 	for (size_t i = 0; i < EXAMPLES; i++)
-		tests[i] = (struct CMUnitTest){examples[i].strategy, test_example, NULL, NULL,
+		tests[i] = (struct CMUnitTest){examples[i].strategy, proposals_follow_the_stated_density, NULL, NULL,
 					       (void *)(uintptr_t)&examples[i]};
 	return _cmocka_run_group_tests("sampled", tests, EXAMPLES, NULL, NULL);
 }

@@ -34,11 +34,11 @@ enum { SIDE = 16, GROUPS = 32 };
 
 /* Fails unless the mean of X + Y + Z over all pixels is that of an image in which every pixel has the radiance
  * `expected`. */
-static void check(const char *name, const struct world *w, double expected, const char *const *integrators,
-		  uint64_t spp)
+static void check_mean_radiance(const char *name, const struct world *w, double expected,
+				const char *const *integrators, uint64_t spp)
 {
 	static struct agreement_image image;
-	double whole = expected * (w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2]), mean[GROUPS];
+	double expected_sum = expected * (w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2]), mean[GROUPS];
 	assert_false(w->effects.colour);
 	for (size_t i = 0; integrators[i]; i++) {
 		char test[64];
@@ -46,7 +46,7 @@ static void check(const char *name, const struct world *w, double expected, cons
 		struct agreement_options side = {integrators[i], spp, GROUPS, 0, 0};
 		agreement_render(w, test, integrators[i], &side, &image);
 		for (int g = 0; g < GROUPS; g++)
-			mean[g] = image.mean[g][AGREEMENT_CELLS] / whole;
+			mean[g] = image.mean[g][AGREEMENT_CELLS] / expected_sum;
 		struct stats_mean m = stats_mean_test(mean, GROUPS, 1);
 		print_message("%s: %.6f +- %.6f\n", test, m.mean, m.error);
 		if (!(fabs(m.mean - 1) < 5 * m.error + 1e-5) || (!test_is_scaled() && !(m.error < 0.005)))
@@ -54,10 +54,10 @@ static void check(const char *name, const struct world *w, double expected, cons
 	}
 }
 
-static const char *const all[] = {"bdpt", "bdpt8", "erpt", "erpt4", "pssmlt", "hslt", NULL};
-static const char *const some[] = {"bdpt", "erpt4", "pssmlt", "hslt", NULL};
+static const char *const all_integrators[] = {"bdpt", "bdpt8", "erpt", "erpt4", "pssmlt", "hslt", NULL};
+static const char *const integrators_without_bdpt8[] = {"bdpt", "erpt4", "pssmlt", "hslt", NULL};
 
-static double film_mean(const struct world *w, double intensity, vec3 place)
+static double mean_pixel_intensity(const struct world *w, double intensity, vec3 place)
 {
 	vec3 in_world = vec3_scale(w->scale, vec3_sub(place, w->center)), d = vec3_sub(in_world, w->camera.position);
 	double distance = vec3_length(d) / w->scale;
@@ -67,21 +67,21 @@ static double film_mean(const struct world *w, double intensity, vec3 place)
 
 /* A beam of power 3 makes a spot of intensity 3 rho / pi times a cosine on the plate. The one pixel that sees the
  * spot gets this intensity over the squared distance and over the pixel's solid angle. */
-static void test_spot(void **state)
+static void beam_lights_the_one_pixel_that_sees_its_spot(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(SIDE, SIDE,
 					  DEPTH("2") SENSOR("0.5,0.3,3", "0,0,0") BEAM("-1,2,4", "0.2,0.1,0")
 						  PLATE("<scale value='2'/>", GREY("0.6")));
 	vec3 to = vec3_normalize((vec3){0.5 - 0.2, 0.3 - 0.1, 3});
-	double expected = film_mean(w, 3 * 0.6 / M_PI * to.z, (vec3){0.2, 0.1, 0});
+	double expected = mean_pixel_intensity(w, 3 * 0.6 / M_PI * to.z, (vec3){0.2, 0.1, 0});
 	assert_true(w->emitters[0].is_delta && w->emitters[0].is_beam && expected > 0);
-	check("spot", w, expected, all, 1536);
+	check_mean_radiance("spot", w, expected, all_integrators, 1536);
 	world_free(w);
 }
 
 /* A perfect mirror at x = 1 sends the beam on. */
-static void test_mirror(void **state)
+static void mirror_sends_the_beam_on(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -91,12 +91,13 @@ static void test_mirror(void **state)
 				PLATE("<scale value='0.5'/><rotate y='1' angle='-90'/><translate x='1' z='0.8'/>",
 				      "<bsdf type='conductor'><string name='material' value='none'/></bsdf>"));
 	vec3 place = {0, 0.1, 0}, to = vec3_normalize((vec3){0.5, 0.3 - 0.1, 3});
-	check("mirror", w, film_mean(w, 3 * 0.6 / M_PI * to.z, place), some, 1024);
+	check_mean_radiance("mirror", w, mean_pixel_intensity(w, 3 * 0.6 / M_PI * to.z, place),
+			    integrators_without_bdpt8, 1024);
 	world_free(w);
 }
 
 /* The beam hits a wall behind the camera at (0, 0, 2), and this spot lights the plate at z = 0. */
-static void test_plate_lit_by_the_spot(void **state)
+static void spot_behind_the_camera_lights_the_plate(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(SIDE, SIDE,
@@ -115,15 +116,15 @@ static void test_plate_lit_by_the_spot(void **state)
 		assert_true(d.z < 0);
 		sum += 3 * 0.5 / M_PI * cosine * cosine / r2 * 0.7 / M_PI;
 	}
-	check("lit from there", w, sum / (FINE * FINE),
-	      (const char *const[]){"bdpt", "bdpt8", "erpt", "pssmlt", "hslt", NULL}, 1024);
+	check_mean_radiance("lit from there", w, sum / (FINE * FINE),
+			    (const char *const[]){"bdpt", "bdpt8", "erpt", "pssmlt", "hslt", NULL}, 1024);
 	world_free(w);
 }
 
 /* The beam scatters in a cube of fog with sigma_t = 0.4 and sigma_s = 0.3. From each piece dt of the beam the film
  * gets 3 sigma_s / (4 pi) exp(-sigma_t (t + d)) / d^2 dt, where d is the distance from the near plane, at which the
  * camera lies here. The camera does not see the end of the beam. */
-static void test_fog(void **state)
+static void fog_scatters_the_beam_once(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -158,13 +159,14 @@ static void test_fog(void **state)
 		if (!camera_project(&w->camera, w->camera.position, vec3_normalize(away), far * w->scale, &x, &y) ||
 		    x < 0 || x >= SIDE || y < 0 || y >= SIDE)
 			continue;
-		sum += film_mean(w, 3 * 0.75 * sigma / (4 * M_PI) * exp(-sigma * (t + far)) * length / PIECES, p);
+		sum += mean_pixel_intensity(
+			w, 3 * 0.75 * sigma / (4 * M_PI) * exp(-sigma * (t + far)) * length / PIECES, p);
 	}
-	check("fog", w, sum, some, 2048);
+	check_mean_radiance("fog", w, sum, integrators_without_bdpt8, 2048);
 	world_free(w);
 }
 
-static void test_refused(void **state)
+static void invalid_beams_are_refused(void **state)
 {
 	(void)state;
 	world_check_refused("<emitter type='collimated'><float name='power' value='-1'/></emitter>", "power");
@@ -189,11 +191,11 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_spot),
-		cmocka_unit_test(test_mirror),
-		cmocka_unit_test(test_plate_lit_by_the_spot),
-		cmocka_unit_test(test_fog),
-		cmocka_unit_test(test_refused),
+		cmocka_unit_test(beam_lights_the_one_pixel_that_sees_its_spot),
+		cmocka_unit_test(mirror_sends_the_beam_on),
+		cmocka_unit_test(spot_behind_the_camera_lights_the_plate),
+		cmocka_unit_test(fog_scatters_the_beam_once),
+		cmocka_unit_test(invalid_beams_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -25,25 +25,25 @@ static void add_samples(struct brightness *b, unsigned a_cell, double (*of)(doub
 	}
 }
 
-static void fill(struct brightness *b, double (*of)(double x, double y))
+static void fill_coarse_map(struct brightness *b, double (*of)(double x, double y))
 {
 	add_samples(b, BRIGHTNESS_SAMPLES_PER_CELL, of);
 	brightness_compute_scales(b, SAMPLES);
 }
 
 /* 64 x 64 cells with two samples each, so that each cell covers one pixel. */
-static void fill_near(struct brightness *b, double (*of)(double x, double y))
+static void fill_fine_map(struct brightness *b, double (*of)(double x, double y))
 {
 	add_samples(b, 1, of);
-	brightness_compute_neighbourhood_scales(b, SAMPLES);
+	brightness_compute_nearby_scales(b, SAMPLES);
 }
 
-static double relative(const struct brightness *b, double x, double y)
+static double relative_brightness(const struct brightness *b, double x, double y)
 {
-	return brightness_scale(b, window.x + x, window.y + y) * SIDE * SIDE;
+	return brightness_inverse_at(b, window.x + x, window.y + y) * SIDE * SIDE;
 }
 
-static double halves(double x, double y)
+static double value_of_two_halves(double x, double y)
 {
 	(void)y;
 	return x < SIDE / 2 ? 10 : 0.5;
@@ -53,16 +53,16 @@ static void both_halves_have_their_brightness(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill(&b, halves);
+	fill_coarse_map(&b, value_of_two_halves);
 	for (double y = 1; y < SIDE; y += 7)
 		for (double x = 1; x < SIDE; x += 5) {
-			double product = relative(&b, x, y) * halves(x, y);
+			double product = relative_brightness(&b, x, y) * value_of_two_halves(x, y);
 			assert_true(product > 0.98 && product < 1.02); /* 1 % of the mean is added in quadrature */
 		}
 	brightness_fini(&b);
 }
 
-static double firefly(double x, double y)
+static double value_of_firefly(double x, double y)
 {
 	return x == 40.25 && y == 20.5 ? 1e6 : 1;
 }
@@ -71,15 +71,16 @@ static void a_firefly_does_not_show(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill(&b, firefly);
-	double there = relative(&b, 40.25, 20.5);
-	assert_true(there == relative(&b, 3, 3) &&
-		    there == relative(&b, 60, 60)); /* the mean of the whole film: no quarter is known well enough */
+	fill_coarse_map(&b, value_of_firefly);
+	double there = relative_brightness(&b, 40.25, 20.5);
+	assert_true(there == relative_brightness(&b, 3, 3) &&
+		    there == relative_brightness(&b, 60,
+						 60)); /* the mean of the whole film: no quarter is known well enough */
 	assert_true(there > 0 && there < 0.01);
 	brightness_fini(&b);
 }
 
-static double nothing(double x, double y)
+static double value_of_black(double x, double y)
 {
 	(void)x, (void)y;
 	return 0;
@@ -89,24 +90,24 @@ static void a_black_film_has_no_scale(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill(&b, nothing);
-	assert_true(relative(&b, 1, 1) == 0);
+	fill_coarse_map(&b, value_of_black);
+	assert_true(relative_brightness(&b, 1, 1) == 0);
 	brightness_fini(&b);
 }
 
-static double dark_half(double x, double y)
+static double value_of_dark_half(double x, double y)
 {
 	(void)y;
 	return x < SIDE / 2 ? 1 : 0;
 }
 
-static void darkness_has_the_least_that_the_error_knows(void **state)
+static void darkness_has_the_smallest_measurable_brightness(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill(&b, dark_half);
-	double least = 1 / relative(&b, 60, 30); /* a hundredth of the mean, which is 0.5 */
-	assert_true(least > 0.00499 && least < 0.00501);
+	fill_coarse_map(&b, value_of_dark_half);
+	double min_brightness = 1 / relative_brightness(&b, 60, 30); /* a hundredth of the mean, which is 0.5 */
+	assert_true(min_brightness > 0.00499 && min_brightness < 0.00501);
 	brightness_fini(&b);
 }
 
@@ -132,12 +133,12 @@ static void dark_places_beside_bright_ones_are_dark(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill_near(&b, halves);
+	fill_fine_map(&b, value_of_two_halves);
 	for (double y = 0.5; y < SIDE; y += 7)
 		for (double x = 0.5; x < SIDE; x++) {
 			if (x > SIDE / 2 - 3 && x < SIDE / 2 + 3)
 				continue; /* neighbourhoods of 5 x 5 cells reach across the border of the halves */
-			double product = relative(&b, x, y) * halves(x, y);
+			double product = relative_brightness(&b, x, y) * value_of_two_halves(x, y);
 			assert_true(product > 0.98 && product < 1.02);
 		}
 	brightness_fini(&b);
@@ -149,25 +150,25 @@ static void a_firefly_is_spread_over_its_neighbourhood(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill_near(&b, firefly);
-	double there = 1 / relative(&b, 40.25, 20.5), expected = 1 + (1e6 - 1) / (2 * 25 * 25);
+	fill_fine_map(&b, value_of_firefly);
+	double there = 1 / relative_brightness(&b, 40.25, 20.5), expected = 1 + (1e6 - 1) / (2 * 25 * 25);
 	assert_true(there > 0.999 * expected && there < 1.001 * expected);
-	double away = 1 / relative(&b, 60, 20.5), mean = 1 + (1e6 - 1) / SAMPLES;
+	double distant_brightness = 1 / relative_brightness(&b, 60, 20.5), mean = 1 + (1e6 - 1) / SAMPLES;
 	expected = sqrt(1 + 0.01 * mean * 0.01 * mean); /* 1 % of the mean is added in quadrature */
-	assert_true(away > 0.999 * expected && away < 1.001 * expected);
+	assert_true(distant_brightness > 0.999 * expected && distant_brightness < 1.001 * expected);
 	brightness_fini(&b);
 }
 
-static void a_black_film_has_no_scale_near_either(void **state)
+static void a_black_film_has_no_scale_in_the_fine_map(void **state)
 {
 	(void)state;
 	struct brightness b;
-	fill_near(&b, nothing);
-	assert_true(relative(&b, 1, 1) == 0);
+	fill_fine_map(&b, value_of_black);
+	assert_true(relative_brightness(&b, 1, 1) == 0);
 	brightness_fini(&b);
-	fill_near(&b, dark_half);
-	double least = 1 / relative(&b, 60, 30);
-	assert_true(least > 0.00499 && least < 0.00501);
+	fill_fine_map(&b, value_of_dark_half);
+	double min_brightness = 1 / relative_brightness(&b, 60, 30);
+	assert_true(min_brightness > 0.00499 && min_brightness < 0.00501);
 	brightness_fini(&b);
 }
 
@@ -177,11 +178,11 @@ int main(void)
 		cmocka_unit_test(both_halves_have_their_brightness),
 		cmocka_unit_test(a_firefly_does_not_show),
 		cmocka_unit_test(a_black_film_has_no_scale),
-		cmocka_unit_test(darkness_has_the_least_that_the_error_knows),
+		cmocka_unit_test(darkness_has_the_smallest_measurable_brightness),
 		cmocka_unit_test(a_sample_counts_once_in_a_cell),
 		cmocka_unit_test(dark_places_beside_bright_ones_are_dark),
 		cmocka_unit_test(a_firefly_is_spread_over_its_neighbourhood),
-		cmocka_unit_test(a_black_film_has_no_scale_near_either),
+		cmocka_unit_test(a_black_film_has_no_scale_in_the_fine_map),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,7 +24,7 @@ static double sum3(const double v[3])
 
 /* Inside a sphere that emits L = 1 and reflects rho = 0.5, the radiance is 1 + 1/2 + 1/4 + ..., with one term per
  * edge up to max_depth. */
-static void test_furnace(void **state)
+static void furnace_has_a_geometric_series_of_radiance(void **state)
 {
 	(void)state;
 	known_radiance_check(
@@ -38,9 +38,9 @@ static void test_furnace(void **state)
 		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct known_radiance_spp){64, 256, 0});
 }
 
-/* Like test_furnace(), but seen in all directions from a point off the centre, with a filter that wraps around the
- * film's edges. */
-static void test_furnace_all_around(void **state)
+/* Like furnace_has_a_geometric_series_of_radiance(), but seen in all directions from a point off the centre, with a
+ * filter that wraps around the film's edges. */
+static void furnace_is_uniform_in_all_directions(void **state)
 {
 	(void)state;
 	known_radiance_check(
@@ -57,7 +57,7 @@ static void test_furnace_all_around(void **state)
 
 /* Seen through a telecentric lens, whose points lie a million radii away: the states of chains must represent them
  * accurately enough. */
-static void test_furnace_far_lens(void **state)
+static void furnace_is_uniform_through_a_telecentric_lens(void **state)
 {
 	(void)state;
 	static struct agreement_image image;
@@ -81,7 +81,7 @@ static void test_furnace_far_lens(void **state)
 #define BALL(bsdf) "<shape type='sphere'>" bsdf "</shape>"
 
 /* In constant light, objects that absorb nothing are invisible. */
-static void test_invisible(void **state)
+static void objects_that_absorb_nothing_are_invisible(void **state)
 {
 	(void)state;
 	known_radiance_check(
@@ -228,7 +228,7 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 	world_free(w);
 }
 
-static void test_lit_floor(void **state)
+static void floor_has_the_irradiance_of_its_lamp(void **state)
 {
 	(void)state;
 	check_lit_floor(
@@ -258,7 +258,7 @@ static void test_lit_floor(void **state)
 }
 
 /* A beam straight down, wider than the part of the floor in view: the radiance is M rho / pi. */
-static void test_beam(void **state)
+static void wide_beam_lights_the_floor_evenly(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("beam", "floor.xml", 16, 16);
@@ -269,7 +269,7 @@ static void test_beam(void **state)
  * glass reflects r = 2 R / (1 + R) with R = ((n - 1) / (n + 1))^2, and the filter transmits one half at each passage:
  * the camera sees (1 - r) / 4 of M rho / pi. A sub-path from either side can reach the floor only through the glass
  * and the filter, and neither the sun nor the camera can be hit. */
-static void test_seen_through(void **state)
+static void glass_and_filter_attenuate_the_sun_twice(void **state)
 {
 	(void)state;
 	const double n = 1.5, R = (n - 1) * (n - 1) / ((n + 1) * (n + 1));
@@ -294,7 +294,7 @@ static void test_seen_through(void **state)
 /* Two plates of reflectance rho, of which the lower emits radiance 1. Between infinite plates every ray from one
  * meets the other, so the radiance of the lower plate is 1 + rho^2 + rho^4 + ..., that of the upper one rho + rho^3 +
  * .... The plates are 4000 gaps wide, which loses about 1e-6 of the light seen by the camera in the middle. */
-static void test_plates(void **state)
+static void parallel_plates_exchange_a_series_of_light(void **state)
 {
 	(void)state;
 	const double rho = 0.6;
@@ -335,7 +335,7 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 	world_free(w);
 }
 
-static void test_small_lamp(void **state)
+static void lamp_smaller_than_a_pixel_has_its_share_of_light(void **state)
 {
 	(void)state;
 	double slope = tan(20 * M_PI / 180); /* slope of the ray through the film's edge */
@@ -352,11 +352,15 @@ static void test_small_lamp(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_furnace),		 cmocka_unit_test(test_furnace_all_around),
-		cmocka_unit_test(test_furnace_far_lens), cmocka_unit_test(test_invisible),
-		cmocka_unit_test(test_lit_floor),	 cmocka_unit_test(test_beam),
-		cmocka_unit_test(test_seen_through),	 cmocka_unit_test(test_plates),
-		cmocka_unit_test(test_small_lamp),
+		cmocka_unit_test(furnace_has_a_geometric_series_of_radiance),
+		cmocka_unit_test(furnace_is_uniform_in_all_directions),
+		cmocka_unit_test(furnace_is_uniform_through_a_telecentric_lens),
+		cmocka_unit_test(objects_that_absorb_nothing_are_invisible),
+		cmocka_unit_test(floor_has_the_irradiance_of_its_lamp),
+		cmocka_unit_test(wide_beam_lights_the_floor_evenly),
+		cmocka_unit_test(glass_and_filter_attenuate_the_sun_twice),
+		cmocka_unit_test(parallel_plates_exchange_a_series_of_light),
+		cmocka_unit_test(lamp_smaller_than_a_pixel_has_its_share_of_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,7 +21,7 @@
 
 /* The ray runs perpendicular to the faces, without refraction, through a length of 1.4 in a medium of sigma_t 1.1 and
  * 0.6 in one of 0.5. The innermost slab states no medium. */
-static void test_absorbing(void **state)
+static void absorbing_slabs_follow_beers_law(void **state)
 {
 	(void)state;
 #define SLAB(size, inner)                                                           \
@@ -50,7 +50,7 @@ static void test_absorbing(void **state)
 
 /* A camera in a medium, whose near plane lies 3 before a face beyond which there is no medium; the medium in front of
  * the near plane does not count. */
-static void test_camera_in_medium(void **state)
+static void medium_before_the_near_plane_does_not_count(void **state)
 {
 	(void)state;
 	known_radiance_check(
@@ -87,7 +87,7 @@ static void test_camera_in_medium(void **state)
 	"<phase type='sggx'><volume type='constvolume' name='S'><string name='value' value='.5,.2,.9,.1,.3,-.1'/></volume></phase>"
 
 /* In media that absorb nothing, everything looks like the sky. */
-static void test_white_media(void **state)
+static void white_media_look_like_the_sky(void **state)
 {
 	(void)state;
 	static const char *const boundary[] = {"<bsdf type='null'/>", "<bsdf type='dielectric'/>"};
@@ -109,7 +109,7 @@ static void test_white_media(void **state)
 
 /* Faces of `null` are no vertices, so paths of one edge pass through them: the image shows the sky through the layer,
  * without the light that the layer scatters. */
-static void test_seen_through_layer(void **state)
+static void unscattered_light_passes_through_null_faces(void **state)
 {
 	(void)state;
 	known_radiance_check(
@@ -145,7 +145,7 @@ static void check_scattered_once(const char *name, double begin, const char *sen
 		0.7 * 0.6 * sum, e);
 }
 
-static void test_scattered_once(void **state)
+static void layer_scatters_sky_light_once(void **state)
 {
 	(void)state;
 	check_scattered_once("scattered once", 0, FROM_ABOVE("0.01", ""), (struct known_radiance_spp){14336, 0, 0});
@@ -177,7 +177,7 @@ static double chandrasekhar_h(double albedo, double mu)
 	return at;
 }
 
-static void test_half_space(void **state)
+static void half_space_reflects_as_chandrasekhar_computed(void **state)
 {
 	(void)state;
 	double albedo = 0.5;
@@ -188,7 +188,7 @@ static void test_half_space(void **state)
 }
 
 /* The mean is 1 from z = 0 to -2, so that the optical depth is that of LAYER. */
-static double strata(double x, double y, double z, uint32_t channel)
+static double strata_density(double x, double y, double z, uint32_t channel)
 {
 	(void)x;
 	(void)y;
@@ -198,7 +198,7 @@ static double strata(double x, double y, double z, uint32_t channel)
 
 /* Phase function from the direction (-0.8, 0, 0.6) to z, from the projected areas and the distribution D of the half
  * vector, with the inverse of the matrix FLAKES. */
-static double flakes_once(double albedo)
+static double flakes_phase_value(double albedo)
 {
 	const double x = -0.8 / sqrt(3.2), z = 1.6 / sqrt(3.2), det = .5 * .17 - .1 * .12 - .3 * .07;
 	double form = (x * x * .17 + z * z * .09 - 2 * x * z * .07) / det, along = sqrt(.9) + sqrt(.356) / 0.6;
@@ -206,7 +206,7 @@ static double flakes_once(double albedo)
 }
 
 /* An oblique beam whose light is scattered once: only the optical depth matters, not the position of the beam. */
-static void test_beam_in_layer(void **state)
+static void oblique_beam_is_scattered_once_in_a_layer(void **state)
 {
 	(void)state;
 #define BEAM_IN(layer)                                                                                          \
@@ -226,12 +226,13 @@ static void test_beam_in_layer(void **state)
 		      "<phase type='mixturephase'><string name='weights' value='.2,.5'/><phase type='rayleigh'/><phase "
 		      "type='tabphase'><string name='values' value='0,3,6'/></phase></phase>"));
 	static struct vol grid;
-	vol_make(&grid, (const uint32_t[3]){1, 1, 4}, 1, strata);
+	vol_make(&grid, (const uint32_t[3]){1, 1, 4}, 1, strata_density);
 	double along = 1 + 1 / 0.6, phase = 3 / (16 * M_PI) * 1.36, once = 0.6 * (1 - exp(-2 * along)) / along;
 	static const char *const names[] = {"beam in a layer", "beam in strata", "beam in a mixture", "beam in flakes"},
 				 *const scenes[] = {BEAM_IN(LAYER("1", "0.6", "<phase type='rayleigh'/>")), layered,
 						    mixed, BEAM_IN(LAYER("1", "0.6", FLAKES))};
-	const double share[] = {once * phase, once * phase, once * (0.2 * phase + 0.1 / (2 * M_PI)), flakes_once(0.6)};
+	const double share[] = {once * phase, once * phase, once * (0.2 * phase + 0.1 / (2 * M_PI)),
+				flakes_phase_value(0.6)};
 	for (int i = 0; i < 4; i++) {
 		const struct memory_file files[] = {{"beam.xml", scenes[i], strlen(scenes[i])},
 						    {"strata.vol", grid.bytes, grid.size},
@@ -244,11 +245,15 @@ static void test_beam_in_layer(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_absorbing),	   cmocka_unit_test(test_camera_in_medium),
-		cmocka_unit_test(test_white_media),	   cmocka_unit_test(test_scattered_once),
-		cmocka_unit_test(test_seen_through_layer), cmocka_unit_test(test_beam_in_layer),
+		cmocka_unit_test(absorbing_slabs_follow_beers_law),
+		cmocka_unit_test(medium_before_the_near_plane_does_not_count),
+		cmocka_unit_test(white_media_look_like_the_sky),
+		cmocka_unit_test(layer_scatters_sky_light_once),
+		cmocka_unit_test(unscattered_light_passes_through_null_faces),
+		cmocka_unit_test(oblique_beam_is_scattered_once_in_a_layer),
 	};
-	const struct CMUnitTest longer[] = {cmocka_unit_test(test_half_space)}; /* half a minute */
+	const struct CMUnitTest longer[] = {
+		cmocka_unit_test(half_space_reflects_as_chandrasekhar_computed)}; /* half a minute */
 	int failed = cmocka_run_group_tests(tests, NULL, NULL);
 	return test_is_full() ? failed + cmocka_run_group_tests(longer, NULL, NULL) : failed;
 }

@@ -42,7 +42,7 @@
 	"</shape>"
 /* clang-format on */
 
-static void test_diffuse_and_rough(void **state)
+static void densities_agree_for_diffuse_and_rough_surfaces(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -59,7 +59,7 @@ static void test_diffuse_and_rough(void **state)
 	/* clang-format on */
 }
 
-static void test_specular(void **state)
+static void densities_agree_for_specular_surfaces(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -87,7 +87,7 @@ static void test_specular(void **state)
 	assert_true(t.with_delta > t.routes / 20);
 }
 
-static void test_infinity(void **state)
+static void densities_agree_for_infinite_emitters(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -149,7 +149,7 @@ static void test_infinity(void **state)
 /* clang-format on */
 
 /* Connections pass through surfaces that let light straight through: to lamps, point lights, the sky and the lens. */
-static void test_passed(void **state)
+static void densities_agree_through_see_through_surfaces(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -174,7 +174,7 @@ static void test_passed(void **state)
 }
 
 /* Lights that no path can hit, beside some that can be hit. */
-static void test_delta_lights(void **state)
+static void densities_agree_for_delta_lights(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -247,13 +247,13 @@ static void check_fog(const char *name, const char *medium, const struct vol *gr
 	struct world *w = world_from_files(32, 24, files);
 	assert_true(w->effects.scattering && w->media_count == 1);
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		assert_int_equal(w->emitter_medium[i], 1);
+		assert_int_equal(w->emitter_media[i], 1);
 	density_check(name, w, walks);
 }
 
 #define FORWARDS "<phase type='hg'><float name='g' value='.5'/></phase></medium>"
 
-static void test_fog(void **state)
+static void densities_agree_in_fog(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -267,7 +267,7 @@ static void test_fog(void **state)
 }
 
 /* Fog of flakes that lie nearly flat, three times as dense along one direction as along another. */
-static void test_flakes(void **state)
+static void densities_agree_in_fog_of_flakes(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -283,17 +283,17 @@ static void test_flakes(void **state)
 	/* clang-format on */
 }
 
-static double puffs(double x, double y, double z, uint32_t channel)
+static double puffs_density(double x, double y, double z, uint32_t channel)
 {
 	return 0.5 + 0.5 * sin(3 * x + channel) * cos(2 * y - channel) * sin(1 + 5 * z);
 }
 
 /* The blend of the two phase functions varies with position; one is a table that is 0 straight ahead. */
-static void test_blended_fog(void **state)
+static void densities_agree_in_fog_of_blended_phases(void **state)
 {
 	(void)state;
 	static struct vol grid;
-	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, puffs);
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, puffs_density);
 	/* clang-format off */
 	check_fog("fog of two phase functions",
 		"<medium type='homogeneous' id='fog'>"
@@ -316,7 +316,7 @@ static void test_blended_fog(void **state)
 }
 
 /* The density varies with position, in one channel or three, in a box that does not fill the room. */
-static void test_puffs(void **state)
+static void densities_agree_in_fog_of_varying_density(void **state)
 {
 	(void)state;
 	static struct vol grid;
@@ -324,7 +324,7 @@ static void test_puffs(void **state)
 					    "<rgb name='albedo' value='.9,.8,.7'/>"};
 	for (uint32_t channels = 1; channels <= 3; channels += 2) {
 		char medium[1024];
-		vol_make(&grid, (const uint32_t[3]){4, 3, 5}, channels, puffs);
+		vol_make(&grid, (const uint32_t[3]){4, 3, 5}, channels, puffs_density);
 		/* clang-format off */
 		snprintf(medium, sizeof medium,
 			"<medium type='heterogeneous' id='fog'>"
@@ -345,7 +345,7 @@ static void test_puffs(void **state)
 }
 
 /* A wide lens, focused in front of the balls, so that the lens vertex x_k differs from path to path. */
-static void test_lens(void **state)
+static void densities_agree_for_a_wide_lens(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -366,7 +366,7 @@ static void test_lens(void **state)
 }
 
 /* Vertex normals tilted by up to 40 degrees from the triangle normals. */
-static void test_bent_normals(void **state)
+static void densities_agree_for_tilted_vertex_normals(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -415,17 +415,17 @@ static void test_bent_normals(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_diffuse_and_rough),
-		cmocka_unit_test(test_specular),
-		cmocka_unit_test(test_infinity),
-		cmocka_unit_test(test_passed),
-		cmocka_unit_test(test_blended_fog),
-		cmocka_unit_test(test_flakes),
-		cmocka_unit_test(test_fog),
-		cmocka_unit_test(test_puffs),
-		cmocka_unit_test(test_lens),
-		cmocka_unit_test(test_delta_lights),
-		cmocka_unit_test(test_bent_normals),
+		cmocka_unit_test(densities_agree_for_diffuse_and_rough_surfaces),
+		cmocka_unit_test(densities_agree_for_specular_surfaces),
+		cmocka_unit_test(densities_agree_for_infinite_emitters),
+		cmocka_unit_test(densities_agree_through_see_through_surfaces),
+		cmocka_unit_test(densities_agree_in_fog_of_blended_phases),
+		cmocka_unit_test(densities_agree_in_fog_of_flakes),
+		cmocka_unit_test(densities_agree_in_fog),
+		cmocka_unit_test(densities_agree_in_fog_of_varying_density),
+		cmocka_unit_test(densities_agree_for_a_wide_lens),
+		cmocka_unit_test(densities_agree_for_delta_lights),
+		cmocka_unit_test(densities_agree_for_tilted_vertex_normals),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 /* A ball on a floor under a sky: almost all of the noise comes from drawing one wavelength. */
-static struct world *sky_over(const char *bsdf)
+static struct world *sky_over_ball_world(const char *bsdf)
 {
 	/* clang-format off */
 	return world_from_text(32, 32,
@@ -44,60 +44,60 @@ static struct world *sky_over(const char *bsdf)
 
 #define SMOOTH(inner) "<bsdf type='dielectric'>" inner "</bsdf>"
 #define ROUGH(inner) "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/>" inner "</bsdf>"
-#define STRONG "<float name='int_ior' value='1.6'/><float name='int_cauchy_b' value='0.06'/>"
-#define PLAIN "<float name='int_ior' value='1.5'/>"
-#define HARDLY PLAIN "<float name='int_cauchy_b' value='1e-9'/>"
-#define NOTHING PLAIN "<float name='int_cauchy_b' value='0'/>"
+#define STRONG_DISPERSION "<float name='int_ior' value='1.6'/><float name='int_cauchy_b' value='0.06'/>"
+#define PLAIN_INDEX "<float name='int_ior' value='1.5'/>"
+#define TINY_DISPERSION PLAIN_INDEX "<float name='int_cauchy_b' value='1e-9'/>"
+#define ZERO_DISPERSION PLAIN_INDEX "<float name='int_cauchy_b' value='0'/>"
 
 static void render(struct world *w, const char *test, const char *side, const char *integrator, uint64_t spp,
 		   struct agreement_image *out)
 {
-	struct agreement_options how = {integrator, spp, 32, 0, 0};
-	agreement_render(w, test, side, &how, out);
+	struct agreement_options options = {integrator, spp, 32, 0, 0};
+	agreement_render(w, test, side, &options, out);
 }
 
-static const struct effect_line *effect_named(const struct world *w, const char *name)
+static const struct effect_line *find_effect_line(const struct world *w, const char *name)
 {
-	for (size_t i = 0; i < w->effects.line_count; i++)
-		if (strcmp(w->effects.lines[i].name, name) == 0)
-			return &w->effects.lines[i];
+	for (size_t i = 0; i < w->effects.effect_line_count; i++)
+		if (strcmp(w->effects.effect_lines[i].name, name) == 0)
+			return &w->effects.effect_lines[i];
 	fail_msg("no line %s", name);
 	return NULL;
 }
 
-static void check_both_ways(const char *name, const char *bsdf, uint64_t spp)
+static void check_bdpt_against_path(const char *name, const char *bsdf, uint64_t spp)
 {
 	static struct agreement_image path, bdpt;
-	struct world *w = sky_over(bsdf);
-	assert_true(w->effects.dispersion && w->effects.colour && effect_named(w, "dispersion")->is_on);
-	assert_non_null(strstr(effect_named(w, "dispersion")->reason, "varies with wavelength"));
+	struct world *w = sky_over_ball_world(bsdf);
+	assert_true(w->effects.dispersion && w->effects.colour && find_effect_line(w, "dispersion")->is_on);
+	assert_non_null(strstr(find_effect_line(w, "dispersion")->reason, "varies with wavelength"));
 	render(w, name, "path", "path", spp, &path);
 	render(w, name, "bdpt", "bdpt", spp, &bdpt);
 	agreement_check(name, &bdpt, &path);
 	world_free(w);
 }
 
-static void test_smooth_glass(void **state)
+static void bdpt_agrees_with_path_for_smooth_dispersive_glass(void **state)
 {
 	(void)state;
-	check_both_ways("smooth glass that disperses", SMOOTH(STRONG), 768);
+	check_bdpt_against_path("smooth glass that disperses", SMOOTH(STRONG_DISPERSION), 768);
 }
 
-static void test_rough_glass(void **state)
+static void bdpt_agrees_with_path_for_rough_dispersive_glass(void **state)
 {
 	(void)state;
-	check_both_ways("rough glass that disperses", ROUGH(STRONG), 768);
+	check_bdpt_against_path("rough glass that disperses", ROUGH(STRONG_DISPERSION), 768);
 }
 
-static void check_one_against_four(const char *name, const char *hardly, const char *plain, uint64_t spp)
+static void check_hero_wavelength_against_four(const char *name, const char *hardly, const char *plain, uint64_t spp)
 {
 	static struct agreement_image one, four;
-	struct world *w = sky_over(hardly);
+	struct world *w = sky_over_ball_world(hardly);
 	assert_true(w->effects.dispersion);
 	render(w, name, "one", "path", spp, &one);
 	world_free(w);
-	w = sky_over(plain);
-	assert_true(!w->effects.dispersion && !effect_named(w, "dispersion")->is_on);
+	w = sky_over_ball_world(plain);
+	assert_true(!w->effects.dispersion && !find_effect_line(w, "dispersion")->is_on);
 	render(w, name, "four", "path", spp, &four);
 	world_free(w);
 	agreement_check(name, &one, &four);
@@ -106,25 +106,25 @@ static void check_one_against_four(const char *name, const char *hardly, const c
 static void test_one_wavelength_stands_for_four(void **state)
 {
 	(void)state;
-	check_one_against_four("one wavelength, smooth", SMOOTH(HARDLY), SMOOTH(PLAIN), 768);
-	check_one_against_four("one wavelength, rough", ROUGH(HARDLY), ROUGH(PLAIN), 768);
+	check_hero_wavelength_against_four("one wavelength, smooth", SMOOTH(TINY_DISPERSION), SMOOTH(PLAIN_INDEX), 768);
+	check_hero_wavelength_against_four("one wavelength, rough", ROUGH(TINY_DISPERSION), ROUGH(PLAIN_INDEX), 768);
 }
 
-static void test_no_coefficient_is_the_plain_scene(void **state)
+static void zero_dispersion_is_the_plain_scene(void **state)
 {
 	(void)state;
 	static struct agreement_image zero, plain;
-	struct world *w = sky_over(ROUGH(NOTHING));
+	struct world *w = sky_over_ball_world(ROUGH(ZERO_DISPERSION));
 	render(w, "nothing", "path", "path", 32, &zero);
 	world_free(w);
-	w = sky_over(ROUGH(PLAIN));
+	w = sky_over_ball_world(ROUGH(PLAIN_INDEX));
 	render(w, "nothing", "path", "path", 32, &plain);
 	world_free(w);
 	assert_memory_equal(zero.mean, plain.mean, sizeof plain.mean);
 }
 
 /* Returns whether the path joined by path_connect() scatters at a dispersive surface. */
-static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
+static bool path_meets_dispersive_surface(const struct path_context *c, unsigned s, unsigned t)
 {
 	for (unsigned i = 1; i < s; i++)
 		if (c->light[i].bsdf->is_dispersive)
@@ -136,14 +136,14 @@ static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
 }
 
 /* Every technique leaves a path that meets dispersive glass one wavelength, and all other paths four. */
-static void test_every_technique_collapses(void **state)
+static void every_technique_leaves_dispersed_paths_one_wavelength(void **state)
 {
 	(void)state;
 	enum { DEPTH = 6 };
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	size_t one[DEPTH + 1] = {0}, four[DEPTH + 1] = {0};
-	struct world *w = sky_over(ROUGH(STRONG));
+	struct world *w = sky_over_ball_world(ROUGH(STRONG_DISPERSION));
 	c = (struct path_context){
 		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = DEPTH, .counters = counters};
 	for (uint64_t i = 0; i < 20000; i++) {
@@ -159,7 +159,7 @@ static void test_every_technique_collapses(void **state)
 				if (!(l.v[0] > 0))
 					continue;
 				bool alone = l.v[1] == 0 && l.v[2] == 0 && l.v[3] == 0;
-				if (alone != meets_glass(&c, s, t))
+				if (alone != path_meets_dispersive_surface(&c, s, t))
 					fail_msg("s = %u, t = %u: %g %g %g %g", s, t, l.v[0], l.v[1], l.v[2], l.v[3]);
 				(alone ? one : four)[s]++;
 			}
@@ -184,11 +184,11 @@ static void test_collapse(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_smooth_glass),
-		cmocka_unit_test(test_rough_glass),
+		cmocka_unit_test(bdpt_agrees_with_path_for_smooth_dispersive_glass),
+		cmocka_unit_test(bdpt_agrees_with_path_for_rough_dispersive_glass),
 		cmocka_unit_test(test_one_wavelength_stands_for_four),
-		cmocka_unit_test(test_no_coefficient_is_the_plain_scene),
-		cmocka_unit_test(test_every_technique_collapses),
+		cmocka_unit_test(zero_dispersion_is_the_plain_scene),
+		cmocka_unit_test(every_technique_leaves_dispersed_paths_one_wavelength),
 		cmocka_unit_test(test_collapse),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

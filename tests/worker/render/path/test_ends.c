@@ -51,30 +51,30 @@ static void check_convergence(const char *name, struct world *w, struct effort e
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
 
 /* Everything is out of focus by up to a third of the image's width; the filter reaches two pixels beyond the border. */
-static void test_defocus(void **state)
+static void integrators_agree_out_of_focus(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("ends", "defocus.xml", 16, 16);
 	check_convergence("defocus", w, (struct effort){3072, 2048, 65536});
 }
 
-struct span {
+struct film_interval {
 	double low, high;
 };
 
-static double overlap(struct span a, struct span b)
+static double interval_overlap(struct film_interval a, struct film_interval b)
 {
 	return fmax(fmin(a.high, b.high) - fmax(a.low, b.low), 0);
 }
 
 /* An emitting rectangle across the axis at depth z, seen through a lens. For each point a of the aperture, the image
  * is that of a pinhole, moved by a (1/z - 1/focus) in slope; the mean over the aperture is found by quadrature. */
-static void test_blurred_rectangle(void **state)
+static void defocused_rectangle_has_its_closed_form(void **state)
 {
 	(void)state;
 	enum { RADII = 64, TURNS = 64 };
 	const double focus = 2, z = 5, radius = 0.5, half = tan(20 * M_PI / 180);
-	const struct span x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
+	const struct film_interval x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
 	static struct agreement_image image;
 	struct world *w = world_from_own_scene("ends", "blurred-rectangle.xml", 16, 16);
 	const struct agreement_options side = {"path", 12288, 32, 0, 0};
@@ -82,12 +82,13 @@ static void test_blurred_rectangle(void **state)
 	double expected[AGREEMENT_CELLS + 1] = {0};
 	for (int c = 0; c < AGREEMENT_CELLS; c++) {
 		/* Film y runs downwards. */
-		struct span bx = {half * (c % 2 - 1), half * (c % 2)}, by = {half * (0 - c / 2), half * (1 - c / 2)};
+		struct film_interval bx = {half * (c % 2 - 1), half * (c % 2)},
+				     by = {half * (0 - c / 2), half * (1 - c / 2)};
 		for (int i = 0; i < RADII * TURNS; i++) {
 			double r = radius * sqrt((i / TURNS + 0.5) / RADII), phi = 2 * M_PI * (i % TURNS + 0.5) / TURNS;
 			double move = 1 / focus - 1 / z, mx = r * cos(phi) * move, my = r * sin(phi) * move;
-			expected[c] += overlap((struct span){x.low + mx, x.high + mx}, bx) *
-				       overlap((struct span){y.low + my, y.high + my}, by) /
+			expected[c] += interval_overlap((struct film_interval){x.low + mx, x.high + mx}, bx) *
+				       interval_overlap((struct film_interval){y.low + my, y.high + my}, by) /
 				       (half * half * RADII * TURNS);
 		}
 		expected[AGREEMENT_CELLS] += expected[c] / AGREEMENT_CELLS;
@@ -98,19 +99,21 @@ static void test_blurred_rectangle(void **state)
 			image.mean[g][c] /= expected[c] * sum;
 	agreement_check_constant("blurred rectangle", &image, 1);
 	/* A pinhole gives a very different image, so the comparison can tell the two cameras apart. */
-	double sharp = overlap(x, (struct span){-half, 0}) * overlap(y, (struct span){0, half}) / (half * half);
+	double sharp = interval_overlap(x, (struct film_interval){-half, 0}) *
+		       interval_overlap(y, (struct film_interval){0, half}) / (half * half);
 	assert_true(fabs(expected[0] / sharp - 1) > 0.1);
 	world_free(w);
 }
 
-/* A floor at y = 0, seen straight from above, and its lights. mirror: a mirror stands on the floor at x = -1.5. */
+/* A floor at y = 0, seen straight from above, and its lights. has_mirror: a mirror stands on the floor at x = -1.5. */
 struct lamps {
-	vec3 point, spot, aim, direction; /* direction: of the parallel light; the spot ends at 40 degrees */
+	vec3 point_position, spot_position, spot_target,
+		direction; /* direction: of the parallel light; the spot ends at 40 degrees */
 	double intensity, spot_intensity, irradiance, sky;
-	bool mirror;
+	bool has_mirror;
 };
 
-static double from_point(vec3 lamp, double intensity, vec3 at)
+static double irradiance_from_point_light(vec3 lamp, double intensity, vec3 at)
 {
 	vec3 d = vec3_sub(lamp, at);
 	return intensity * d.y / pow(vec3_dot(d, d), 1.5);
@@ -119,14 +122,17 @@ static double from_point(vec3 lamp, double intensity, vec3 at)
 /* Returns the irradiance at (x, z). Divided by pi, it is the radiance of a white floor. */
 static double irradiance(const struct lamps *l, double x, double z)
 {
-	vec3 at = {x, 0, z}, image = {-3 - l->point.x, l->point.y, l->point.z};
-	double sum = from_point(l->point, l->intensity, at) + l->irradiance * -vec3_normalize(l->direction).y;
-	if (l->mirror)
-		sum = 2 * sum - from_point(l->point, l->intensity, at) + from_point(image, l->intensity, at);
+	vec3 at = {x, 0, z}, image = {-3 - l->point_position.x, l->point_position.y, l->point_position.z};
+	double sum = irradiance_from_point_light(l->point_position, l->intensity, at) +
+		     l->irradiance * -vec3_normalize(l->direction).y;
+	if (l->has_mirror)
+		sum = 2 * sum - irradiance_from_point_light(l->point_position, l->intensity, at) +
+		      irradiance_from_point_light(image, l->intensity, at);
 	if (l->spot_intensity > 0) {
-		vec3 axis = vec3_normalize(vec3_sub(l->aim, l->spot));
-		double degrees = acos(vec3_dot(axis, vec3_normalize(vec3_sub(at, l->spot)))) * 180 / M_PI;
-		sum += from_point(l->spot, l->spot_intensity, at) * fmin(fmax((40 - degrees) / 15, 0), 1);
+		vec3 axis = vec3_normalize(vec3_sub(l->spot_target, l->spot_position));
+		double degrees = acos(vec3_dot(axis, vec3_normalize(vec3_sub(at, l->spot_position)))) * 180 / M_PI;
+		sum += irradiance_from_point_light(l->spot_position, l->spot_intensity, at) *
+		       fmin(fmax((40 - degrees) / 15, 0), 1);
 	}
 	return sum / M_PI + l->sky;
 }
@@ -171,9 +177,10 @@ static void check_floor(const char *name, const struct lamps *l, struct effort e
 			AT("<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>")
 		"</emitter>"
 		"<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
-		l->mirror ? 3 : 2, l->mirror ? mirror : "", l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x,
-		l->direction.y, l->direction.z, l->irradiance, l->spot_intensity, l->spot.x, l->spot.y, l->spot.z,
-		l->aim.x, l->aim.y, l->aim.z, l->sky);
+		l->has_mirror ? 3 : 2, l->has_mirror ? mirror : "", l->point_position.x, l->point_position.y,
+		l->point_position.z, l->intensity, l->direction.x, l->direction.y, l->direction.z, l->irradiance,
+		l->spot_intensity, l->spot_position.x, l->spot_position.y, l->spot_position.z,
+		l->spot_target.x, l->spot_target.y, l->spot_target.z, l->sky);
 	/* clang-format on */
 	assert_true(!w->effects.colour && (w->environment >= 0) == (l->sky > 0));
 	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2],
@@ -199,32 +206,36 @@ static void check_floor(const char *name, const struct lamps *l, struct effort e
 	world_free(w);
 }
 
-static void test_lit_floor(void **state)
+static void floor_has_the_irradiance_of_delta_lights(void **state)
 {
 	(void)state;
-	struct lamps l = {.point = {0.6, 1.2, -0.4}, .intensity = 2, .direction = {0, -1, 0}, .aim = {0, -1, 0}};
+	struct lamps l = {
+		.point_position = {0.6, 1.2, -0.4}, .intensity = 2, .direction = {0, -1, 0}, .spot_target = {0, -1, 0}};
 	check_floor("point", &l, (struct effort){1024, 1024, 0});
-	l = (struct lamps){.spot = {-0.5, 2, 0}, .aim = {0.2, 0, 0.3}, .direction = {0, -1, 0}, .spot_intensity = 3};
+	l = (struct lamps){.spot_position = {-0.5, 2, 0},
+			   .spot_target = {0.2, 0, 0.3},
+			   .direction = {0, -1, 0},
+			   .spot_intensity = 3};
 	check_floor("spot", &l, (struct effort){1024, 2048, 0});
 	/* Two lights, and the sky, which escaping rays meet. */
-	l = (struct lamps){.point = {0.6, 2, -0.4},
+	l = (struct lamps){.point_position = {0.6, 2, -0.4},
 			   .intensity = 1,
 			   .direction = {0.5, -1, 0.2},
 			   .irradiance = 0.2,
-			   .aim = {0, -1, 0},
+			   .spot_target = {0, -1, 0},
 			   .sky = 0.02};
 	check_floor("point, parallel light and sky", &l, (struct effort){5120, 4096, 0});
 }
 
 /* Light by way of a mirror is a caustic, which only paths from the light find. */
-static void test_lit_by_a_mirror(void **state)
+static void bdpt_finds_caustics_of_a_mirror(void **state)
 {
 	(void)state;
-	struct lamps l = {.point = {-0.2, 2, -0.2},
+	struct lamps l = {.point_position = {-0.2, 2, -0.2},
 			  .intensity = 2,
 			  .direction = {-1, -0.5, 0.03},
-			  .aim = {0, -1, 0},
-			  .mirror = true};
+			  .spot_target = {0, -1, 0},
+			  .has_mirror = true};
 	check_floor("mirrored point", &l, (struct effort){0, 6144, 77824});
 	l.intensity = 0;
 	l.irradiance = 1;
@@ -232,7 +243,7 @@ static void test_lit_by_a_mirror(void **state)
 }
 
 /* Rough glass and metal in light that no path hits: these caustics are found by the path tracer as well. */
-static void test_rough_in_delta_light(void **state)
+static void integrators_agree_on_rough_caustics_of_delta_lights(void **state)
 {
 	(void)state;
 	struct world *w = world_from_own_scene("ends", "rough-bodies.xml", 16, 16);
@@ -243,7 +254,7 @@ static void test_rough_in_delta_light(void **state)
  * events that the scene sets for it; at this event one path in twenty ends: 200 of 4,000 with standard deviation
  * 13.8. The accepted range of 130 to 270 rejects a correct program once in two million; a rate of one in 30 or one in
  * 14 is found with 95 % probability. */
-static void test_roulette(void **state)
+static void roulette_ends_no_path_before_its_depth(void **state)
 {
 	(void)state;
 	enum { EDGES = 64, PATHS = 4000 };
@@ -290,9 +301,12 @@ static void test_roulette(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_roulette),	  cmocka_unit_test(test_defocus),
-		cmocka_unit_test(test_blurred_rectangle), cmocka_unit_test(test_lit_floor),
-		cmocka_unit_test(test_lit_by_a_mirror),	  cmocka_unit_test(test_rough_in_delta_light),
+		cmocka_unit_test(roulette_ends_no_path_before_its_depth),
+		cmocka_unit_test(integrators_agree_out_of_focus),
+		cmocka_unit_test(defocused_rectangle_has_its_closed_form),
+		cmocka_unit_test(floor_has_the_irradiance_of_delta_lights),
+		cmocka_unit_test(bdpt_finds_caustics_of_a_mirror),
+		cmocka_unit_test(integrators_agree_on_rough_caustics_of_delta_lights),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,16 +20,16 @@
 #define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
 
-enum { INTEGRATORS_MOST = 8 };
+enum { INTEGRATORS_MAX = 8 };
 
 /* Runs every integrator briefly and stores the mean of each image in `mean`. */
-static void run_all(const char *name, struct world *w, double mean[INTEGRATORS_MOST])
+static void render_with_all_integrators(const char *name, struct world *w, double mean[INTEGRATORS_MAX])
 {
 	static struct agreement_image image;
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct integrator_properties *r = render_integrator_at(i);
 		struct agreement_options side = {r->name, 32, 16, 0, 0};
-		assert_true(i < INTEGRATORS_MOST);
+		assert_true(i < INTEGRATORS_MAX);
 		agreement_render(w, name, r->name, &side, &image);
 		mean[i] = 0;
 		for (uint32_t g = 0; g < image.groups; g++)
@@ -47,12 +47,13 @@ static void run_all(const char *name, struct world *w, double mean[INTEGRATORS_M
 	"</shape>"
 /* clang-format on */
 
-static void test_hard(void **state)
+static void extreme_scenes_render_finite_values(void **state)
 {
 	(void)state;
-	double mean[INTEGRATORS_MOST];
+	double mean[INTEGRATORS_MAX];
 	/* A sun: half a degree, radiance 1e9, 100 units away. */
-	run_all("sun",
+	render_with_all_integrators(
+		"sun",
 		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
@@ -61,7 +62,8 @@ static void test_hard(void **state)
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* A light 1e-6 times as large as the scene. */
-	run_all("tiny light",
+	render_with_all_integrators(
+		"tiny light",
 		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
@@ -70,7 +72,8 @@ static void test_hard(void **state)
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* Grazing view: the camera lies almost in the floor's plane. */
-	run_all("grazing",
+	render_with_all_integrators(
+		"grazing",
 		world_from_text(
 			16, 16,
 			DEPTH("6") SENSOR("0,1e-6,1.9", "0,0,-3") FLOOR SKY
@@ -79,7 +82,8 @@ static void test_hard(void **state)
 		mean);
 	assert_true(mean[0] > 0);
 	/* Two lights so different that the fainter one is never chosen. */
-	run_all("faint light",
+	render_with_all_integrators(
+		"faint light",
 		world_from_text(
 			16, 16,
 			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
@@ -89,7 +93,8 @@ static void test_hard(void **state)
 			"<emitter type='area'><float name='radiance' value='1e30'/></emitter></shape>"),
 		mean);
 	/* A sliver of a mirror and a sliver of a lamp. */
-	run_all("slivers",
+	render_with_all_integrators(
+		"slivers",
 		world_from_text(
 			16, 16,
 			DEPTH("6") SENSOR("0,2,4", "0,0,0") FLOOR
@@ -102,7 +107,7 @@ static void test_hard(void **state)
 }
 
 /* No light at all: leases return black, the bootstrap finds no seeds, and chains without a seed stay black. */
-static void expect_black(const char *text)
+static void assert_scene_is_black(const char *text)
 {
 	struct world *w = world_from_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
 	for (size_t i = 0; render_integrator_at(i); i++) {
@@ -138,18 +143,19 @@ static void expect_black(const char *text)
 	world_free(w);
 }
 
-static void test_black(void **state)
+static void scenes_without_light_are_black(void **state)
 {
 	(void)state;
-	expect_black(FLOOR);
-	expect_black("");
-	expect_black(FLOOR
-		     "<shape type='sphere'><emitter type='area'><float name='radiance' value='0'/></emitter></shape>");
-	expect_black("<emitter type='constant'><float name='radiance' value='0'/></emitter>");
+	assert_scene_is_black(FLOOR);
+	assert_scene_is_black("");
+	assert_scene_is_black(
+		FLOOR "<shape type='sphere'><emitter type='area'><float name='radiance' value='0'/></emitter></shape>");
+	assert_scene_is_black("<emitter type='constant'><float name='radiance' value='0'/></emitter>");
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_hard), cmocka_unit_test(test_black)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(extreme_scenes_render_finite_values),
+					   cmocka_unit_test(scenes_without_light_are_black)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

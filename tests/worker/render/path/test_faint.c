@@ -15,39 +15,39 @@
 
 #include <cmocka.h>
 
-enum { SAMPLES = 150, PLACES = 512 };
+enum { SAMPLES = 150, ROULETTE_NUMBERS = 512 };
 
 /* A sample's random numbers, with a fixed value for the number that decides about faint connections. */
-struct placed {
+struct fixed_roulette_sampler {
 	struct sampler base;
 	struct sampler_random random;
-	double place, value[SAMPLER_BLOCK_SIZE];
+	double roulette_number, value[SAMPLER_BLOCK_SIZE];
 };
 
-static const double *placed_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+static const double *fixed_roulette_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
-	struct placed *p = (struct placed *)(void *)base;
+	struct fixed_roulette_sampler *p = (struct fixed_roulette_sampler *)(void *)base;
 	const double *u = p->random.base.block(&p->random.base, side, vertex);
 	if (side != SIDE_CAMERA || vertex != 0)
 		return u;
 	memcpy(p->value, u, sizeof p->value);
-	p->value[DIM_FAINT] = p->place;
+	p->value[DIM_FAINT_CONNECTION] = p->roulette_number;
 	return p->value;
 }
 
-static struct placed placed_at(uint64_t index, double place)
+static struct fixed_roulette_sampler make_fixed_roulette_sampler(uint64_t index, double place)
 {
-	struct placed p = {.base = {placed_block}, .place = place};
+	struct fixed_roulette_sampler p = {.base = {fixed_roulette_block}, .roulette_number = place};
 	sampler_random_init(&p.random, 7, RNG_TEST, index, 0);
 	return p;
 }
 
 /* Returns the contribution (X + Y + Z) of a pair of sub-paths to its own film point with every connection made, and
  * counts the shadow rays traced for it. */
-static double by_every_connection(struct path_context *c, uint64_t index)
+static double trace_all_connections(struct path_context *c, uint64_t index)
 {
 	double film[2], xyz[3];
-	struct placed p = placed_at(index, 0);
+	struct fixed_roulette_sampler p = make_fixed_roulette_sampler(index, 0);
 	unsigned camera = path_walk_camera(c, &p.base, c->max_depth + 1, film);
 	unsigned light = path_walk_light(c, &p.base, c->max_depth);
 	spectrum sum = spectrum_constant(0);
@@ -60,11 +60,11 @@ static double by_every_connection(struct path_context *c, uint64_t index)
 	return xyz[0] + xyz[1] + xyz[2];
 }
 
-/* Like by_every_connection(), but as bdpt computes it, with the roulette's number set to `place`. */
-static double by_chance(struct path_context *c, uint64_t index, double place)
+/* Like trace_all_connections(), but as bdpt computes it, with the roulette's number set to `roulette_number`. */
+static double trace_with_roulette(struct path_context *c, uint64_t index, double place)
 {
 	static struct path_sample out;
-	struct placed p = placed_at(index, place);
+	struct fixed_roulette_sampler p = make_fixed_roulette_sampler(index, place);
 	path_trace_bidirectional(c, &p.base, &out);
 	const struct splat *s = out.splats;
 	return out.splat_count > 0 ? s->xyz[0] + s->xyz[1] + s->xyz[2] : 0;
@@ -95,7 +95,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 				     .counters = counters};
 }
 
-static void test_mean(void **state)
+static void mean_over_roulette_is_that_of_all_connections(void **state)
 {
 	(void)state;
 	static uint64_t counters[BATCH_COUNTERS];
@@ -106,20 +106,21 @@ static void test_mean(void **state)
 	uint64_t rays_all = 0, rays = 0, differ = 0;
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		counters[COUNT_RAYS_SHADOW] = 0;
-		double expected = by_every_connection(&c, i), sum = 0;
-		rays_all += counters[COUNT_RAYS_SHADOW] * PLACES;
+		double expected = trace_all_connections(&c, i), sum = 0;
+		rays_all += counters[COUNT_RAYS_SHADOW] * ROULETTE_NUMBERS;
 		counters[COUNT_RAYS_SHADOW] = 0;
-		for (int k = 0; k < PLACES; k++)
-			sum += by_chance(&c, i, (k + 0.5) / PLACES);
+		for (int k = 0; k < ROULETTE_NUMBERS; k++)
+			sum += trace_with_roulette(&c, i, (k + 0.5) / ROULETTE_NUMBERS);
 		rays += counters[COUNT_RAYS_SHADOW];
-		/* Each connection's probability is off by at most one of PLACES values; one connection counts at most
-		 * 12 tenths of the sum, and there are some tens of connections. */
-		if (fabs(sum / PLACES - expected) > 0.02 * expected) {
-			print_message("sample %d: %g, by every connection %g\n", (int)i, sum / PLACES, expected);
+		/* Each connection's probability is off by at most one of ROULETTE_NUMBERS values; one connection counts
+		 * at most 12 tenths of the sum, and there are some tens of connections. */
+		if (fabs(sum / ROULETTE_NUMBERS - expected) > 0.02 * expected) {
+			print_message("sample %d: %g, by every connection %g\n", (int)i, sum / ROULETTE_NUMBERS,
+				      expected);
 			differ++;
 		}
 		all += expected;
-		mean += sum / PLACES;
+		mean += sum / ROULETTE_NUMBERS;
 	}
 	print_message("%d samples: mean off by %.1e, %.2f of the shadow rays\n", SAMPLES, mean / all - 1,
 		      (double)rays / (double)rays_all);
@@ -131,15 +132,15 @@ static void test_mean(void **state)
 
 /* Chains and the bootstrap need samples that are functions of their random numbers: without roulette, all connections
  * are made. */
-static void test_without_roulette(void **state)
+static void chains_make_all_connections(void **state)
 {
 	(void)state;
 	static uint64_t counters[BATCH_COUNTERS];
 	struct world *w = make_room();
 	struct path_context c = context_of(w, counters);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
-		double expected = by_every_connection(&c, i);
-		assert_true(fabs(by_chance(&c, i, 0.5) - expected) <= 1e-12 * expected);
+		double expected = trace_all_connections(&c, i);
+		assert_true(fabs(trace_with_roulette(&c, i, 0.5) - expected) <= 1e-12 * expected);
 	}
 	world_free(w);
 }
@@ -147,8 +148,8 @@ static void test_without_roulette(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_mean),
-		cmocka_unit_test(test_without_roulette),
+		cmocka_unit_test(mean_over_roulette_is_that_of_all_connections),
+		cmocka_unit_test(chains_make_all_connections),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

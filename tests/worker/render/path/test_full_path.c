@@ -36,14 +36,14 @@ enum { EDGES = 8 };
 static double intensity_of(struct path_context *c, spectrum l, double share[3])
 {
 	struct path_sample s = {.splat_count = 0, .intensity = 0};
-	path_add_splat(c, &s, 0, 0, l);
+	path_sample_add_splat(c, &s, 0, 0, l);
 	for (int k = 0; k < 3 && s.intensity > 0; k++)
 		share[k] = s.splats[0].xyz[k] / s.intensity;
 	return s.intensity;
 }
 
 /* The balance heuristic over all techniques turns the estimate f / p_s into f / sum p. */
-static double f_over_p(struct path_context *c, struct full_path *x)
+static double balance_heuristic_estimate(struct path_context *c, struct full_path *x)
 {
 	double log_pdf[FULL_PATH_VERTICES_MAX], log_f = full_path_log_f(c, x), sum = 0;
 	full_path_log_technique_pdfs(c, x, log_pdf);
@@ -53,37 +53,37 @@ static double f_over_p(struct path_context *c, struct full_path *x)
 }
 
 struct tally {
-	unsigned long compared, disagree, black, refracted;
-	double worst;
+	unsigned long compared, disagreeing, black, refracted;
+	double max_error;
 };
 
-static void compare(struct path_context *c, unsigned s, unsigned edges, struct tally *t)
+static void compare_full_path(struct path_context *c, unsigned s, unsigned edges, struct tally *t)
 {
 	static struct full_path x;
 	double film[2], share[3], colour[3];
-	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_EDGES_MAX, film), share);
-	bool there = full_path_from_subpaths(c, s, c->passed_count, edges + c->passed_count, &x);
-	if (!there || want == 0) {
+	double expected = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_EDGES_MAX, film), share);
+	bool is_full_path = full_path_from_subpaths(c, s, c->passed_count, edges + c->passed_count, &x);
+	if (!is_full_path || expected == 0) {
 		/* rounding may move a film point drawn on the border to the other side of it */
 		t->black++;
-		t->disagree += there != (want > 0);
+		t->disagreeing += is_full_path != (expected > 0);
 		return;
 	}
 	char text[200];
 	if (!path_check(c, &x, text, sizeof text))
 		fail_msg("technique %u of %u edges: %s", s, edges, text);
-	double got = f_over_p(c, &x), off = fabs(got - want) / want;
+	double got = balance_heuristic_estimate(c, &x), relative_error = fabs(got - expected) / expected;
 	full_path_colour(c, &x, colour);
 	for (int k = 0; k < 3; k++)
-		off = fmax(off, fabs(colour[k] - share[k]));
+		relative_error = fmax(relative_error, fabs(colour[k] - share[k]));
 	t->compared++;
 	t->refracted += s == 1 && path_vertex_is_refracting(&x.v[1]);
-	if (off > t->worst)
-		t->worst = off;
+	if (relative_error > t->max_error)
+		t->max_error = relative_error;
 }
 
 /* Returns the number of paths with a refracted connection. */
-static unsigned long check(const char *name, struct world *w, unsigned long samples)
+static unsigned long check_paths(const char *name, struct world *w, unsigned long samples)
 {
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
@@ -107,37 +107,39 @@ static unsigned long check(const char *name, struct world *w, unsigned long samp
 				unsigned tail = edges + 1 - k;
 				if (tail > camera || (k > 1 && k > light) || (k == 1 && (edges < 2 || tail < 2)))
 					continue;
-				compare(&c, k, edges, &t);
+				compare_full_path(&c, k, edges, &t);
 			}
 	}
-	printf("%s: %lu paths, largest difference %.3g, %lu black, %lu in doubt\n", name, t.compared, t.worst, t.black,
-	       t.disagree);
+	printf("%s: %lu paths, largest difference %.3g, %lu black, %lu in doubt\n", name, t.compared, t.max_error,
+	       t.black, t.disagreeing);
 	assert_true(t.compared > samples);
-	assert_true(t.worst < 1e-7);
-	assert_true(t.disagree * 10000 <= t.compared);
+	assert_true(t.max_error < 1e-7);
+	assert_true(t.disagreeing * 10000 <= t.compared);
 	world_free(w);
 	return t.refracted;
 }
 
-static void test_surfaces(void **state)
+static void full_paths_agree_on_surfaces(void **state)
 {
 	(void)state;
-	check("rough glass",
-	      world_from_text(32, 32,
-			      ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
-	      1500);
-	check("glass with holes",
-	      world_from_text(32, 32,
-			      ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>"
-					     "<bsdf type='dielectric'/></bsdf>")),
-	      3000);
-	check("gold",
-	      world_from_text(32, 32,
-			      ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
-	      1500);
-	check("mirror", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
+	check_paths("rough glass",
+		    world_from_text(
+			    32, 32,
+			    ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
+		    1500);
+	check_paths("glass with holes",
+		    world_from_text(32, 32,
+				    ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>"
+						   "<bsdf type='dielectric'/></bsdf>")),
+		    3000);
+	check_paths(
+		"gold",
+		world_from_text(32, 32,
+				ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
+		1500);
+	check_paths("mirror", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
 	/* clang-format off */
-	check("turned normals", world_from_text(32, 32,
+	check_paths("turned normals", world_from_text(32, 32,
 		ROOM LAMP
 		BALL(
 			"<bsdf type='normalmap'>"
@@ -148,17 +150,17 @@ static void test_surfaces(void **state)
 				"<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
 			"</bsdf>")), 1500);
 	/* clang-format on */
-	check("phong", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
+	check_paths("phong", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 	/* The probability of going straight on through a hair differs between paths from the lamp and paths from the
 	 * camera. */
-	check("hair", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
+	check_paths("hair", world_from_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
 	/* Curves do not scatter at their backs. */
-	check("hairs", world_from_own_scene("integrators", "hair.xml", 32, 32), 3000);
+	check_paths("hairs", world_from_own_scene("integrators", "hair.xml", 32, 32), 3000);
 }
 
 /* Coloured glass around a stone that states no medium and around a bubble that states its exterior medium; water up
  * to the lamp. */
-static void test_media(void **state)
+static void full_paths_agree_in_media(void **state)
 {
 	(void)state;
 /* clang-format off */
@@ -188,9 +190,9 @@ static void test_media(void **state)
 			MEDIUM("exterior", "0.3,1,2")));
 	/* clang-format on */
 	assert_true(w->effects.absorption && w->media_count == 2);
-	check("coloured glass", w, 4000);
+	check_paths("coloured glass", w, 4000);
 	/* clang-format off */
-	check("from haze", world_from_text(32, 32,
+	check_paths("from haze", world_from_text(32, 32,
 		"<sensor type='perspective'>"
 			"<float name='fov' value='40'/>"
 			"<float name='near_clip' value='0.5'/>"
@@ -200,7 +202,7 @@ static void test_media(void **state)
 		"<shape type='cube'>" AT("<scale value='2'/>") "</shape>"
 		LAMP
 		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")), 1500);
-	check("a layer of water", world_from_text(32, 32,
+	check_paths("a layer of water", world_from_text(32, 32,
 		ROOM LAMP
 		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
 		"<shape type='cube'>"
@@ -213,11 +215,11 @@ static void test_media(void **state)
 
 /* Next-event estimation samples a sphere within the cone in which the vertex sees it; a light sub-path starts
  * anywhere on the sphere's area. */
-static void test_round_lamp(void **state)
+static void full_paths_agree_for_a_spherical_lamp(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	check("round lamp, gold", world_from_text(32, 32,
+	check_paths("round lamp, gold", world_from_text(32, 32,
 		ROOM
 		"<shape type='sphere'>"
 			"<point name='center' value='0.8,1,-0.5'/>"
@@ -228,11 +230,11 @@ static void test_round_lamp(void **state)
 	/* clang-format on */
 }
 
-static void test_environment(void **state)
+static void full_paths_agree_for_an_environment(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	check("environment", world_from_text(32, 32,
+	check_paths("environment", world_from_text(32, 32,
 		SENSOR("0,1,5", "0,0,0")
 		"<shape type='rectangle'>"
 			AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
@@ -243,7 +245,7 @@ static void test_environment(void **state)
 }
 
 /* A lens, and lights that no path can hit, beside an environment. */
-static void test_ends(void **state)
+static void full_paths_agree_for_lenses_and_delta_lights(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -269,17 +271,17 @@ static void test_ends(void **state)
 			AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>")
 		"</shape>"
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-2'/>") "</shape>";
-	check("lens and lamps, rough", world_from_text(32, 32, "%s%s%s%s", lens, lights, floor,
+	check_paths("lens and lamps, rough", world_from_text(32, 32, "%s%s%s%s", lens, lights, floor,
 		BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
 		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
 	/* clang-format on */
-	check("lens and lamps, glass",
-	      world_from_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
+	check_paths("lens and lamps, glass",
+		    world_from_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
 /* Connections through panes, through holes, and through a block that absorbs light between faces that let it straight
  * through. */
-static void test_passed(void **state)
+static void full_paths_agree_through_see_through_surfaces(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -307,15 +309,15 @@ static void test_passed(void **state)
 		"</shape>");
 	/* clang-format on */
 	assert_true(w->effects.transparent_shadows && w->effects.absorption);
-	check("panes", w, 3000);
+	check_paths("panes", w, 3000);
 }
 
 /* Small lamps in, under and behind glass of several kinds, some of which absorbs, disperses or has bent normals. */
-static void test_refracted(void **state)
+static void full_paths_agree_with_refracted_connections(void **state)
 {
 	(void)state;
 	/* clang-format off */
-	assert_true(check("lamps behind glass", world_from_text(32, 32, "%s",
+	assert_true(check_paths("lamps behind glass", world_from_text(32, 32, "%s",
 		ROOM
 		BALL("<bsdf type='dielectric'/>")
 		"<shape type='sphere'>"
@@ -329,7 +331,7 @@ static void test_refracted(void **state)
 			"<emitter type='area'><float name='radiance' value='90'/></emitter>"
 		"</shape>"
 		"<emitter type='point'><point name='position' x='-.5' y='-1' z='-1.9'/></emitter>"), 3000) > 300);
-	assert_true(check("a prism and the sun", world_from_text(32, 32, "%s",
+	assert_true(check_paths("a prism and the sun", world_from_text(32, 32, "%s",
 		SENSOR("0,-1,2.8", "0,-1.4,0")
 		"<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1.5'/>")
 			"<bsdf type='phong'/></shape>"
@@ -343,7 +345,7 @@ static void test_refracted(void **state)
 
 /* Surfaces that a connection passes through count as edges: no path is shorter or longer than requested, and some
  * paths are long enough only because of these surfaces. */
-static void test_passed_lengths(void **state)
+static void passed_surfaces_count_as_edges(void **state)
 {
 	(void)state;
 	enum { LEAST = 4, MOST = 6 };
@@ -390,12 +392,12 @@ static void test_passed_lengths(void **state)
 /* A lamp straight behind more panes than a connection may pass through: only a sub-path that goes through the panes
  * one by one finds it, so the weight of this technique is 1. With one pane less, the lamp can be connected to the
  * lens as well, a technique with the higher density. */
-static void test_passed_most(void **state)
+static void technique_beyond_the_pass_limit_has_no_weight(void **state)
 {
 	(void)state;
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	for (unsigned panes = PATH_PASSED_MAX; panes <= PATH_PASSED_MAX + 4; panes++) {
+	for (unsigned panes = PATH_PASSED_VERTICES_MAX; panes <= PATH_PASSED_VERTICES_MAX + 4; panes++) {
 		char xml[16384];
 		size_t used = 0;
 		unsigned hits = 0;
@@ -415,7 +417,7 @@ static void test_passed_most(void **state)
 					  .max_depth = 40,
 					  .counters = counters,
 					  .joins_emitters_to_lens = true,
-					  .light_every = 1};
+					  .light_subpath_interval = 1};
 		for (uint64_t i = 0; i < 8000; i++) {
 			struct sampler_random s;
 			double film[2];
@@ -427,7 +429,7 @@ static void test_passed_most(void **state)
 			spectrum l = path_connect(&c, 0, camera, PATH_EDGES_MAX, film),
 				 whole = spectrum_mul(z->beta, path_emitted_radiance(&c, z, z->to_prev, &c.wl));
 			double weight = l.v[0] / whole.v[0];
-			assert_true(panes > PATH_PASSED_MAX ? fabs(weight - 1) < 1e-12 : weight < 0.1);
+			assert_true(panes > PATH_PASSED_VERTICES_MAX ? fabs(weight - 1) < 1e-12 : weight < 0.1);
 			hits++;
 		}
 		assert_true(hits > 10);
@@ -437,7 +439,7 @@ static void test_passed_most(void **state)
 
 /* A wall in front of the near plane, another behind the far plane, and the sky: everything that a camera path finds
  * between the two planes is visible. */
-static void test_clipped(void **state)
+static void camera_paths_see_what_lies_between_clip_planes(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -451,7 +453,7 @@ static void test_clipped(void **state)
 	static const char walls[] =
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='4'/>") "</shape>"
 		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-3'/>") "</shape>";
-	check("clipped", world_from_text(32, 32, "%s%s%s", sensor, walls,
+	check_paths("clipped", world_from_text(32, 32, "%s%s%s", sensor, walls,
 		BALL("<bsdf type='diffuse'/>")
 		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
 	/* clang-format on */
@@ -459,7 +461,7 @@ static void test_clipped(void **state)
 
 /* A surface scatters only if both directions lie on the same side of the shading normal and both on the same side of
  * the geometric normal: all eight cases, with a shading normal tilted by 60 degrees. */
-static void test_sides(void **state)
+static void scattering_needs_both_directions_on_one_side(void **state)
 {
 	(void)state;
 	static struct full_path x;
@@ -484,12 +486,17 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),       cmocka_unit_test(test_media),
-		cmocka_unit_test(test_round_lamp),     cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),	       cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_passed),	       cmocka_unit_test(test_refracted),
-		cmocka_unit_test(test_passed_lengths), cmocka_unit_test(test_passed_most),
-		cmocka_unit_test(test_sides),
+		cmocka_unit_test(full_paths_agree_on_surfaces),
+		cmocka_unit_test(full_paths_agree_in_media),
+		cmocka_unit_test(full_paths_agree_for_a_spherical_lamp),
+		cmocka_unit_test(full_paths_agree_for_an_environment),
+		cmocka_unit_test(full_paths_agree_for_lenses_and_delta_lights),
+		cmocka_unit_test(camera_paths_see_what_lies_between_clip_planes),
+		cmocka_unit_test(full_paths_agree_through_see_through_surfaces),
+		cmocka_unit_test(full_paths_agree_with_refracted_connections),
+		cmocka_unit_test(passed_surfaces_count_as_edges),
+		cmocka_unit_test(technique_beyond_the_pass_limit_has_no_weight),
+		cmocka_unit_test(scattering_needs_both_directions_on_one_side),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-static void compare(const char *name, uint64_t spp, bool demanding)
+static void compare_integrators(const char *name, uint64_t spp, bool demanding)
 {
 	static struct agreement_image reference, other;
 	struct world *w = world_from_own_scene("integrators", "hair.xml", 32, 32);
@@ -28,23 +28,24 @@ static void compare(const char *name, uint64_t spp, bool demanding)
 	world_free(w);
 }
 
-static void test_from_both_ends(void **state)
+static void bdpt_agrees_with_path_in_hair(void **state)
 {
 	(void)state;
-	compare("bdpt", 1024, true);
+	compare_integrators("bdpt", 1024, true);
 }
 
-static void test_chains(void **state)
+static void chains_agree_with_path_in_hair(void **state)
 {
 	(void)state;
 	if (!test_is_full())
 		skip();
-	compare("pssmlt", 5000, false);
-	compare("hslt", 5000, false);
+	compare_integrators("pssmlt", 5000, false);
+	compare_integrators("hslt", 5000, false);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_from_both_ends), cmocka_unit_test(test_chains)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(bdpt_agrees_with_path_in_hair),
+					   cmocka_unit_test(chains_agree_with_path_in_hair)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

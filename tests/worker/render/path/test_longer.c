@@ -6,7 +6,7 @@
  */
 #include "tests/support/worlds.h"
 #include "worker/render/path/integrate_path.h"
-#include "worker/render/path/longer.h"
+#include "worker/render/path/overlong.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -39,7 +39,7 @@ static struct world *make_room(const char *bsdf)
 
 /* Returns the estimated mean of all paths of more than `after` and up to `longest` edges; *error: its standard error.
  */
-static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, double *error)
+static double mean_of_longer_paths(struct world *w, uint32_t after, uint32_t longest, double *error)
 {
 	static struct path_context c;
 	static struct path_sample sample;
@@ -47,7 +47,7 @@ static double mean_of_longer(struct world *w, uint32_t after, uint32_t longest, 
 	double sum = 0, square = 0;
 	c = context_of(w, counters, after);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
-		double x = longer_paths_sample_energy(&c, 3, i, longest, &sample);
+		double x = overlong_paths_sample_energy(&c, 3, i, longest, &sample);
 		assert_true(c.max_depth == after && c.max_survival == 0);
 		sum += x / SAMPLES;
 		square += x * x / SAMPLES;
@@ -75,9 +75,10 @@ static double mean_of_unit_light(void)
 	return sum;
 }
 
-static void expect(struct world *w, uint32_t after, uint32_t longest, double wanted, double most_error)
+static void assert_mean_of_longer_paths(struct world *w, uint32_t after, uint32_t longest, double wanted,
+					double most_error)
 {
-	double error, unit = mean_of_unit_light(), mean = mean_of_longer(w, after, longest, &error) / unit;
+	double error, unit = mean_of_unit_light(), mean = mean_of_longer_paths(w, after, longest, &error) / unit;
 	error /= unit;
 	printf("%u to %u edges: %.5g +- %.2g, wanted %.5g\n", after + 1, longest, mean, error, wanted);
 	if (!(fabs(mean - wanted) <= 4 * error) || error > most_error * wanted)
@@ -87,29 +88,30 @@ static void expect(struct world *w, uint32_t after, uint32_t longest, double wan
 /* r^after + ... + r^(longest - 1) */
 static double geometric_series(double r, uint32_t after, uint32_t longest)
 {
-	return (pow(r, after) - (longest == LONGER_EDGES_MAX ? 0 : pow(r, longest))) / (1 - r);
+	return (pow(r, after) - (longest == OVERLONG_EDGES_MAX ? 0 : pow(r, longest))) / (1 - r);
 }
 
-static void test_a_shining_sphere(void **state)
+static void longer_paths_in_a_diffuse_sphere_sum_to_a_series(void **state)
 {
 	(void)state;
 	struct world *w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
-	expect(w, 32, 64, geometric_series(0.99, 32, 64), 0.02);
-	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03); /* across the border of two segments */
-	expect(w, 128, LONGER_EDGES_MAX, geometric_series(0.99, 128, LONGER_EDGES_MAX), 0.05);
+	assert_mean_of_longer_paths(w, 32, 64, geometric_series(0.99, 32, 64), 0.02);
+	assert_mean_of_longer_paths(w, 126, 131, geometric_series(0.99, 126, 131),
+				    0.03); /* across the border of two segments */
+	assert_mean_of_longer_paths(w, 128, OVERLONG_EDGES_MAX, geometric_series(0.99, 128, OVERLONG_EDGES_MAX), 0.05);
 	world_free(w);
 	w = make_room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
-	expect(w, 4, LONGER_EDGES_MAX, geometric_series(0.5, 4, LONGER_EDGES_MAX), 0.05);
+	assert_mean_of_longer_paths(w, 4, OVERLONG_EDGES_MAX, geometric_series(0.5, 4, OVERLONG_EDGES_MAX), 0.05);
 	world_free(w);
 }
 
 /* Like the shining sphere, but the wall scatters in one direction only. */
-static void test_a_mirror(void **state)
+static void longer_paths_in_a_mirror_sphere_sum_to_a_series(void **state)
 {
 	(void)state;
 	struct world *w = make_room("<bsdf type='conductor'><string name='material' value='none'/>"
 				    "<spectrum name='specular_reflectance' value='0.99'/></bsdf>");
-	expect(w, 126, 131, geometric_series(0.99, 126, 131), 0.03);
+	assert_mean_of_longer_paths(w, 126, 131, geometric_series(0.99, 126, 131), 0.03);
 	world_free(w);
 }
 
@@ -131,36 +133,36 @@ static struct world *make_corridor(const char *bsdf)
 }
 
 /* Mirrors: a segment of the continuation starts where the previous one ended, with its throughput. */
-static void test_a_corridor(void **state)
+static void continuation_keeps_the_throughput_of_mirrors(void **state)
 {
 	(void)state;
 	struct world *w =
 		make_corridor("<bsdf type='twosided'><bsdf type='conductor'><string name='material' value='none'/>"
 			      "<spectrum name='specular_reflectance' value='0.995'/></bsdf></bsdf>");
-	expect(w, 128, 300, 0, 0);
-	expect(w, 128, 301, pow(0.995, 300), 0.05);
+	assert_mean_of_longer_paths(w, 128, 300, 0, 0);
+	assert_mean_of_longer_paths(w, 128, 301, pow(0.995, 300), 0.05);
 	world_free(w);
 }
 
 /* Slabs of dispersive glass that reflect all of the light. One wavelength travels on, and its factor of four is
  * applied only once, whatever the number of segments. */
-static void test_a_slab(void **state)
+static void dispersion_factor_is_applied_once_over_all_segments(void **state)
 {
 	(void)state;
 	struct world *w = make_corridor("<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='int_cauchy_b' value='0.01'/></bsdf>");
 	assert_true(w->effects.dispersion);
-	expect(w, 128, 301, 1, 0.05);
+	assert_mean_of_longer_paths(w, 128, 301, 1, 0.05);
 	world_free(w);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_a_shining_sphere),
-		cmocka_unit_test(test_a_mirror),
-		cmocka_unit_test(test_a_corridor),
-		cmocka_unit_test(test_a_slab),
+		cmocka_unit_test(longer_paths_in_a_diffuse_sphere_sum_to_a_series),
+		cmocka_unit_test(longer_paths_in_a_mirror_sphere_sum_to_a_series),
+		cmocka_unit_test(continuation_keeps_the_throughput_of_mirrors),
+		cmocka_unit_test(dispersion_factor_is_applied_once_over_all_segments),
 	};
 	return cmocka_run_group_tests_name("worker/render/path/longer", tests, NULL, NULL);
 }

@@ -29,7 +29,7 @@
 
 /* Layers at z in (-1, 1), (-3, -2) and (-7.25, -3.25). A third layer that began where the second ends would need a
  * stated exterior in one and a stated interior in the other; so a gap of 0.25 separates them. */
-static struct world *layers(void)
+static struct world *make_layers(void)
 {
 	return world_from_text(
 		8, 8,
@@ -39,7 +39,7 @@ static struct world *layers(void)
 		SENSOR("0,0,5", "0,0,0"));
 }
 
-static struct path_vertex start_at(const struct world *w, double z)
+static struct path_vertex vertex_at_depth(const struct world *w, double z)
 {
 	struct path_vertex v = {.kind = VERTEX_MEDIUM};
 	v.x.p = vec3_scale(w->scale, vec3_sub((vec3){0.1, 0.2, z}, w->center));
@@ -52,35 +52,36 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 	return (struct path_context){.w = w, .wl = wavelengths_sample(0.37), .counters = counters};
 }
 
-static const vec3 down = {0, 0, -1};
+static const vec3 down_direction = {0, 0, -1};
 
 /* Returns the transmittance of a homogeneous medium over `distance`. */
-static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
+static spectrum homogeneous_transmittance(const struct medium *m, double distance, const struct wavelengths *w)
 {
-	spectrum t = medium_extinction(m, (vec3){0, 0, 0}, down, w);
+	spectrum t = medium_extinction(m, (vec3){0, 0, 0}, down_direction, w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		t.v[i] = exp(-t.v[i] * distance);
 	return t;
 }
 
-static void test_events(void **state)
+static void scattering_events_follow_their_density(void **state)
 {
 	(void)state;
 	enum { NUMBERS = 1 << 16, PLACES = 40 };
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	struct world *w = layers();
+	struct world *w = make_layers();
 	struct path_context c = context_of(w, counters);
-	struct path_vertex at = start_at(w, 3), to;
+	struct path_vertex at = vertex_at_depth(w, 3), to;
 	double length = 11 * w->scale; /* length of the test ray */
 	unsigned events[PLACES] = {0}, free_ones = 0;
-	spectrum left, carried = spectrum_constant(0);
+	spectrum transmittance, carried = spectrum_constant(0);
 	double pdf_free = 0;
 	for (int i = 0; i < NUMBERS; i++) {
-		assert_true(path_extend_in_media(&c, &at, down, 0, INFINITY, (i + 0.5) / NUMBERS, NULL, &to, &left));
+		assert_true(path_extend_in_media(&c, &at, down_direction, 0, INFINITY, (i + 0.5) / NUMBERS, NULL, &to,
+						 &transmittance));
 		if (to.kind == VERTEX_INFINITE) {
 			free_ones++;
 			pdf_free = path_edge_pdf(&c, &to.edge, to.edge.medium, &to);
-			carried = left;
+			carried = transmittance;
 			continue;
 		}
 		assert_int_equal(to.kind, VERTEX_MEDIUM);
@@ -88,8 +89,9 @@ static void test_events(void **state)
 	}
 	assert_true(fabs(free_ones / (double)NUMBERS - pdf_free) < 8.0 / NUMBERS);
 	const struct medium *first = &w->media[0], *second = &w->media[1], *third = &w->media[2];
-	spectrum a = let_through(first, 2 * w->scale, &c.wl), b = let_through(second, w->scale, &c.wl),
-		 d = let_through(third, 4 * w->scale, &c.wl);
+	spectrum a = homogeneous_transmittance(first, 2 * w->scale, &c.wl),
+		 b = homogeneous_transmittance(second, w->scale, &c.wl),
+		 d = homogeneous_transmittance(third, 4 * w->scale, &c.wl);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		assert_true(fabs(carried.v[i] / (a.v[i] * b.v[i] * d.v[i]) - 1) < 1e-9);
 	assert_true(fabs(pdf_free / spectrum_mean(spectrum_mul(a, d)) - 1) < 1e-9);
@@ -99,9 +101,9 @@ static void test_events(void **state)
 		for (int i = 0; i < STEPS; i++) {
 			struct path_edge edge;
 			double z = 3 - 11 * (k + (i + 0.5) / STEPS) / PLACES;
-			struct path_vertex there = start_at(w, z);
-			assert_true(path_is_visible_in_media(&c, &at, &there, &edge, &left));
-			if (edge.medium && path_medium(w, edge.medium)->scatters)
+			struct path_vertex there = vertex_at_depth(w, z);
+			assert_true(path_is_visible_in_media(&c, &at, &there, &edge, &transmittance));
+			if (edge.medium && path_medium(w, edge.medium)->is_scattering)
 				sum += path_edge_pdf(&c, &edge, edge.medium, &there) * length / PLACES / STEPS;
 		}
 		/* a face may fall between two steps; the four wavelengths differ in whether an event occurs at either
@@ -113,9 +115,9 @@ static void test_events(void **state)
 
 /* A grid of four values stacked along z, and four layers that almost touch each other. */
 #define VALUES 4
-static const double steps[VALUES] = {0.4, 2, 0, 0.9};
+static const double grid_densities[VALUES] = {0.4, 2, 0, 0.9};
 
-static struct world *as_layers(bool scatters)
+static struct world *make_layered_world(bool scatters)
 {
 	static char xml[4096], *at;
 	at = xml + sprintf(xml, "<emitter type='constant'/>%s", SENSOR("0,0,5", "0,0,0"));
@@ -125,11 +127,11 @@ static struct world *as_layers(bool scatters)
 			"<shape type='cube'><transform name='to_world'><scale x='9' y='9' z='0.4999999'/><translate "
 			"z='%g'/></transform><bsdf type='null'/><medium type='homogeneous' name='interior'>"
 			"<rgb name='sigma_t' value='%g,%g,%g'/><float name='albedo' value='%g'/></medium></shape>",
-			i - 3.5, 2 * steps[i], steps[i], steps[i] / 2, scatters ? 0.5 : 0);
+			i - 3.5, 2 * grid_densities[i], grid_densities[i], grid_densities[i] / 2, scatters ? 0.5 : 0);
 	return world_from_text(8, 8, "%s", xml);
 }
 
-static struct world *as_grid(bool scatters)
+static struct world *make_grid_world(bool scatters)
 {
 	static char xml[4096];
 	static struct vol grid;
@@ -138,7 +140,7 @@ static struct world *as_grid(bool scatters)
 	grid.channels = 3;
 	for (int i = 0; i < VALUES; i++)
 		for (int k = 0; k < 3; k++)
-			grid.value[3 * i + k] = (float)(steps[i] * (k == 0 ? 2 : k == 1 ? 1 : 0.5));
+			grid.value[3 * i + k] = (float)(grid_densities[i] * (k == 0 ? 2 : k == 1 ? 1 : 0.5));
 	vol_write(&grid);
 	int n = snprintf(
 		xml, sizeof xml,
@@ -155,25 +157,25 @@ static struct world *as_grid(bool scatters)
 
 /* Where a grid steps from one value to the next, the events and the remaining light are those of homogeneous layers.
  * Three channels are compared where colours are RGB. */
-static void test_grid_as_layers(void **state)
+static void stepped_grid_equals_homogeneous_layers(void **state)
 {
 	(void)state;
 	enum { NUMBERS = 400 };
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	struct world *w[2] = {as_layers(true), as_grid(true)};
+	struct world *w[2] = {make_layered_world(true), make_grid_world(true)};
 	const vec3 along = vec3_normalize((vec3){0.3, -0.2, -1});
 	unsigned in_media = 0;
 	assert_true(w[0]->scale == w[1]->scale);
 	for (int n = 0; n < NUMBERS; n++) {
 		struct path_vertex to[2];
-		spectrum left[2];
+		spectrum transmittance[2];
 		double pdf[2];
 		for (int i = 0; i < 2; i++) {
 			struct path_context c = context_of(w[i], counters);
 			c.wl = (struct wavelengths){.is_rgb = true};
-			struct path_vertex at = start_at(w[i], 0.5);
+			struct path_vertex at = vertex_at_depth(w[i], 0.5);
 			assert_true(path_extend_in_media(&c, &at, along, 0, INFINITY, (n + 0.5) / NUMBERS, NULL, &to[i],
-							 &left[i]));
+							 &transmittance[i]));
 			pdf[i] = path_edge_pdf(&c, &to[i].edge, to[i].edge.medium, &to[i]);
 		}
 		assert_int_equal(to[0].kind, to[1].kind);
@@ -183,33 +185,36 @@ static void test_grid_as_layers(void **state)
 					 w[1]->center.z) < 1e-5);
 		assert_true(fabs(pdf[0] / pdf[1] - 1) < 1e-5);
 		for (int k = 0; k < 3; k++)
-			assert_true(fabs(left[0].v[k] / left[1].v[k] - 1) < 1e-5);
+			assert_true(fabs(transmittance[0].v[k] / transmittance[1].v[k] - 1) < 1e-5);
 	}
 	assert_true(in_media > NUMBERS / 2 && in_media < NUMBERS);
 	world_free(w[0]);
 	world_free(w[1]);
 }
 
-/* Like test_grid_as_layers(), but in media that only absorb, between points on both sides of the boundaries and
- * within them. */
-static void test_absorbing_grid(void **state)
+/* Like stepped_grid_equals_homogeneous_layers(), but in media that only absorb, between points on both sides of the
+ * boundaries and within them. */
+static void absorbing_grid_equals_absorbing_layers(void **state)
 {
 	(void)state;
-	struct world *w = as_grid(false);
+	struct world *w = make_grid_world(false);
 	assert_false(w->effects.scattering);
 	const struct wavelengths rgb = {.is_rgb = true};
 	for (double a = -3.9; a < 0; a += 0.37)
 		for (double b = -3.8; b < 0; b += 0.41) {
-			struct path_vertex from = start_at(w, a), to = start_at(w, b);
-			spectrum left = path_transmittance(w, &rgb, 1, &from, &to);
+			struct path_vertex from = vertex_at_depth(w, a), to = vertex_at_depth(w, b);
+			spectrum transmittance = path_transmittance(w, &rgb, 1, &from, &to);
 			double depth = 0;
 			for (int i = 0; i < VALUES; i++)
-				depth += steps[i] * fmax(fmin(fmax(a, b), i - 3) - fmax(fmin(a, b), i - 4), 0);
+				depth += grid_densities[i] * fmax(fmin(fmax(a, b), i - 3) - fmax(fmin(a, b), i - 4), 0);
 			for (int k = 0; k < 3; k++)
-				assert_true(fabs(left.v[k] / exp(-depth * (k == 0 ? 2 : k == 1 ? 1 : 0.5)) - 1) < 1e-7);
+				assert_true(fabs(transmittance.v[k] / exp(-depth * (k == 0   ? 2
+										    : k == 1 ? 1
+											     : 0.5)) -
+						 1) < 1e-7);
 		}
-	struct path_vertex from = start_at(w, 2), sky = {.kind = VERTEX_INFINITE, .x.p = {0, 0, -1}};
-	double depth = steps[0] + steps[1] + steps[2] + steps[3];
+	struct path_vertex from = vertex_at_depth(w, 2), sky = {.kind = VERTEX_INFINITE, .x.p = {0, 0, -1}};
+	double depth = grid_densities[0] + grid_densities[1] + grid_densities[2] + grid_densities[3];
 	assert_true(fabs(path_transmittance(w, &rgb, 1, &from, &sky).v[0] / exp(-2 * depth) - 1) < 1e-7);
 	assert_true(fabs(path_transmittance(w, &rgb, 1, &sky, &from).v[0] / exp(-2 * depth) - 1) < 1e-7);
 	world_free(w);
@@ -217,13 +222,13 @@ static void test_absorbing_grid(void **state)
 
 /* Points in the first and in the third layer see each other with the same optical depths in both directions; only the
  * ends of the edge are exchanged. */
-static void test_both_ends(void **state)
+static void transmittance_is_equal_in_both_directions(void **state)
 {
 	(void)state;
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	struct world *w = layers();
+	struct world *w = make_layers();
 	struct path_context c = context_of(w, counters);
-	struct path_vertex a = start_at(w, 0.5), b = start_at(w, -5);
+	struct path_vertex a = vertex_at_depth(w, 0.5), b = vertex_at_depth(w, -5);
 	struct path_edge there, back;
 	spectrum left, left_back;
 	a.edge.medium = 1;
@@ -234,21 +239,22 @@ static void test_both_ends(void **state)
 	assert_int_equal(there.medium, 3);
 	assert_int_equal(back.previous_medium, 3);
 	assert_int_equal(back.medium, 1);
-	assert_true(there.media_match && back.media_match);
+	assert_true(there.has_matching_media && back.has_matching_media);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		assert_true(fabs(there.free_flight.v[i] / back.free_flight.v[i] - 1) < 1e-12);
+		assert_true(fabs(there.scattering_transmittance.v[i] / back.scattering_transmittance.v[i] - 1) < 1e-12);
 		assert_true(fabs(left.v[i] / left_back.v[i] - 1) < 1e-12);
-		assert_true(left.v[i] < 0.95 * there.free_flight.v[i]); /* the layer between the points absorbs */
+		assert_true(left.v[i] <
+			    0.95 * there.scattering_transmittance.v[i]); /* the layer between the points absorbs */
 	}
 	a.edge.medium = 2; /* differs from the interior that the layer states */
 	assert_true(path_is_visible_in_media(&c, &a, &b, &there, &left));
-	assert_false(there.media_match);
+	assert_false(there.has_matching_media);
 	world_free(w);
 }
 
 /* A lamp in fog that states no medium, a lamp that states the medium around it, a point light outside the fog, and
  * one inside. */
-static void test_emitters(void **state)
+static void edges_find_emitters_in_and_outside_fog(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -283,9 +289,11 @@ static void test_emitters(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_events),	       cmocka_unit_test(test_grid_as_layers),
-		cmocka_unit_test(test_absorbing_grid), cmocka_unit_test(test_both_ends),
-		cmocka_unit_test(test_emitters),
+		cmocka_unit_test(scattering_events_follow_their_density),
+		cmocka_unit_test(stepped_grid_equals_homogeneous_layers),
+		cmocka_unit_test(absorbing_grid_equals_absorbing_layers),
+		cmocka_unit_test(transmittance_is_equal_in_both_directions),
+		cmocka_unit_test(edges_find_emitters_in_and_outside_fog),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -57,7 +57,7 @@ static struct path_context context_of(struct world *w, uint64_t *counters)
 				     .refract = halfvec_refract};
 }
 
-static double f_over(const double *log_pdf, unsigned last, double log_f)
+static double contribution_over_densities(const double *log_pdf, unsigned last, double log_f)
 {
 	double sum = 0;
 	for (unsigned s = 0; s <= last; s++)
@@ -67,7 +67,7 @@ static double f_over(const double *log_pdf, unsigned last, double log_f)
 
 /* Continues the camera's sub-path of t vertices to vertex s of the light sub-path as if this vertex had been sampled.
  * Returns false if that is impossible. */
-static bool continue_to_light(struct path_context *c, unsigned s, unsigned t)
+static bool extend_camera_subpath_to_light(struct path_context *c, unsigned s, unsigned t)
 {
 	const struct path_vertex *y = &c->light[s];
 	struct path_vertex *at = &c->camera[t - 1], *z = &c->camera[t];
@@ -78,28 +78,28 @@ static bool continue_to_light(struct path_context *c, unsigned s, unsigned t)
 	z->pdf = pdf;
 	z->beta = spectrum_mul(at->beta, path_scatter(c, at, at->to_prev, w));
 	z->beta = spectrum_scale(path_geometry_term(at, y, w, distance2) / pdf, z->beta);
-	at->delta = false;
+	at->is_delta = false;
 	if (t >= 2)
 		at[-1].pdf_rev = path_pdf(c, y, at, at - 1, TRANSPORT_IMPORTANCE);
 	if (pdf > 0 && EFFECT_IS_ON(c->w, scattering)) {
-		spectrum left;
-		if (!path_is_visible_in_media(c, at, z, &z->edge, &left))
+		spectrum transmittance;
+		if (!path_is_visible_in_media(c, at, z, &z->edge, &transmittance))
 			return false;
-		path_apply_edge(c, z, left);
+		path_apply_edge(c, z, transmittance);
 		if (t >= 2)
 			at[-1].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.previous_medium, &at[-1]);
 	}
 	return pdf > 0;
 }
 
-static void expect_near(double got, double want, double *worst)
+static void note_relative_error(double got, double expected, double *worst)
 {
-	if (isinf(want) && isinf(got))
+	if (isinf(expected) && isinf(got))
 		return;
-	double off = fabs(got - want) / want;
-	if (!(off < 1e-7))
-		fail_msg("%.17g instead of %.17g", got, want);
-	*worst = fmax(*worst, off);
+	double relative_error = fabs(got - expected) / expected;
+	if (!(relative_error < 1e-7))
+		fail_msg("%.17g instead of %.17g", got, expected);
+	*worst = fmax(*worst, relative_error);
 }
 
 static unsigned long check_densities(const char *name, struct world *w, unsigned long samples)
@@ -118,17 +118,20 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 		/* From the longest sub-path down: each meeting changes the vertices after it. */
 		for (unsigned t = camera; t >= 2; t--)
 			for (unsigned s = 2; s < light && s + t <= EDGES; s++) {
-				struct merged found;
+				struct merged_path found;
 				/* s + 1 vertices of the light sub-path and t of the camera's are joined */
-				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) || !continue_to_light(&c, s, t))
+				if (!full_path_from_subpaths(&c, s + 1, 0, s + t, &x) ||
+				    !extend_camera_subpath_to_light(&c, s, t))
 					continue;
 				struct photon p = photon_from_vertex(&c, s);
 				if (!merging_merge_photon(&c, &p, t, &found))
 					continue;
 				double log_f = full_path_log_f(&c, &x);
 				full_path_log_technique_pdfs(&c, &x, log_pdf);
-				expect_near(found.bdpt_contribution, f_over(log_pdf, x.edges, log_f), &worst);
-				expect_near(found.path_contribution, f_over(log_pdf, 1, log_f), &worst);
+				note_relative_error(found.bdpt_contribution,
+						    contribution_over_densities(log_pdf, x.edges, log_f), &worst);
+				note_relative_error(found.path_contribution,
+						    contribution_over_densities(log_pdf, 1, log_f), &worst);
 				compared++;
 			}
 	}
@@ -137,7 +140,7 @@ static unsigned long check_densities(const char *name, struct world *w, unsigned
 	return compared;
 }
 
-static void test_densities(void **state)
+static void merging_equals_f_over_the_sum_of_densities(void **state)
 {
 	(void)state;
 	assert_true(check_densities("diffuse", world_from_text(32, 32, ROOM LAMP "%s", ""), 1000) > 1000);
@@ -194,7 +197,7 @@ static void test_densities(void **state)
 			40000) > 100);
 }
 
-static void add(void *user, const struct merged *m)
+static void add_merged_contribution(void *user, const struct merged_path *m)
 {
 	*(double *)user += m->contribution;
 }
@@ -202,7 +205,7 @@ static void add(void *user, const struct merged *m)
 /* Light that arrives after at least two scattering events. Merging misses photons in the part of the disk beyond the
  * edge of a wall, here 1 %. The limit of 4.5 standard errors beyond 3 % rejects a correct program once in 10^5; an
  * error of 10 % is found nine times in ten. */
-static void test_energy(void **state)
+static void merging_finds_the_light_of_bdpt(void **state)
 {
 	(void)state;
 	enum { PATHS = 1 << 14, GROUPS = 32 };
@@ -221,7 +224,7 @@ static void test_energy(void **state)
 		for (uint64_t i = 0; i < PATHS; i++) {
 			struct merging_point place;
 			if (merging_walk_camera(&m, &c, g, 1, i, &place))
-				merging_for_each(&m, &c, &place, add, &by[0][g]);
+				merging_visit_paths(&m, &c, &place, add_merged_contribution, &by[0][g]);
 		}
 		merging_fini(&m);
 		c.min_depth = 3;
@@ -250,6 +253,7 @@ static void test_energy(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_densities), cmocka_unit_test(test_energy)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(merging_equals_f_over_the_sum_of_densities),
+					   cmocka_unit_test(merging_finds_the_light_of_bdpt)};
 	return cmocka_run_group_tests_name("worker/render/path/merging", tests, NULL, NULL);
 }

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-static void test_masks(void **state)
+static void passed_masks_lengthen_connections(void **state)
 {
 	(void)state;
 	static struct agreement_image path, bdpt;
@@ -35,6 +35,6 @@ static void test_masks(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_masks)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(passed_masks_lengthen_connections)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

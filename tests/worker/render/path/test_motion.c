@@ -38,13 +38,13 @@
 /* Returns whether the card covers a point of the film at time t. The film spans 2 x 2 around the origin. */
 typedef bool covers_fn(double x, double y, double t);
 
-static bool slides(double x, double y, double t)
+static bool card_slides_over(double x, double y, double t)
 {
 	double middle = -0.6 + 1.0 * t;
 	return fabs(x - middle) < 0.2 && fabs(y) < 0.5;
 }
 
-static bool turns(double x, double y, double t)
+static bool card_turns_over(double x, double y, double t)
 {
 	double a = M_PI / 2 * t, u = cos(a) * x + sin(a) * y, v = -sin(a) * x + cos(a) * y;
 	return fabs(u) < 0.8 && fabs(v) < 0.1;
@@ -104,7 +104,7 @@ static void check_seen(const char *test, struct world *w, covers_fn *covers)
 	world_free(w);
 }
 
-static void test_seen(void **state)
+static void moving_card_covers_its_share_of_the_time(void **state)
 {
 	(void)state;
 	check_seen("sliding",
@@ -112,13 +112,13 @@ static void test_seen(void **state)
 				   FROM_ABOVE "<shape type='rectangle'>" KEYS(
 					   "<scale x='0.2' y='0.5'/><translate x='-0.6'/>",
 					   "<scale x='0.2' y='0.5'/><translate x='0.4'/>") "</shape>"),
-		   slides);
+		   card_slides_over);
 	check_seen("turning",
 		   world_from_text(12, 12,
 				   FROM_ABOVE "<shape type='rectangle'>" KEYS(
 					   "<scale x='0.8' y='0.1'/>",
 					   "<scale x='0.8' y='0.1'/><rotate z='1' angle='90'/>") "</shape>"),
-		   turns);
+		   card_turns_over);
 }
 
 /* ---- all integrators ---- */
@@ -237,16 +237,16 @@ static void put_camera(char *out, size_t size, double t)
 		 170 + 20 * t, -0.5 + t);
 }
 
-typedef void put_fn(char *out, size_t size, double t);
+typedef void put_part_fn(char *out, size_t size, double t);
 
-static void put_still(char *out, size_t size, put_fn *put, double t)
+static void put_still(char *out, size_t size, put_part_fn *put, double t)
 {
 	char steps[256];
 	put(steps, sizeof steps, t);
 	snprintf(out, size, TO("%s"), steps);
 }
 
-static void put_moving(char *out, size_t size, put_fn *put)
+static void put_moving(char *out, size_t size, put_part_fn *put)
 {
 	char begin[256], end[256];
 	put(begin, sizeof begin, 0);
@@ -254,7 +254,7 @@ static void put_moving(char *out, size_t size, put_fn *put)
 	snprintf(out, size, KEYS("%s", "%s"), begin, end);
 }
 
-enum thing {
+enum scene_part {
 	EYES,
 	CARDS,
 	GLASSES,
@@ -267,25 +267,26 @@ enum thing {
 	SUNS,
 	PICTURES,
 	GLOWS,
-	THINGS
+	SCENE_PARTS
 };
-static put_fn *const puts_of[THINGS] = {put_camera,    put_card,      put_glass,      put_group, put_spot,    put_point,
-					put_card_lamp, put_ball_lamp, put_group_lamp, put_sun,	 put_picture, put_glow};
+static put_part_fn *const part_writers[SCENE_PARTS] = {put_camera,     put_card,  put_glass,	 put_group,
+						       put_spot,       put_point, put_card_lamp, put_ball_lamp,
+						       put_group_lamp, put_sun,	  put_picture,	 put_glow};
 
 /* The parts of the scene that move: one stage each, from the first to the last; the remaining parts stand at their
- * position for STILL. Only integrators with light sub-paths find the light that points and spots send through glass,
- * so the scene with these lights has no glass. */
+ * position for REST_TIME. Only integrators with light sub-paths find the light that points and spots send through
+ * glass, so the scene with these lights has no glass. */
 enum stage { SHAPES, CAMERA, LIGHTS, LAMPS, SKIES, MEDIA };
 static const struct {
 	const char *name;
-	enum thing first, last;
+	enum scene_part first, last;
 } stages[] = {{"motion", CARDS, GROUPS},	{"moving camera", EYES, EYES},
 	      {"moving lights", SPOTS, POINTS}, {"moving lamps", CARD_LAMPS, GROUP_LAMPS},
 	      {"moving skies", SUNS, PICTURES}, {"moving glow", GLOWS, GLOWS}};
-#define STILL 0.4
+#define REST_TIME 0.4
 
 /* A world that has a picture of the sky among its files. */
-__attribute__((format(printf, 1, 2))) static struct world *world_of(const char *format, ...)
+__attribute__((format(printf, 1, 2))) static struct world *world_from_format(const char *format, ...)
 {
 	static char xml[1 << 14];
 	static const char sky[] = "P5 4 2 255\n\x90\xff\x40\x20\x60\x30\x50\x40";
@@ -301,30 +302,30 @@ __attribute__((format(printf, 1, 2))) static struct world *world_of(const char *
 /* Returns the static world at time t, or the moving world if t is negative. */
 static struct world *world_at(enum stage s, double t)
 {
-	char place[THINGS][768];
-	for (enum thing i = 0; i < THINGS; i++)
+	char place[SCENE_PARTS][768];
+	for (enum scene_part i = 0; i < SCENE_PARTS; i++)
 		if (i < stages[s].first || i > stages[s].last)
-			put_still(place[i], sizeof place[i], puts_of[i], STILL);
+			put_still(place[i], sizeof place[i], part_writers[i], REST_TIME);
 		else if (t < 0)
-			put_moving(place[i], sizeof place[i], puts_of[i]);
+			put_moving(place[i], sizeof place[i], part_writers[i]);
 		else
-			put_still(place[i], sizeof place[i], puts_of[i], t);
+			put_still(place[i], sizeof place[i], part_writers[i], t);
 #define SCENE(inner) "<scene version='3.0.0'>" DEPTH EYE FLOOR inner "</scene>", place[EYES]
 	switch (s) {
 	case LIGHTS:
-		return world_of(SCENE(SKY CARD SPOT POINT), place[CARDS], place[SPOTS], place[POINTS]);
+		return world_from_format(SCENE(SKY CARD SPOT POINT), place[CARDS], place[SPOTS], place[POINTS]);
 	case LAMPS:
-		return world_of(SCENE(SKY CARD CARD_LAMP BALL_LAMP GROUP_LAMP), place[CARDS], place[CARD_LAMPS],
-				place[BALL_LAMPS], place[GROUP_LAMPS]);
+		return world_from_format(SCENE(SKY CARD CARD_LAMP BALL_LAMP GROUP_LAMP), place[CARDS],
+					 place[CARD_LAMPS], place[BALL_LAMPS], place[GROUP_LAMPS]);
 	case SKIES:
-		return world_of(SCENE(CARD SUN PICTURE), place[CARDS], place[SUNS], place[PICTURES]);
+		return world_from_format(SCENE(CARD SUN PICTURE), place[CARDS], place[SUNS], place[PICTURES]);
 	case MEDIA:
-		return world_of(
+		return world_from_format(
 			"<scene version='3.0.0'><integrator type='volpath'><integer name='max_depth' value='6'/>"
 			"</integrator>" EYE FLOOR SKY CARD GLOW "</scene>",
 			place[EYES], place[CARDS], place[GLOWS]);
 	default:
-		return world_of(SCENE(LAMP SKY CARD GLASS GROUP), place[CARDS], place[GLASSES], place[GROUPS]);
+		return world_from_format(SCENE(LAMP SKY CARD GLASS GROUP), place[CARDS], place[GLASSES], place[GROUPS]);
 	}
 }
 
@@ -335,9 +336,9 @@ static void mean_of_stills(enum stage s, struct agreement_image *out)
 	for (int i = 0; i < PARTS; i++) {
 		char side[32];
 		struct world *w = world_at(s, (i + 0.5) / PARTS);
-		const struct agreement_options how = {"bdpt", 320, 32, 0, 0};
+		const struct agreement_options options = {"bdpt", 320, 32, 0, 0};
 		snprintf(side, sizeof side, "still %d", i);
-		agreement_render(w, stages[s].name, side, &how, &part);
+		agreement_render(w, stages[s].name, side, &options, &part);
 		out->groups = part.groups;
 		for (uint32_t g = 0; g < part.groups; g++)
 			for (int c = 0; c <= AGREEMENT_CELLS; c++)
@@ -362,15 +363,15 @@ static void check_integrators(enum stage s, const struct agreement_options *side
 	/* The image of the static world at the opening of the shutter differs, so the comparison can tell them apart.
 	 */
 	struct agreement_difference d;
-	const struct agreement_options how = {"bdpt", test_is_scaled() ? 8192 : 1024, 32, 0, 0};
+	const struct agreement_options options = {"bdpt", test_is_scaled() ? 8192 : 1024, 32, 0, 0};
 	w = world_at(s, 0);
-	agreement_render(w, "motion", "when it opens", &how, &image);
+	agreement_render(w, "motion", "when it opens", &options, &image);
 	agreement_measure(&image, &stills, &d);
 	assert_false(d.agrees);
 	world_free(w);
 }
 
-static void test_shapes(void **state)
+static void integrators_agree_on_moving_shapes(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {{"path", 16384, 32, 0, 0},
@@ -380,14 +381,14 @@ static void test_shapes(void **state)
 	check_integrators(SHAPES, sides, test_is_full() ? 4 : 2);
 }
 
-static void test_camera(void **state)
+static void integrators_agree_for_a_moving_camera(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {{"path", 8192, 32, 0, 0}, {"hslt", 98304, 32, 0, 0}};
 	check_integrators(CAMERA, sides, test_is_full() ? 2 : 1);
 }
 
-static void test_lights(void **state)
+static void integrators_agree_on_moving_delta_lights(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {
@@ -395,7 +396,7 @@ static void test_lights(void **state)
 	check_integrators(LIGHTS, sides, test_is_full() ? 3 : 2);
 }
 
-static void test_lamps(void **state)
+static void integrators_agree_on_moving_lamps(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {
@@ -406,7 +407,7 @@ static void test_lamps(void **state)
 	check_integrators(LAMPS, sides, test_is_full() ? 7 : 2);
 }
 
-static void test_skies(void **state)
+static void integrators_agree_on_moving_skies(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {
@@ -414,7 +415,7 @@ static void test_skies(void **state)
 	check_integrators(SKIES, sides, test_is_full() ? 3 : 2);
 }
 
-static void test_glow(void **state)
+static void integrators_agree_on_a_moving_glow(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {{"bdpt", 11520, 32, 0, 0}, {"path", 16384, 32, 0, 0}};
@@ -425,7 +426,7 @@ static void test_glow(void **state)
 
 /* A lamp whose transforms are all equal, and one that would move only while the shutter is closed, give the same bits
  * as static lamps. */
-static void test_at_rest(void **state)
+static void equal_keyframes_give_the_bits_of_a_static_lamp(void **state)
 {
 	(void)state;
 	static struct agreement_image still, image;
@@ -435,11 +436,12 @@ static void test_at_rest(void **state)
 		("<animation name='to_world'><transform time='3'><translate x='0.25' z='1.5'/></transform>"
 		 "<transform time='4'><translate x='2'/></transform></animation>")};
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-		struct world *w = world_of("<scene version='3.0.0'>" DEPTH EYE FLOOR CARD_LAMP "</scene>",
-					   TO("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>"), places[i]);
-		const struct agreement_options how = {"bdpt", 16, 16, 0, 0};
+		struct world *w =
+			world_from_format("<scene version='3.0.0'>" DEPTH EYE FLOOR CARD_LAMP "</scene>",
+					  TO("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>"), places[i]);
+		const struct agreement_options options = {"bdpt", 16, 16, 0, 0};
 		assert_false(w->effects.motion);
-		agreement_render(w, "at rest", "a lamp", &how, i ? &image : &still);
+		agreement_render(w, "at rest", "a lamp", &options, i ? &image : &still);
 		assert_true(i == 0 || memcmp(image.mean, still.mean, sizeof still.mean) == 0);
 		world_free(w);
 	}
@@ -448,9 +450,14 @@ static void test_at_rest(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_seen),   cmocka_unit_test(test_shapes),  cmocka_unit_test(test_camera),
-		cmocka_unit_test(test_lights), cmocka_unit_test(test_lamps),   cmocka_unit_test(test_skies),
-		cmocka_unit_test(test_glow),   cmocka_unit_test(test_at_rest),
+		cmocka_unit_test(moving_card_covers_its_share_of_the_time),
+		cmocka_unit_test(integrators_agree_on_moving_shapes),
+		cmocka_unit_test(integrators_agree_for_a_moving_camera),
+		cmocka_unit_test(integrators_agree_on_moving_delta_lights),
+		cmocka_unit_test(integrators_agree_on_moving_lamps),
+		cmocka_unit_test(integrators_agree_on_moving_skies),
+		cmocka_unit_test(integrators_agree_on_a_moving_glow),
+		cmocka_unit_test(equal_keyframes_give_the_bits_of_a_static_lamp),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

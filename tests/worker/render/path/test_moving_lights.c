@@ -23,36 +23,36 @@
 #define SHINES(radiance) "<emitter type='area'><float name='radiance' value='" radiance "'/></emitter>"
 
 /* The half sides, or the radius, and the position of the light at one time. */
-struct light_at {
+struct light_state {
 	double a, b, x, height;
 };
-typedef struct light_at light_fn(double t);
+typedef struct light_state light_fn(double t);
 
-static struct light_at moves_by(double t)
+static struct light_state sliding_light(double t)
 {
-	return (struct light_at){.a = 0.2, .b = 0.2, .x = -1.5 + 3 * t, .height = 1.5};
+	return (struct light_state){.a = 0.2, .b = 0.2, .x = -1.5 + 3 * t, .height = 1.5};
 }
 
-static struct light_at rises(double t)
+static struct light_state rising_light(double t)
 {
-	return (struct light_at){.a = 0.1 + 0.3 * t, .b = 0.1 + 0.3 * t, .height = 1.5 + t};
+	return (struct light_state){.a = 0.1 + 0.3 * t, .b = 0.1 + 0.3 * t, .height = 1.5 + t};
 }
 
-static struct light_at is_stretched(double t)
+static struct light_state stretching_light(double t)
 {
-	return (struct light_at){.a = 0.1 + 0.8 * t, .b = 0.6 - 0.4 * t, .height = 1.5 + 0.5 * t};
+	return (struct light_state){.a = 0.1 + 0.8 * t, .b = 0.6 - 0.4 * t, .height = 1.5 + 0.5 * t};
 }
 
 /* Returns the irradiance at the point (x, y, 0), with its normal towards +z, from a light of strength 1. */
-typedef double irradiance_fn(const struct light_at *l, double x, double y);
+typedef double irradiance_fn(const struct light_state *l, double x, double y);
 
-static double of_ball(const struct light_at *l, double x, double y)
+static double irradiance_of_ball(const struct light_state *l, double x, double y)
 {
 	double d2 = (x - l->x) * (x - l->x) + y * y + l->height * l->height;
 	return M_PI * l->a * l->a * l->height / (d2 * sqrt(d2));
 }
 
-static double of_card(const struct light_at *l, double x, double y)
+static double irradiance_of_card(const struct light_state *l, double x, double y)
 {
 	const double side[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
 	double sum = 0;
@@ -66,39 +66,39 @@ static double of_card(const struct light_at *l, double x, double y)
 }
 
 /* 1 inside the beam and 0 outside: over time, the mean blurs the moving edge. */
-static double of_beam(const struct light_at *l, double x, double y)
+static double irradiance_of_beam(const struct light_state *l, double x, double y)
 {
 	return fabs(x - l->x) < l->a && fabs(y) < l->b;
 }
 
-static double of_projector(const struct light_at *l, double x, double y)
+static double irradiance_of_projector(const struct light_state *l, double x, double y)
 {
 	(void)x, (void)y;
 	return M_PI / (l->height * l->height);
 }
 
-static const struct over_plane {
+static const struct moving_light_case {
 	const char *name;
 	light_fn *light;
 	irradiance_fn *irradiance;
-	const char *type, *inside;
-} over_plane[] = {
-	{"a ball slides", moves_by, of_ball, "sphere", SHINES("1")},
-	{"a ball rises and grows", rises, of_ball, "sphere", SHINES("1")},
-	{"a card is stretched", is_stretched, of_card, "rectangle", SHINES("1")},
-	{"a beam is stretched", is_stretched, of_beam, "rectangle",
+	const char *type, *children;
+} moving_light_cases[] = {
+	{"a ball slides", sliding_light, irradiance_of_ball, "sphere", SHINES("1")},
+	{"a ball rises and grows", rising_light, irradiance_of_ball, "sphere", SHINES("1")},
+	{"a card is stretched", stretching_light, irradiance_of_card, "rectangle", SHINES("1")},
+	{"a beam is stretched", stretching_light, irradiance_of_beam, "rectangle",
 	 "<emitter type='directionalarea'><float name='radiance' value='1'/></emitter>"},
-	{"a projector rises", rises, of_projector, "projector", "<float name='fov' value='60'/>"},
+	{"a projector rises", rising_light, irradiance_of_projector, "projector", "<float name='fov' value='60'/>"},
 };
 
 /* Returns the mean, over time and over the image, of the radiance of a plane of reflectance 1 that the camera sees
  * from a height of 1. */
-static double mean_radiance(const struct over_plane *o)
+static double mean_radiance(const struct moving_light_case *o)
 {
 	enum { STEPS = 48, TIMES = 512 };
 	double sum = 0, half = tan(M_PI / 9);
 	for (int k = 0; k < TIMES; k++) {
-		struct light_at l = o->light((k + 0.5) / TIMES);
+		struct light_state l = o->light((k + 0.5) / TIMES);
 		for (int i = 0; i < STEPS * STEPS; i++)
 			sum += o->irradiance(&l, half * (2 * (i % STEPS + 0.5) / STEPS - 1),
 					     half * (2 * (i / STEPS + 0.5) / STEPS - 1));
@@ -106,18 +106,18 @@ static double mean_radiance(const struct over_plane *o)
 	return sum / (M_PI * STEPS * STEPS * TIMES);
 }
 
-static void put_light(char *out, size_t size, const struct over_plane *o, double t)
+static void put_light(char *out, size_t size, const struct moving_light_case *o, double t)
 {
-	const struct light_at l = o->light(t);
+	const struct light_state l = o->light(t);
 	snprintf(out, size,
 		 "<scale x='%.17g' y='%.17g' z='%.17g'/><rotate x='1' angle='180'/><translate x='%.17g' z='%.17g'/>",
 		 l.a, l.b, l.a, l.x, l.height);
 }
 
-static struct world *world_over_plane(const struct over_plane *o)
+static struct world *make_world_over_plane(const struct moving_light_case *o)
 {
 	char begin[256], end[256];
-	const char *element = o->irradiance == of_projector ? "emitter" : "shape";
+	const char *element = o->irradiance == irradiance_of_projector ? "emitter" : "shape";
 	put_light(begin, sizeof begin, o, 0);
 	put_light(end, sizeof end, o, 1);
 	return world_from_text(16, 16,
@@ -129,22 +129,22 @@ static struct world *world_over_plane(const struct over_plane *o)
 				       "<scale value='4'/>") "<bsdf type='diffuse'>"
 							     "<float name='reflectance' value='1'/></bsdf></shape>"
 							     "<%s type='%s'>" KEYS("%s", "%s") "%s</%s>",
-			       element, o->type, begin, end, o->inside, element);
+			       element, o->type, begin, end, o->children, element);
 }
 
-static void test_over_a_plane(void **state)
+static void moving_lights_light_the_plane_as_integrated(void **state)
 {
 	(void)state;
 	static const struct agreement_options sides[] = {{"path", 1024, 32, 0, 0}, {"bdpt", 1536, 32, 0, 0}};
 	static struct agreement_image image;
-	for (size_t k = 0; k < sizeof over_plane / sizeof *over_plane; k++) {
-		struct world *w = world_over_plane(&over_plane[k]);
+	for (size_t k = 0; k < sizeof moving_light_cases / sizeof *moving_light_cases; k++) {
+		struct world *w = make_world_over_plane(&moving_light_cases[k]);
 		double xyz = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
 		for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
 			char test[64];
-			snprintf(test, sizeof test, "%s, %s", over_plane[k].name, sides[i].integrator);
+			snprintf(test, sizeof test, "%s, %s", moving_light_cases[k].name, sides[i].integrator);
 			agreement_render(w, test, "moving", &sides[i], &image);
-			agreement_check_constant(test, &image, xyz * mean_radiance(&over_plane[k]));
+			agreement_check_constant(test, &image, xyz * mean_radiance(&moving_light_cases[k]));
 		}
 		world_free(w);
 	}
@@ -153,7 +153,7 @@ static void test_over_a_plane(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_over_a_plane),
+		cmocka_unit_test(moving_lights_light_the_plane_as_integrated),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

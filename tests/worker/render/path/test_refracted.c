@@ -59,7 +59,8 @@ static struct world *image_of_lamp(const char *effects)
 
 /* Compares images with refracted connections, of spp samples per pixel (bdpt: a quarter), with a reference without
  * them of twice as many. */
-static void check_both(const char *name, struct world *(*build)(const char *effects), uint64_t spp)
+static void check_with_and_without_refraction(const char *name, struct world *(*build)(const char *effects),
+					      uint64_t spp)
 {
 	static struct agreement_image without, with;
 	const struct agreement_options sides[] = {{"path", spp, 32, 0, 0}, {"bdpt", spp / 4, 32, 0, 0}};
@@ -77,22 +78,22 @@ static void check_both(const char *name, struct world *(*build)(const char *effe
 	world_free(w);
 }
 
-static void test_caustic(void **state)
+static void refracted_connections_keep_the_mean_of_a_caustic(void **state)
 {
 	(void)state;
-	check_both("caustic", caustic_world, 2048);
+	check_with_and_without_refraction("caustic", caustic_world, 2048);
 }
 
-static void test_image_of_lamp(void **state)
+static void refracted_connections_keep_the_mean_of_a_mirrored_lamp(void **state)
 {
 	(void)state;
-	check_both("image of a lamp", image_of_lamp, 512);
+	check_with_and_without_refraction("image of a lamp", image_of_lamp, 512);
 }
 
 /* The floor of a pool under a low sun, behind a wall that blocks straight lines to the sun. Refracted light passes
  * above the wall: the irradiance E cos a T(a) arrives, where a is the angle of incidence and T Fresnel's
  * transmittance. */
-static void test_pool(void **state)
+static void refracted_sun_lights_the_pool_behind_a_wall(void **state)
 {
 	(void)state;
 	static struct agreement_image seen;
@@ -127,7 +128,8 @@ static void test_pool(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_caustic), cmocka_unit_test(test_image_of_lamp),
-					   cmocka_unit_test(test_pool)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(refracted_connections_keep_the_mean_of_a_caustic),
+					   cmocka_unit_test(refracted_connections_keep_the_mean_of_a_mirrored_lamp),
+					   cmocka_unit_test(refracted_sun_lights_the_pool_behind_a_wall)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

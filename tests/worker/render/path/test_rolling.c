@@ -39,7 +39,7 @@ enum { WIDTH = 12, HEIGHT = 8 };
 	"<float name='rolling_shutter_duration' value='" duration "'/>"
 #define BOX_FILTER "<rfilter type='box'/>"
 
-static struct world *world_of(const char *roll, const char *filter)
+static struct world *make_rolling_world(const char *roll, const char *filter)
 {
 	return world_from_text(WIDTH, HEIGHT, SCENE LIT, roll, filter);
 }
@@ -47,31 +47,31 @@ static struct world *world_of(const char *roll, const char *filter)
 /* Returns the line's position from 0, the first line, to 1, the last. */
 typedef double line_fn(double x, double y);
 
-static double none(double x, double y)
+static double line_of_no_roll(double x, double y)
 {
 	(void)x, (void)y;
 	return 0;
 }
 
-static double top(double x, double y)
+static double line_from_top(double x, double y)
 {
 	(void)x;
 	return y / HEIGHT;
 }
 
-static double bottom(double x, double y)
+static double line_from_bottom(double x, double y)
 {
 	(void)x;
 	return 1 - y / HEIGHT;
 }
 
-static double left(double x, double y)
+static double line_from_left(double x, double y)
 {
 	(void)y;
 	return x / WIDTH;
 }
 
-static double right(double x, double y)
+static double line_from_right(double x, double y)
 {
 	(void)y;
 	return 1 - x / WIDTH;
@@ -82,14 +82,14 @@ static const struct roll {
 	line_fn *line;
 	double exposure;
 } rolls[] = {
-	{"", none, 1},
-	{ROLL("none", "0.2"), none, 1},
-	{ROLL("top", "0.5"), top, 0.5},
-	{ROLL("top", "0"), top, 0},
-	{ROLL("top", "1"), top, 1},
-	{ROLL("bottom", "0.25"), bottom, 0.25},
-	{ROLL("left", "0.125"), left, 0.125},
-	{ROLL("right", "0.7"), right, 0.7},
+	{"", line_of_no_roll, 1},
+	{ROLL("none", "0.2"), line_of_no_roll, 1},
+	{ROLL("top", "0.5"), line_from_top, 0.5},
+	{ROLL("top", "0"), line_from_top, 0},
+	{ROLL("top", "1"), line_from_top, 1},
+	{ROLL("bottom", "0.25"), line_from_bottom, 0.25},
+	{ROLL("left", "0.125"), line_from_left, 0.125},
+	{ROLL("right", "0.7"), line_from_right, 0.7},
 };
 enum { ROLLS = sizeof rolls / sizeof *rolls };
 
@@ -102,16 +102,16 @@ static double time_of(const struct roll *r, const double film[2], double u)
 /* ---- samples ---- */
 
 /* Random numbers with a fixed number for the time. */
-struct timed {
+struct fixed_time_sampler {
 	struct sampler base;
 	struct sampler_random random;
 	double time;
 };
 
-static const double *timed_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+static const double *fixed_time_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
 	static double block[SAMPLER_BLOCK_SIZE];
-	struct timed *s = (struct timed *)base;
+	struct fixed_time_sampler *s = (struct fixed_time_sampler *)base;
 	const double *u = s->random.base.block(&s->random.base, side, vertex);
 	if (side != SIDE_LIGHT || vertex != 0)
 		return u;
@@ -136,14 +136,14 @@ static void check_samples(const struct roll *r, const char *filter)
 {
 	static struct path_context rolling, still;
 	static struct path_sample a, b;
-	struct world *w = world_of(r->xml, filter), *open = world_of("", filter);
+	struct world *w = make_rolling_world(r->xml, filter), *open = make_rolling_world("", filter);
 	unsigned lit = 0, beyond = 0;
-	assert_true(w->effects.motion && world_has_rolling_shutter(w) == (r->line != none));
+	assert_true(w->effects.motion && world_has_rolling_shutter(w) == (r->line != line_of_no_roll));
 	begin(&rolling, w);
 	begin(&still, open);
 	for (uint64_t i = 0; i < 4000; i++) {
 		struct sampler_random s;
-		struct timed t = {{timed_block}, .time = 0};
+		struct fixed_time_sampler t = {{fixed_time_block}, .time = 0};
 		double film[2];
 		sampler_random_init(&s, 5, RNG_TEST, i, 0);
 		sampler_random_init(&t.random, 5, RNG_TEST, i, 0);
@@ -163,7 +163,7 @@ static void check_samples(const struct roll *r, const char *filter)
 	world_free(open);
 }
 
-static void test_samples(void **state)
+static void times_of_samples_follow_their_lines(void **state)
 {
 	(void)state;
 	for (int i = 0; i < ROLLS; i++) {
@@ -195,7 +195,7 @@ static void check_seen(const struct roll *r)
 		seen[(int)film[1]][(int)film[0]] += c.camera[1].kind == VERTEX_SURFACE;
 	}
 	for (int k = 0; k < WIDTH * HEIGHT; k++) {
-		double share = 0, found = seen[k / WIDTH][k % WIDTH], all = drawn[k / WIDTH][k % WIDTH];
+		double share = 0, seen_count = seen[k / WIDTH][k % WIDTH], drawn_count = drawn[k / WIDTH][k % WIDTH];
 		for (int i = 0; i < FINE * FINE * FINE; i++) {
 			const double film[2] = {k % WIDTH + (i % FINE + 0.5) / FINE,
 						k / WIDTH + (i / FINE % FINE + 0.5) / FINE};
@@ -204,8 +204,8 @@ static void check_seen(const struct roll *r)
 			share += fabs(x - (t - 0.6)) < 0.2 && fabs(y) < 0.9;
 		}
 		share /= FINE * FINE * FINE;
-		double variance = all * (share * (1 - share) + 1e-3); /* plus the error of the quadrature */
-		chi2 += (found - all * share) * (found - all * share) / variance;
+		double variance = drawn_count * (share * (1 - share) + 1e-3); /* plus the error of the quadrature */
+		chi2 += (seen_count - drawn_count * share) * (seen_count - drawn_count * share) / variance;
 		cells += share > 0 && share < 1;
 	}
 	print_message("%s: chi^2 %.1f of %zu cells\n", *r->xml ? r->xml : "all at once", chi2, cells);
@@ -213,7 +213,7 @@ static void check_seen(const struct roll *r)
 	world_free(w);
 }
 
-static void test_seen(void **state)
+static void rolling_shutter_sees_the_moving_card_line_by_line(void **state)
 {
 	(void)state;
 	for (int i = 0; i < ROLLS; i++)
@@ -237,10 +237,10 @@ static int lease_of(const struct world *w, const char *integrator, struct error 
 	return render_lease(w, &p, &key, NULL, NULL, &end, &b, e);
 }
 
-static void test_who_renders_it(void **state)
+static void integrators_without_rolling_shutter_refuse_it(void **state)
 {
 	(void)state;
-	struct world *w = world_of(ROLL("top", "0.5"), BOX_FILTER);
+	struct world *w = make_rolling_world(ROLL("top", "0.5"), BOX_FILTER);
 	struct render_summary summary;
 	world_summary(w, &summary);
 	assert_true(summary.has_rolling_shutter);
@@ -267,7 +267,7 @@ static void test_who_renders_it(void **state)
 	world_free(w);
 	/* Where nothing moves, every integrator can render. */
 	worlds_effects = "-motion";
-	w = world_of(ROLL("top", "0.5"), BOX_FILTER);
+	w = make_rolling_world(ROLL("top", "0.5"), BOX_FILTER);
 	worlds_effects = NULL;
 	world_summary(w, &summary);
 	assert_false(summary.has_rolling_shutter);
@@ -277,9 +277,9 @@ static void test_who_renders_it(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_samples),
-		cmocka_unit_test(test_seen),
-		cmocka_unit_test(test_who_renders_it),
+		cmocka_unit_test(times_of_samples_follow_their_lines),
+		cmocka_unit_test(rolling_shutter_sees_the_moving_card_line_by_line),
+		cmocka_unit_test(integrators_without_rolling_shutter_refuse_it),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

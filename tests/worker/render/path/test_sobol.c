@@ -17,8 +17,8 @@
 
 #define LEVEL 1e-6
 
-static void draw(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sample, enum sampler_side side,
-		 unsigned vertex, double out[SAMPLER_BLOCK_SIZE])
+static void draw_block(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sample, enum sampler_side side,
+		       unsigned vertex, double out[SAMPLER_BLOCK_SIZE])
 {
 	struct sampler_sobol s;
 	sampler_sobol_init(&s, seed, RNG_TEST, index, replicate, sample);
@@ -62,7 +62,7 @@ static void check_net(const double (*u)[4], unsigned m)
 	}
 }
 
-static void test_elementary_intervals(void **state)
+static void elementary_intervals_hold_their_share(void **state)
 {
 	(void)state;
 	enum { M = 7 };
@@ -73,8 +73,8 @@ static void test_elementary_intervals(void **state)
 		for (int half = 0; half < 2; half++) {
 			double u[1 << M][4], block[SAMPLER_BLOCK_SIZE];
 			for (unsigned i = 0; i < 1 << M; i++) {
-				draw(seed, n, n % 3, first[n % 6] + i, n % 2 ? SIDE_LIGHT : SIDE_CAMERA,
-				     (unsigned)n % 5, block);
+				draw_block(seed, n, n % 3, first[n % 6] + i, n % 2 ? SIDE_LIGHT : SIDE_CAMERA,
+					   (unsigned)n % 5, block);
 				memcpy(u[i], block + 4 * half, sizeof u[i]);
 			}
 			check_net((const double(*)[4])u, M);
@@ -83,7 +83,7 @@ static void test_elementary_intervals(void **state)
 
 /* bdpt8 traces a light sub-path where this number is below 1/8: in exactly one of any eight samples that begin at a
  * multiple of 8. */
-static void test_one_of_eight(void **state)
+static void one_of_eight_samples_has_a_light_subpath(void **state)
 {
 	(void)state;
 	uint64_t seed = stats_seed("test_one_of_eight");
@@ -92,8 +92,8 @@ static void test_one_of_eight(void **state)
 			unsigned count = 0;
 			for (uint64_t i = 0; i < 8; i++) {
 				double u[SAMPLER_BLOCK_SIZE];
-				draw(seed, n, n % 3, first + i, SIDE_CAMERA, 0, u);
-				count += u[DIM_HAS_LIGHT] * 8 < 1;
+				draw_block(seed, n, n % 3, first + i, SIDE_CAMERA, 0, u);
+				count += u[DIM_LIGHT_SUBPATH] * 8 < 1;
 			}
 			assert_int_equal(count, 1);
 		}
@@ -101,7 +101,7 @@ static void test_one_of_eight(void **state)
 
 /* Points without scrambling, by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1 and
  * x^3 + x + 1. A scramble preserves the number of leading bits that two points share, in every dimension. */
-static void directions(unsigned degree, unsigned inner, const uint32_t *initial, uint32_t v[32])
+static void compute_direction_numbers(unsigned degree, unsigned inner, const uint32_t *initial, uint32_t v[32])
 {
 	uint32_t m[32];
 	for (unsigned i = 0; i < 32; i++) {
@@ -128,7 +128,7 @@ static uint32_t unscrambled(const uint32_t v[32], uint32_t i)
 /* A prefix of 2^11 samples is a shuffled, aligned range of Sobol' points, and the leading bits shared by two of these
  * points depend only on the exclusive or of their indices. So the multiset, over all pairs, of the bits shared in
  * dimension 0 and in another dimension is that of the plain points. */
-static void test_directions(void **state)
+static void scrambling_keeps_the_named_polynomials(void **state)
 {
 	(void)state;
 	enum { N = 1 << 11 };
@@ -136,9 +136,9 @@ static void test_directions(void **state)
 	uint32_t v[4][32];
 	for (unsigned i = 0; i < 32; i++)
 		v[0][i] = UINT32_C(1) << (31 - i);
-	directions(1, 0, one, v[1]);
-	directions(2, 1, two, v[2]);
-	directions(3, 1, three, v[3]);
+	compute_direction_numbers(1, 0, one, v[1]);
+	compute_direction_numbers(2, 1, two, v[2]);
+	compute_direction_numbers(3, 1, three, v[3]);
 	uint64_t seed = stats_seed("test_directions");
 	static uint64_t seen[4][13][34], expected[4][13][34];
 	memset(seen, 0, sizeof seen);
@@ -146,17 +146,17 @@ static void test_directions(void **state)
 	static uint32_t u[N][4];
 	for (uint32_t i = 0; i < N; i++) {
 		double block[SAMPLER_BLOCK_SIZE];
-		draw(seed, 1, 2, i, SIDE_CAMERA, 0, block);
+		draw_block(seed, 1, 2, i, SIDE_CAMERA, 0, block);
 		for (int d = 0; d < 4; d++)
 			u[i][d] = (uint32_t)ldexp(block[d], 32);
 	}
 	for (uint32_t i = 0; i < N; i++)
 		for (uint32_t j = 0; j < i; j++) {
-			unsigned here = shared_bits(u[i][0], u[j][0]),
+			unsigned shared = shared_bits(u[i][0], u[j][0]),
 				 there = shared_bits(unscrambled(v[0], i), unscrambled(v[0], j));
-			assert_true(here < 13 && there < 13);
+			assert_true(shared < 13 && there < 13);
 			for (int d = 1; d < 4; d++) {
-				seen[d][here][shared_bits(u[i][d], u[j][d])]++;
+				seen[d][shared][shared_bits(u[i][d], u[j][d])]++;
 				expected[d][there][shared_bits(unscrambled(v[d], i), unscrambled(v[d], j))]++;
 			}
 		}
@@ -182,7 +182,7 @@ static int cell_of(double u)
 
 /* One sample of each of many sequences: each number alone is uniform, and so are its bits below the 2^-32 that
  * stratify. */
-static void test_marginals(void **state)
+static void each_number_alone_is_uniform(void **state)
 {
 	(void)state;
 	uint64_t seed = stats_seed("test_marginals");
@@ -190,7 +190,7 @@ static void test_marginals(void **state)
 		low[SAMPLER_BLOCK_SIZE][CELLS];
 	for (uint64_t n = 0; n < TRIALS; n++) {
 		double u[SAMPLER_BLOCK_SIZE];
-		draw(seed, n / 16, n % 16, 5, SIDE_LIGHT, 3, u);
+		draw_block(seed, n / 16, n % 16, 5, SIDE_LIGHT, 3, u);
 		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++) {
 			assert_true(u[d] >= 0 && u[d] < 1);
 			coarse[d][cell_of(u[d])]++;
@@ -206,14 +206,14 @@ static void test_marginals(void **state)
 }
 
 /* Samples with indices from 2^32 on do not repeat earlier ones. */
-static void test_long_sequences(void **state)
+static void indices_beyond_32_bits_do_not_repeat_samples(void **state)
 {
 	(void)state;
 	uint64_t seed = stats_seed("long sequences"), same = 0;
 	for (uint64_t i = 0; i < 1000; i++) {
 		double u[SAMPLER_BLOCK_SIZE], v[SAMPLER_BLOCK_SIZE];
-		draw(seed, 1, 2, i, SIDE_CAMERA, 1, u);
-		draw(seed, 1, 2, i + (UINT64_C(1) << 32), SIDE_CAMERA, 1, v);
+		draw_block(seed, 1, 2, i, SIDE_CAMERA, 1, u);
+		draw_block(seed, 1, 2, i + (UINT64_C(1) << 32), SIDE_CAMERA, 1, v);
 		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++)
 			same += fabs(u[d] - v[d]) < 0x1p-20;
 	}
@@ -229,8 +229,8 @@ static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[
 	memset(count, 0, sizeof count);
 	for (uint64_t n = 0; n < TRIALS; n++) {
 		double u[SAMPLER_BLOCK_SIZE], v[SAMPLER_BLOCK_SIZE];
-		draw(seed + n, a[0], a[1], 3, SIDE_CAMERA, 1, u);
-		draw(seed + n, b[0], b[1], 3, side, vertex, v);
+		draw_block(seed + n, a[0], a[1], 3, SIDE_CAMERA, 1, u);
+		draw_block(seed + n, b[0], b[1], 3, side, vertex, v);
 		for (int d = 0; d < SAMPLER_BLOCK_SIZE; d++)
 			count[d][cell_of(u[d]) * CELLS + cell_of(v[d])]++;
 	}
@@ -238,7 +238,7 @@ static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[
 		check_uniform(count[d], CELLS * CELLS, TRIALS, what);
 }
 
-static void test_independence(void **state)
+static void sequences_and_blocks_are_independent(void **state)
 {
 	(void)state;
 	check_pairs("replicates", (const uint64_t[]){7, 0}, (const uint64_t[]){7, 1}, 1, SIDE_CAMERA);
@@ -250,7 +250,7 @@ static void test_independence(void **state)
 	uint64_t seed = stats_seed("halves"), count[CELLS * CELLS] = {0};
 	for (uint64_t n = 0; n < TRIALS; n++) {
 		double u[SAMPLER_BLOCK_SIZE];
-		draw(seed, n, 0, 3, SIDE_CAMERA, 1, u);
+		draw_block(seed, n, 0, 3, SIDE_CAMERA, 1, u);
 		count[cell_of(u[1]) * CELLS + cell_of(u[5])]++;
 	}
 	check_uniform(count, CELLS * CELLS, TRIALS, "halves");
@@ -266,7 +266,7 @@ static double integrand(const double u[SAMPLER_BLOCK_SIZE])
 /* Means of 64 samples over many replicates. Power: the smallest bias found with 95 % probability must be below 1 %, and
  * a planted bias of 2 % must be found. The variance between replicates is at most a third of that of independent
  * samples. */
-static void test_means(void **state)
+static void low_discrepancy_means_are_unbiased(void **state)
 {
 	(void)state;
 	enum { GROUPS = 16, REPLICATES = 4096, SAMPLES = 64 };
@@ -277,7 +277,7 @@ static void test_means(void **state)
 		double sum = 0;
 		for (uint64_t i = 0; i < SAMPLES; i++) {
 			double u[SAMPLER_BLOCK_SIZE];
-			draw(seed, 3, r, i, SIDE_CAMERA, 2, u);
+			draw_block(seed, 3, r, i, SIDE_CAMERA, 2, u);
 			double f = integrand(u);
 			sum += f / SAMPLES;
 			single += (f - exact) * (f - exact) / (REPLICATES * SAMPLES);
@@ -298,13 +298,13 @@ static void test_means(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_elementary_intervals),
-		cmocka_unit_test(test_one_of_eight),
-		cmocka_unit_test(test_directions),
-		cmocka_unit_test(test_marginals),
-		cmocka_unit_test(test_long_sequences),
-		cmocka_unit_test(test_independence),
-		cmocka_unit_test(test_means),
+		cmocka_unit_test(elementary_intervals_hold_their_share),
+		cmocka_unit_test(one_of_eight_samples_has_a_light_subpath),
+		cmocka_unit_test(scrambling_keeps_the_named_polynomials),
+		cmocka_unit_test(each_number_alone_is_uniform),
+		cmocka_unit_test(indices_beyond_32_bits_do_not_repeat_samples),
+		cmocka_unit_test(sequences_and_blocks_are_independent),
+		cmocka_unit_test(low_discrepancy_means_are_unbiased),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

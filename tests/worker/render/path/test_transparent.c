@@ -22,16 +22,16 @@ struct tally {
 	unsigned open, blocked, passed;
 };
 
-static void connect_to(struct path_context *c, unsigned t, const struct path_vertex *y, struct tally *sum)
+static void count_connection(struct path_context *c, unsigned t, const struct path_vertex *y, struct tally *sum)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	double distance2;
-	spectrum left;
+	spectrum transmittance;
 	path_direction(z, y, &distance2);
 	if (!(distance2 > 0))
 		return;
 	bool open = path_is_visible(c, z, y);
-	bool through = path_trace_passed(c, t > 1 ? z - 1 : NULL, z, y, &left);
+	bool through = path_trace_passed(c, t > 1 ? z - 1 : NULL, z, y, &transmittance);
 	if (open)
 		assert_false(through);
 	*(open ? &sum->open : through ? &sum->passed : &sum->blocked) += 1;
@@ -39,7 +39,7 @@ static void connect_to(struct path_context *c, unsigned t, const struct path_ver
 }
 
 /* The ends lie on masks and thin glass, flat, round or made of several faces, that emit or reflect light. */
-static void test_far_end(void **state)
+static void connections_do_not_pass_the_surface_of_the_far_end(void **state)
 {
 	(void)state;
 	uint64_t counters[BATCH_COUNTERS] = {0};
@@ -74,10 +74,10 @@ static void test_far_end(void **state)
 		for (unsigned t = 2; t <= camera; t++) {
 			if (c.camera[t - 1].kind != VERTEX_SURFACE || !path_scatters_smoothly(&c.camera[t - 1]))
 				continue;
-			if (path_draw_next_event(&c, &c.camera[t - 1], &y, &pdf))
-				connect_to(&c, t, &y, &sum);
+			if (path_sample_next_event(&c, &c.camera[t - 1], &y, &pdf))
+				count_connection(&c, t, &y, &sum);
 			for (unsigned k = 2; k <= light; k++)
-				connect_to(&c, t, &c.light[k - 1], &sum);
+				count_connection(&c, t, &c.light[k - 1], &sum);
 		}
 	}
 	print_message("%u connections are open, %u pass surfaces, %u are blocked\n", sum.open, sum.passed, sum.blocked);
@@ -87,6 +87,6 @@ static void test_far_end(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_far_end)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(connections_do_not_pass_the_surface_of_the_far_end)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -59,25 +59,25 @@ static struct path_vertex vertex_beside(const struct path_vertex *v, vec3 d)
 	return to;
 }
 
-static bool right_side(const struct path_vertex *v, vec3 w)
+static bool is_on_front_side(const struct path_vertex *v, vec3 w)
 {
 	return vec3_dot(v->x.ng, w) * vec3_dot(v->x.sh.n, w) > 0;
 }
 
 /* f: scattering towards o of light from i; to_light: density of i seen from o; to_camera: density of o seen from i. */
-struct seen {
+struct scattering_values {
 	double f, to_light, to_camera;
 };
 
-static struct seen scattering_seen(const struct world *w, const struct path_vertex *v, vec3 o, vec3 i)
+static struct scattering_values scattering_at(const struct world *w, const struct path_vertex *v, vec3 o, vec3 i)
 {
 	static struct path_context c;
 	c.w = w;
 	c.wl = (struct wavelengths){.nm = {450, 500, 550, 600}};
 	const struct path_vertex camera = vertex_beside(v, o), light = vertex_beside(v, i);
-	return (struct seen){spectrum_mean(path_scatter(&c, v, o, i)),
-			     path_pdf(&c, &camera, v, &light, TRANSPORT_RADIANCE),
-			     path_pdf(&c, &light, v, &camera, TRANSPORT_IMPORTANCE)};
+	return (struct scattering_values){spectrum_mean(path_scatter(&c, v, o, i)),
+					  path_pdf(&c, &camera, v, &light, TRANSPORT_RADIANCE),
+					  path_pdf(&c, &light, v, &camera, TRANSPORT_IMPORTANCE)};
 }
 
 static void assert_same(double got, double expected)
@@ -99,9 +99,9 @@ static void check(const char *shape, const char *inner, bool turns)
 		rng_uniform4(stats_seed(__func__), RNG_TEST, k, 0, 0, u);
 		vec3 o = sphere_from_square(u), i = sphere_from_square(u + 2);
 		struct path_vertex v = vertex_on(w, k), p = vertex_on(plain, k), q = vertex_on(other, k);
-		bool away = !right_side(&p, o) && right_side(&q, o);
-		struct seen got = scattering_seen(w, &v, o, i), as_it_is = scattering_seen(plain, &p, o, i),
-			    turned = scattering_seen(other, &q, o, i);
+		bool away = !is_on_front_side(&p, o) && is_on_front_side(&q, o);
+		struct scattering_values got = scattering_at(w, &v, o, i), as_it_is = scattering_at(plain, &p, o, i),
+					 turned = scattering_at(other, &q, o, i);
 		struct surface_point room;
 		assert_true((path_point_facing_camera(&v, o, &room) == &room) == (away && turns));
 		if (!(away && turns)) {
@@ -121,7 +121,7 @@ static void check(const char *shape, const char *inner, bool turns)
 	world_free(other);
 }
 
-static void test_turned(void **state)
+static void normals_away_from_the_camera_scatter_like_mirrored_maps(void **state)
 {
 	(void)state;
 	static const char *const shapes[] = {"sphere", "rectangle", "obj"};
@@ -134,7 +134,7 @@ static void test_turned(void **state)
 }
 
 /* Files of version 0.6 turn normals only if they say so. */
-static void test_dialects(void **state)
+static void version_0_6_turns_normals_only_on_request(void **state)
 {
 	(void)state;
 	static const char inside[] =
@@ -177,7 +177,7 @@ static const char room[] =
 	"<translate x='-0.5' y='2.5'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter></shape>";
 /* clang-format on */
 
-static void test_integrators_agree(void **state)
+static void integrators_agree_on_turned_normals(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(32, 32, "%s", room);
@@ -190,7 +190,8 @@ static void test_integrators_agree(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_turned), cmocka_unit_test(test_dialects),
-					   cmocka_unit_test(test_integrators_agree)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(normals_away_from_the_camera_scatter_like_mirrored_maps),
+					   cmocka_unit_test(version_0_6_turns_normals_only_on_request),
+					   cmocka_unit_test(integrators_agree_on_turned_normals)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

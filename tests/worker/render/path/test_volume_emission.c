@@ -34,7 +34,7 @@ static double sum3(const double v[3])
 }
 
 /* Cells that have the same value in every sample have no variance to test with. */
-static void forgive_rounding(struct agreement_image *image, double expected)
+static void ignore_rounding_variance(struct agreement_image *image, double expected)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
 		for (int c = 0; c <= AGREEMENT_CELLS; c++)
@@ -42,45 +42,46 @@ static void forgive_rounding(struct agreement_image *image, double expected)
 				image->mean[g][c] = expected;
 }
 
-/* spp: samples per pixel; all: run also the integrators that build on `path` and bdpt. Long runs are for FULL=1 and
- * then half as many samples longer: bdpt from LONGER samples on, these other integrators from LONG on. */
+/* spp: samples per pixel; with_derived_integrators: run also the integrators that build on `path` and bdpt. Long runs
+ * are for FULL=1 and then half as many samples longer: bdpt from LONGER samples on, these other integrators from LONG
+ * on. */
 struct effort {
 	uint64_t spp;
-	bool all;
+	bool with_derived_integrators;
 };
 
 enum { LONG = 1000, LONGER = 5000 };
 
-static uint64_t spp_of(size_t i, struct effort e)
+static uint64_t spp_of_integrator(size_t i, struct effort e)
 {
-	static const uint64_t most[INTEGRATORS] = {UINT64_MAX, LONGER, LONG, LONG, LONG};
-	if (i >= 2 && !e.all)
+	static const uint64_t max_spp[INTEGRATORS] = {UINT64_MAX, LONGER, LONG, LONG, LONG};
+	if (i >= 2 && !e.with_derived_integrators)
 		return 0;
-	return e.spp < most[i] ? e.spp : test_is_full() ? 3 * e.spp / 2 : 0;
+	return e.spp < max_spp[i] ? e.spp : test_is_full() ? 3 * e.spp / 2 : 0;
 }
 
-/* Expects X + Y + Z = `sum` in every block of the image, from paths of at least `least` edges. Takes ownership of the
- * world. */
-static void expect_sum(const char *name, struct world *w, uint32_t least, double sum, struct effort e)
+/* Expects X + Y + Z = `sum` in every block of the image, from paths of at least `min_edges` edges. Takes ownership of
+ * the world. */
+static void assert_block_sums(const char *name, struct world *w, uint32_t min_edges, double sum, struct effort e)
 {
 	static struct agreement_image image;
 	for (size_t i = 0; i < INTEGRATORS; i++) {
 		char test[96];
-		const struct agreement_options side = {integrators[i], spp_of(i, e), GROUPS, least, 0};
+		const struct agreement_options side = {integrators[i], spp_of_integrator(i, e), GROUPS, min_edges, 0};
 		if (!side.spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
 		agreement_render(w, test, integrators[i], &side, &image);
-		forgive_rounding(&image, sum);
+		ignore_rounding_variance(&image, sum);
 		agreement_check_constant(test, &image, sum);
 	}
 	world_free(w);
 }
 
-static void expect(const char *name, struct world *w, double radiance, struct effort e)
+static void assert_radiance(const char *name, struct world *w, double radiance, struct effort e)
 {
 	assert_false(w->effects.colour);
-	expect_sum(name, w, 0, radiance * sum3(w->grey_xyz), e);
+	assert_block_sums(name, w, 0, radiance * sum3(w->grey_xyz), e);
 }
 
 #define DEPTH(k)                                                         \
@@ -104,40 +105,43 @@ static void expect(const char *name, struct world *w, double radiance, struct ef
 
 /* Seen from above: the emission of a layer of thickness 2, and the remaining light of the sky behind it. Lengths are
  * in units of the scene; the medium's scale applies to its coefficients only. */
-static void test_layer(void **state)
+static void emitting_layer_has_its_closed_form(void **state)
 {
 	(void)state;
 	const struct effort e = {16, false};
-	double left = exp(-0.6 * 2);
-	expect("absorbing layer",
-	       world_from_text(
-		       SIDE, SIDE,
-		       DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(
-			       "<medium type='homogeneous' name='interior'><float name='sigma_t' value='0.3'/>"
-			       "<float name='albedo' value='0'/><float name='scale' value='2'/></medium>" NULL_FACES
-				       SHINES("0.4"))),
-	       0.4 / 0.6 * (1 - left) + 0.7 * left, e);
-	expect("clear layer",
-	       world_from_text(SIDE, SIDE,
-			       DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
-	       0.4 * 2 + 0.7, e);
-	expect("clear layer and nothing else",
-	       world_from_text(SIDE, SIDE,
-			       DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
-	       0.4 * 2, e);
+	double transmittance = exp(-0.6 * 2);
+	assert_radiance(
+		"absorbing layer",
+		world_from_text(
+			SIDE, SIDE,
+			DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(
+				"<medium type='homogeneous' name='interior'><float name='sigma_t' value='0.3'/>"
+				"<float name='albedo' value='0'/><float name='scale' value='2'/></medium>" NULL_FACES
+					SHINES("0.4"))),
+		0.4 / 0.6 * (1 - transmittance) + 0.7 * transmittance, e);
+	assert_radiance("clear layer",
+			world_from_text(SIDE, SIDE,
+					DEPTH("1") FROM_ABOVE("1", "")
+						SKY LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
+			0.4 * 2 + 0.7, e);
+	assert_radiance("clear layer and nothing else",
+			world_from_text(SIDE, SIDE,
+					DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
+			0.4 * 2, e);
 	/* The camera's near plane lies in the middle of the layer. */
-	left = exp(-1);
-	expect("inside of a layer",
-	       world_from_text(SIDE, SIDE,
-			       DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
-				       SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
-	       0.4 * (1 - left) + 0.7 * left, e);
+	transmittance = exp(-1);
+	assert_radiance("inside of a layer",
+			world_from_text(SIDE, SIDE,
+					DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
+						SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
+			0.4 * (1 - transmittance) + 0.7 * transmittance, e);
 	/* One edge: the unscattered part of the light of a layer that scatters. */
-	left = exp(-2 * 1.5);
-	expect("one edge in a layer that scatters",
-	       world_from_text(SIDE, SIDE,
-			       DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
-	       0.4 / 1.5 * (1 - left), (struct effort){1024, true});
+	transmittance = exp(-2 * 1.5);
+	assert_radiance("one edge in a layer that scatters",
+			world_from_text(SIDE, SIDE,
+					DEPTH("1") FROM_ABOVE("1", "")
+						LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
+			0.4 / 1.5 * (1 - transmittance), (struct effort){1024, true});
 	/* A layer that does not scatter contributes nothing to paths of two edges or more. */
 	struct world *w = world_from_text(
 		SIDE, SIDE, DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4")));
@@ -179,7 +183,7 @@ static void test_layer(void **state)
 #define GLASS(type, more) \
 	"<bsdf type='" type "'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/>" more "</bsdf>"
 
-static void test_furnace(void **state)
+static void furnace_of_emitting_fog_is_uniform(void **state)
 {
 	(void)state;
 	static const struct {
@@ -196,15 +200,16 @@ static void test_furnace(void **state)
 		 {4096, false}},
 	};
 	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
-		expect(balls[i].name, world_from_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL("%s"), balls[i].inner), 0.7,
-		       balls[i].e);
-	expect("room in fog", world_from_text(SIDE, SIDE, ROOM FOG_BALL SMOKE_CUBE GLASS_BALL), 0.7,
-	       (struct effort){5760, false});
+		assert_radiance(balls[i].name,
+				world_from_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL("%s"), balls[i].inner), 0.7,
+				balls[i].e);
+	assert_radiance("room in fog", world_from_text(SIDE, SIDE, ROOM FOG_BALL SMOKE_CUBE GLASS_BALL), 0.7,
+			(struct effort){5760, false});
 }
 
 /* Chains that spread the fog's light over many pixels cannot resolve half a percent per block in a test, but they can
  * resolve their total. */
-static void test_chains(void **state)
+static void chains_find_the_total_emission(void **state)
 {
 	(void)state;
 	static struct agreement_image chains, sky;
@@ -222,7 +227,7 @@ static void test_chains(void **state)
 /* ---- grids ---- */
 
 /* Linear between grid points, and 0 in most of one half of the box. */
-static double cloud(double x, double y, double z, uint32_t channel)
+static double cloud_density(double x, double y, double z, uint32_t channel)
 {
 	return (x < 0.5 ? 0 : 2 + 3 * y) + (z > 0.9 ? 4 : 0) + 0.3 * channel * (y + z);
 }
@@ -232,7 +237,7 @@ static double cloud(double x, double y, double z, uint32_t channel)
 	"name='to_world'><translate x='-.5' y='-.5' z='-.5'/><scale value='2'/></transform></volume>"
 #define CUBE(inner) "<shape type='cube'>" inner "</shape>"
 
-static struct world *in_files(const char *xml, const struct vol *extinction, const struct vol *light)
+static struct world *world_with_grids(const char *xml, const struct vol *extinction, const struct vol *light)
 {
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)},
 					    {"t.vol", extinction->bytes, extinction->size},
@@ -245,8 +250,8 @@ static struct world *in_files(const char *xml, const struct vol *extinction, con
 static void make_cloud(struct vol *extinction, struct vol *light, uint32_t channels, double factor)
 {
 	const uint32_t side[3] = {5, 4, 6};
-	vol_make(extinction, side, channels, cloud);
-	vol_make(light, side, channels, cloud);
+	vol_make(extinction, side, channels, cloud_density);
+	vol_make(light, side, channels, cloud_density);
 	for (uint32_t i = 0; i < side[0] * side[1] * side[2] * channels; i++)
 		light->value[i] *= (float)factor;
 	vol_write(light);
@@ -257,7 +262,7 @@ static void make_cloud(struct vol *extinction, struct vol *light, uint32_t chann
 		"sigma_t", "t.vol") "<spectrum name='albedo' value='" albedo "'/></medium>" NULL_FACES
 #define GRID_GLOW "<emitter type='volumelight'>" GRID("radiance", "l.vol") "</emitter>"
 
-static void test_grid_furnace(void **state)
+static void furnace_of_an_emitting_grid_is_uniform(void **state)
 {
 	(void)state;
 	static struct vol extinction, light;
@@ -266,26 +271,27 @@ static void test_grid_furnace(void **state)
 			  fog[] = "<scene version='3.0.0'>" DEPTH("128")
 				  VIEW SKY CUBE(CLOUD("0.5") GRID_GLOW) "</scene>";
 	make_cloud(&extinction, &light, 1, 0.7);
-	expect("smoke on a grid", in_files(turned, &extinction, &light), 0.7, (struct effort){2048, false});
+	assert_radiance("smoke on a grid", world_with_grids(turned, &extinction, &light), 0.7,
+			(struct effort){2048, false});
 	make_cloud(&extinction, &light, 1, 0.35);
-	expect("fog on a grid", in_files(fog, &extinction, &light), 0.7, (struct effort){2048, false});
+	assert_radiance("fog on a grid", world_with_grids(fog, &extinction, &light), 0.7, (struct effort){2048, false});
 }
 
 /* Grids of emission in a homogeneous medium, and grids of extinction with constant emission; and positions beyond a
  * grid's box. */
-static double ramp(double x, double y, double z, uint32_t channel)
+static double ramp_value(double x, double y, double z, uint32_t channel)
 {
 	(void)x;
 	(void)y;
 	return (1 + 2 * z) * (channel + 1);
 }
 
-static void test_grid_layer(void **state)
+static void emitting_grid_has_its_closed_form(void **state)
 {
 	(void)state;
 	static struct vol box, light;
-	vol_make(&box, (const uint32_t[3]){1, 1, 1}, 1, ramp);
-	vol_make(&light, (const uint32_t[3]){1, 1, 2}, 1, ramp);
+	vol_make(&box, (const uint32_t[3]){1, 1, 1}, 1, ramp_value);
+	vol_make(&light, (const uint32_t[3]){1, 1, 2}, 1, ramp_value);
 	/* Grid points lie at z = -0.75 (value 1) and z = -0.25 (value 3). Beyond the grid's box, which reaches from z
 	 * = -1 to 0, the emission continues with the last value, down to -2. */
 #define RAMP                                                                                                  \
@@ -293,32 +299,34 @@ static void test_grid_layer(void **state)
 	"value='l.vol'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80'/>" \
 	"</transform></volume></emitter>"
 	const struct effort e = {16, false};
-	expect("grid of light in a clear layer",
-	       in_files("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
-				LAYER(FOG("0", "0") NULL_FACES RAMP) "</scene>",
-			&box, &light),
-	       3 * 0.25 + 2 * 0.5 + 1 * 1.25, e);
+	assert_radiance("grid of light in a clear layer",
+			world_with_grids("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
+						 LAYER(FOG("0", "0") NULL_FACES RAMP) "</scene>",
+					 &box, &light),
+			3 * 0.25 + 2 * 0.5 + 1 * 1.25, e);
 	double sum = 0;
 	enum { STEPS = 4000 };
 	for (int i = 0; i < STEPS; i++) {
 		double z = (i + 0.5) * 2 / STEPS;
 		sum += exp(-1.5 * z) * fmin(fmax(3 - (z - 0.25) * 4, 1), 3) * 2 / STEPS;
 	}
-	expect("grid of light in a layer",
-	       in_files("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
-				LAYER(FOG("1.5", "0") NULL_FACES RAMP) "</scene>",
-			&box, &light),
-	       sum, (struct effort){512, false});
+	assert_radiance("grid of light in a layer",
+			world_with_grids("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
+						 LAYER(FOG("1.5", "0") NULL_FACES RAMP) "</scene>",
+					 &box, &light),
+			sum, (struct effort){512, false});
 	/* The medium's own box is half of the layer. */
-	expect("light in a box",
-	       in_files(
-		       "<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "") LAYER(
-			       "<medium type='heterogeneous' name='interior'><volume name='sigma_t' type='constvolume'>"
-			       "<float name='value' value='0'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1.5'/>"
-			       "<scale x='80' y='80'/></transform></volume><volume name='sigma_n' type='constvolume'>"
-			       "<float name='value' value='1'/></volume></medium>" NULL_FACES SHINES("0.4")) "</scene>",
-		       &box, &light),
-	       0.4, e);
+	assert_radiance(
+		"light in a box",
+		world_with_grids(
+			"<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "") LAYER(
+				"<medium type='heterogeneous' name='interior'><volume name='sigma_t' type='constvolume'>"
+				"<float name='value' value='0'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1.5'/>"
+				"<scale x='80' y='80'/></transform></volume><volume name='sigma_n' type='constvolume'>"
+				"<float name='value' value='1'/></volume></medium>" NULL_FACES SHINES(
+					"0.4")) "</scene>",
+			&box, &light),
+		0.4, e);
 }
 
 /* ---- colours ---- */
@@ -326,7 +334,7 @@ static void test_grid_layer(void **state)
 #define WHITE "<emitter type='constant'><spectrum name='radiance' value='%s'/></emitter>"
 
 /* Expects the image of the sky alone. */
-static void expect_unseen(const char *name, struct world *w, struct world *sky, struct effort e)
+static void assert_image_of_sky_alone(const char *name, struct world *w, struct world *sky, struct effort e)
 {
 	static struct agreement_image image, of_sky;
 	const struct agreement_options alone = {"path", 4096, GROUPS, 0, 0};
@@ -334,7 +342,7 @@ static void expect_unseen(const char *name, struct world *w, struct world *sky, 
 	agreement_render(sky, name, "sky", &alone, &of_sky);
 	for (size_t i = 0; i < INTEGRATORS; i++) {
 		char test[96];
-		const struct agreement_options side = {integrators[i], spp_of(i, e), GROUPS, 0, 0};
+		const struct agreement_options side = {integrators[i], spp_of_integrator(i, e), GROUPS, 0, 0};
 		if (!side.spp)
 			continue;
 		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
@@ -354,7 +362,7 @@ static void expect_unseen(const char *name, struct world *w, struct world *sky, 
 #define HALF_RISING "360:0.5,595:1,830:2"
 #define FLAT "360:1,595:1.000001,830:1"
 
-static void test_colours(void **state)
+static void emission_that_balances_absorption_is_unseen_in_colour(void **state)
 {
 	(void)state;
 	static const struct {
@@ -365,9 +373,10 @@ static void test_colours(void **state)
 		{"coloured fog", NULL_FACES COLOURED("0.5", HALF_RISING), {2432, false}},
 	};
 	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
-		expect_unseen(balls[i].name,
-			      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
-			      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
+		assert_image_of_sky_alone(
+			balls[i].name,
+			world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
+			world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
 	/* In dispersive glass: half of sigma_t times the squared index at each wavelength. */
 	char light_in_glass[4096], *to = light_in_glass;
 	for (int nm = 360; nm <= 830; nm += 5) {
@@ -376,10 +385,11 @@ static void test_colours(void **state)
 		to += sprintf(to, "%s%d:%.9g", nm == 360 ? "" : ",", nm, 0.5 * sigma_t * index * index);
 	}
 #define PRISM GLASS("dielectric", "<float name='int_cauchy_b' value='0.02'/>")
-	expect_unseen("coloured fog in glass that disperses",
-		      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT,
-				      light_in_glass),
-		      world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), (struct effort){16384, false});
+	assert_image_of_sky_alone("coloured fog in glass that disperses",
+				  world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")),
+						  FLAT, light_in_glass),
+				  world_from_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT),
+				  (struct effort){16384, false});
 	/* R, G and B on a grid. */
 	static struct vol extinction, light;
 	static const char fog[] = "<scene version='3.0.0'>" DEPTH("64") VIEW
@@ -389,8 +399,8 @@ static void test_colours(void **state)
 			  "<emitter type='constant'><rgb name='radiance' value='0.7,0.7,0.70001'/></emitter></scene>";
 	make_cloud(&extinction, &light, 3, 0.35);
 	worlds_accuracy = "colour=rgb";
-	expect_unseen("fog on a grid of R, G and B", in_files(fog, &extinction, &light),
-		      in_files(sky, &extinction, &light), (struct effort){2240, false});
+	assert_image_of_sky_alone("fog on a grid of R, G and B", world_with_grids(fog, &extinction, &light),
+				  world_with_grids(sky, &extinction, &light), (struct effort){2240, false});
 	worlds_accuracy = NULL;
 }
 
@@ -415,7 +425,7 @@ static double random_walk(struct dice *d, double y, double sigma, double albedo)
 	}
 }
 
-static void test_ball(void **state)
+static void emitting_ball_agrees_with_a_random_walk(void **state)
 {
 	(void)state;
 	enum { WALKS = 1 << 21 };
@@ -448,7 +458,7 @@ static void test_ball(void **state)
 
 /* ---- descriptions ---- */
 
-static void test_refused(void **state)
+static void invalid_volume_lights_are_refused(void **state)
 {
 	(void)state;
 	world_check_refused("<emitter type='volumelight'/>", "\"volumelight\" must be inside a shape");
@@ -467,7 +477,7 @@ static void test_refused(void **state)
 }
 
 /* Two shapes with one medium refer to the same emitter, and so does the medium around the camera. */
-static void test_shared(void **state)
+static void shapes_with_one_medium_share_its_emitter(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -485,7 +495,7 @@ static void test_shared(void **state)
 }
 
 /* Chains over full paths would leave the emission out. */
-static void test_integrators_that_miss_it(void **state)
+static void integrators_that_miss_volume_emission_are_refused(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES SHINES("1")));
@@ -511,7 +521,7 @@ static void test_integrators_that_miss_it(void **state)
 }
 
 /* After a vertex that disperses, one wavelength travels on and stands for all four. */
-static void test_dispersed(void **state)
+static void volume_emission_after_dispersion_has_one_wavelength(void **state)
 {
 	(void)state;
 	static struct path_context c;
@@ -540,12 +550,17 @@ static void test_dispersed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_layer),	   cmocka_unit_test(test_furnace),
-		cmocka_unit_test(test_chains),	   cmocka_unit_test(test_grid_furnace),
-		cmocka_unit_test(test_grid_layer), cmocka_unit_test(test_colours),
-		cmocka_unit_test(test_ball),	   cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_shared),	   cmocka_unit_test(test_integrators_that_miss_it),
-		cmocka_unit_test(test_dispersed),
+		cmocka_unit_test(emitting_layer_has_its_closed_form),
+		cmocka_unit_test(furnace_of_emitting_fog_is_uniform),
+		cmocka_unit_test(chains_find_the_total_emission),
+		cmocka_unit_test(furnace_of_an_emitting_grid_is_uniform),
+		cmocka_unit_test(emitting_grid_has_its_closed_form),
+		cmocka_unit_test(emission_that_balances_absorption_is_unseen_in_colour),
+		cmocka_unit_test(emitting_ball_agrees_with_a_random_walk),
+		cmocka_unit_test(invalid_volume_lights_are_refused),
+		cmocka_unit_test(shapes_with_one_medium_share_its_emitter),
+		cmocka_unit_test(integrators_that_miss_volume_emission_are_refused),
+		cmocka_unit_test(volume_emission_after_dispersion_has_one_wavelength),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,7 +21,7 @@ static int read_xml(struct scene *s, const char *xml, bool lenient, struct error
 		       : scene_read(s, &assets, "s.xml", scene_tables(), NULL, 0, e);
 }
 
-static struct scene read_ok(const char *xml)
+static struct scene read_valid(const char *xml)
 {
 	struct scene s;
 	struct error e;
@@ -30,7 +30,7 @@ static struct scene read_ok(const char *xml)
 	return s;
 }
 
-static void refuses(const char *xml, const char *sentence)
+static void expect_refused(const char *xml, const char *sentence)
 {
 	struct scene s;
 	struct error e;
@@ -41,7 +41,7 @@ static void refuses(const char *xml, const char *sentence)
 
 /* An animation without motion becomes a transform; unsupported motion is reduced to its first transform with
  * `lenient`. */
-static void test_animations(void **state)
+static void test_animation_becomes_motion_or_transform(void **state)
 {
 	(void)state;
 #define SPHERE(x) "<scene version='3.0.0'><shape type='sphere'>" x "</shape></scene>"
@@ -54,15 +54,15 @@ static void test_animations(void **state)
 			"0", "3") "</animation></shape></scene>",
 	};
 	for (size_t i = 0; i < sizeof still / sizeof *still; i++) {
-		struct scene s = read_ok(still[i]);
+		struct scene s = read_valid(still[i]);
 		mat4 m = node_transform(s.objects[0], "to_world");
 		assert_true(m.m[0][3] == 3 && s.note_count == 0);
 		scene_fini(&s);
 	}
-#define TWO(x) "<animation name='animation'>" AT("-0.5", "4") AT("1", x) "</animation>"
-	struct scene s =
-		read_ok("<scene version='3.0.0'><shape type='sphere'>" TWO("5") "</shape><shape type='sphere'>" TWO(
-			"6") "</shape><shape type='sphere'>" TWO("5") "</shape></scene>");
+#define MOVING_BETWEEN(x) "<animation name='animation'>" AT("-0.5", "4") AT("1", x) "</animation>"
+	struct scene s = read_valid(
+		"<scene version='3.0.0'><shape type='sphere'>" MOVING_BETWEEN("5") "</shape><shape type='sphere'>" MOVING_BETWEEN(
+			"6") "</shape><shape type='sphere'>" MOVING_BETWEEN("5") "</shape></scene>");
 	const struct animation *a = node_animation(s.objects[0]);
 	mat4 m = node_transform(s.objects[0], "to_world");
 	assert_true(m.m[0][3] == 4 && s.note_count == 0);
@@ -74,8 +74,9 @@ static void test_animations(void **state)
 	scene_fini(&s);
 
 	struct error e;
-	static const char grouped[] = "<scene version='3.0.0'><shape type='shapegroup'><shape type='sphere'>" TWO(
-		"5") "</shape></shape></scene>";
+	static const char grouped[] =
+		"<scene version='3.0.0'><shape type='shapegroup'><shape type='sphere'>" MOVING_BETWEEN(
+			"5") "</shape></shape></scene>";
 	assert_int_equal(read_xml(&s, grouped, false, &e), -ENOTSUP);
 	assert_int_equal(read_xml(&s, grouped, true, &e), 0);
 	m = node_transform(s.objects[0]->children[0], "to_world");
@@ -90,40 +91,44 @@ static void test_animations(void **state)
 /* A shape that moves from its position at time 0. */
 #define MOVING(type, later, inside) \
 	"<shape type='" type "'><animation name='to_world'><transform time='0'/>" later "</animation>" inside "</shape>"
-#define LATER(time, scale) "<transform time='" time "'><scale value='" scale "'/></transform>"
+#define TRANSFORM_AT(time, scale) "<transform time='" time "'><scale value='" scale "'/></transform>"
 
-static void test_refused(void **state)
+static void test_invalid_animations_are_refused(void **state)
 {
 	(void)state;
-	refuses(S "<shape type='sphere'><animation name='toWorld'/></shape>" END, "holds no transform");
-	refuses(S "<shape type='sphere'><animation name='toWorld'><scale value='2'/></animation></shape>" END,
-		"has no place in <animation>");
-	refuses(S "<shape type='shapegroup'>" MOVING("cube", LATER("1", "2"), "") "</shape>" END,
+	expect_refused(S "<shape type='sphere'><animation name='toWorld'/></shape>" END, "holds no transform");
+	expect_refused(S "<shape type='sphere'><animation name='toWorld'><scale value='2'/></animation></shape>" END,
+		       "has no place in <animation>");
+	expect_refused(
+		S "<shape type='shapegroup'>" MOVING("cube", TRANSFORM_AT("1", "2"), "") "</shape>" END,
 		"motion of a shape in a shapegroup is not supported (line 1); --lenient keeps the first transform");
-	refuses(S MOVING("cube", "<transform/>", "") END, "<transform>: needs a time, a (finite) number");
-	refuses(S MOVING("cube", "<transform time='soon'/>", "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("nan", "2"), "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("inf", "2"), "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("1e31", "2"), "") END, "time=1e+31 is outside [-1e+30, 1e+30]");
-	refuses(S MOVING("cube", LATER("0", "2"), "") END, "time=0 is not after the time of the transform before, 0");
-	refuses(S MOVING("cube", LATER("2", "2") LATER("1", "3"), "") END,
-		"time=1 is not after the time of the transform before, 2");
-	refuses(S MOVING("cube", LATER("1", "0"), "") END, "flattens the object (it has no inverse)");
-	refuses(S MOVING("cube", LATER("1", "1e-61"), "") END, "makes the object too small");
-	refuses(S MOVING("cube", "<transform time='1'><scale x='1e-300' y='1e-300'/></transform>", "") END,
-		"more than 1e+12 times as far in one direction");
-	refuses(S MOVING("cube", "<transform time='1'><scale x='1e13'/></transform>", "") END,
-		"more than 1e+12 times as far in one direction");
-	refuses(S MOVING("cube", LATER("1", "-1"), "") END,
-		"either this transform or the one before mirrors the object, but not both");
-	refuses(S MOVING("cube", LATER("1", "2") "<scale value='2'/>", "") END, "has no place in <animation>");
-	refuses(S MOVING("cube", "<transform time='1' tiem='2'/>", "") END, "has no attribute `tiem`");
-	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,
-		"has no attribute `tiem`");
+	expect_refused(S MOVING("cube", "<transform/>", "") END, "<transform>: needs a time, a (finite) number");
+	expect_refused(S MOVING("cube", "<transform time='soon'/>", "") END, "needs a time, a (finite) number");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("nan", "2"), "") END, "needs a time, a (finite) number");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("inf", "2"), "") END, "needs a time, a (finite) number");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("1e31", "2"), "") END, "time=1e+31 is outside [-1e+30, 1e+30]");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("0", "2"), "") END,
+		       "time=0 is not after the time of the transform before, 0");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("2", "2") TRANSFORM_AT("1", "3"), "") END,
+		       "time=1 is not after the time of the transform before, 2");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("1", "0"), "") END, "flattens the object (it has no inverse)");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("1", "1e-61"), "") END, "makes the object too small");
+	expect_refused(S MOVING("cube", "<transform time='1'><scale x='1e-300' y='1e-300'/></transform>", "") END,
+		       "more than 1e+12 times as far in one direction");
+	expect_refused(S MOVING("cube", "<transform time='1'><scale x='1e13'/></transform>", "") END,
+		       "more than 1e+12 times as far in one direction");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("1", "-1"), "") END,
+		       "either this transform or the one before mirrors the object, but not both");
+	expect_refused(S MOVING("cube", TRANSFORM_AT("1", "2") "<scale value='2'/>", "") END,
+		       "has no place in <animation>");
+	expect_refused(S MOVING("cube", "<transform time='1' tiem='2'/>", "") END, "has no attribute `tiem`");
+	expect_refused(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,
+		       "has no attribute `tiem`");
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_animations), cmocka_unit_test(test_refused)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_animation_becomes_motion_or_transform),
+					   cmocka_unit_test(test_invalid_animations_are_refused)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

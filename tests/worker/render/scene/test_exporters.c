@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-static void test_are_read(void **state)
+static void test_exported_scenes_are_read(void **state)
 {
 	(void)state;
 	static const char *const scenes[] = {"blender-0.5.xml", "blender-3.xml", "rhino.xml", "maya.xml"};
@@ -36,7 +36,7 @@ static void test_are_read(void **state)
 
 /* Attributes of <scene> besides the version: those that Mitsuba allows and those that XML editors add, also in
  * included files. */
-static void test_roots(void **state)
+static void test_extra_attributes_of_the_root_are_accepted(void **state)
 {
 	(void)state;
 	static const char *const roots[] = {
@@ -64,7 +64,7 @@ static void test_roots(void **state)
 }
 
 /* Malformed XML that Mitsuba 3's reader accepts; a stray letter gets a note. */
-static void test_loose_xml(void **state)
+static void test_malformed_xml_of_exporters_is_accepted(void **state)
 {
 	(void)state;
 	static const struct {
@@ -97,7 +97,7 @@ static void test_loose_xml(void **state)
 }
 
 /* The note about several root elements names the file, which may be an included one, once. */
-static void test_more_than_one_element(void **state)
+static void test_several_root_elements_are_noted_once(void **state)
 {
 	(void)state;
 	static const char outer[] =
@@ -119,8 +119,9 @@ static void test_more_than_one_element(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read), cmocka_unit_test(test_roots),
-					   cmocka_unit_test(test_loose_xml),
-					   cmocka_unit_test(test_more_than_one_element)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_exported_scenes_are_read),
+					   cmocka_unit_test(test_extra_attributes_of_the_root_are_accepted),
+					   cmocka_unit_test(test_malformed_xml_of_exporters_is_accepted),
+					   cmocka_unit_test(test_several_root_elements_are_noted_once)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

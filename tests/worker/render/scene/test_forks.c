@@ -23,7 +23,7 @@ static int read_scene(const char *body, struct scene *s, struct error *e)
 }
 
 /* Parameters of forks in objects of all classes, and directly in <scene>. */
-static void test_ignored_everywhere(void **state)
+static void test_parameters_of_forks_are_ignored(void **state)
 {
 	(void)state;
 #define GUIDED "<boolean name='use_path_guiding' value='true'/>"
@@ -55,7 +55,7 @@ static void test_ignored_everywhere(void **state)
 
 /* Mistakes: a name that resembles a parameter of this plug-in or of another one; and objects, which affect the image.
  */
-static void test_mistakes(void **state)
+static void test_mistyped_parameters_and_objects_are_refused(void **state)
 {
 	(void)state;
 	static const char *const mistakes[][2] = {
@@ -84,8 +84,8 @@ static void test_mistakes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ignored_everywhere),
-		cmocka_unit_test(test_mistakes),
+		cmocka_unit_test(test_parameters_of_forks_are_ignored),
+		cmocka_unit_test(test_mistyped_parameters_and_objects_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

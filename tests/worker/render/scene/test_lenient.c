@@ -17,13 +17,13 @@
 
 #include <cmocka.h>
 
-static void test_stand_ins(void **state)
+static void test_each_unsupported_plugin_has_its_stand_in(void **state)
 {
 	(void)state;
 	static const struct {
 		enum plugin_class cls;
 		const char *type;
-		enum lenient_action way;
+		enum lenient_action action;
 		const char *stand_in;
 	} expected[] = {
 		{PLUGIN_BSDF, "irawan", LENIENT_INNER, "diffuse"},
@@ -44,7 +44,8 @@ static void test_stand_ins(void **state)
 	};
 	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
 		const char *stand_in;
-		assert_int_equal(lenient_plugin_action(expected[i].cls, expected[i].type, &stand_in), expected[i].way);
+		assert_int_equal(lenient_plugin_action(expected[i].cls, expected[i].type, &stand_in),
+				 expected[i].action);
 		if (!expected[i].stand_in) {
 			assert_null(stand_in);
 			continue;
@@ -58,7 +59,7 @@ static void test_stand_ins(void **state)
 	}
 }
 
-static void test_colours_are_kept(void **state)
+static void test_parameters_are_renamed_for_the_stand_in(void **state)
 {
 	(void)state;
 	assert_string_equal(lenient_param_name("diffuse", "base_color"), "reflectance");
@@ -81,7 +82,7 @@ static struct scene read_leniently(const char *xml)
 }
 
 /* OpenPBR's weights become the parameters of `principled` with the same meaning; others are dropped. */
-static void test_openpbr(void **state)
+static void test_openpbr_weights_become_those_of_principled(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -109,7 +110,7 @@ static void test_openpbr(void **state)
 
 /* The stand-in follows from the element: the format of a shape's file, the camera in a sensor's name, a material's
  * parameters. */
-static void test_likely_stand_ins(void **state)
+static void test_stand_in_follows_from_the_element(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -159,7 +160,7 @@ static void test_likely_stand_ins(void **state)
 }
 
 /* Objects that refer to a subsurface or a field that is left out do without it. */
-static void test_absent_by_reference(void **state)
+static void test_references_to_objects_left_out_are_dropped(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='0.6.0'><emitter type='constant'/><subsurface type='dipole' id='d'/>"
@@ -176,7 +177,7 @@ static void test_absent_by_reference(void **state)
 
 /* Unsupported textures around others are replaced by the first texture inside; without one they are left out, as
  * fields are. */
-static void test_textures_around_others(void **state)
+static void test_unsupported_textures_are_replaced_by_inner_ones(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -211,7 +212,7 @@ static void test_textures_around_others(void **state)
 }
 
 /* A portal is not an emitter of the scene, and is ignored even without `lenient`. */
-static void test_portals(void **state)
+static void test_portals_are_ignored(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>\n<emitter type='portal'><transform name='to_world'>"
@@ -230,12 +231,12 @@ static void test_portals(void **state)
 
 /* Unsupported coverings of materials are removed, and supported ones are kept: in agreement with bsdf_create() for
  * the same node. */
-static void test_covers(void **state)
+static void test_unsupported_coverings_are_removed(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *text;
-		bool goes;
+		bool is_removed;
 	} covers[] = {
 		{"coating | diffuse", false},
 		{"coating | difftrans", true},
@@ -255,17 +256,17 @@ static void test_covers(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		struct error e;
-		bool goes = lenient_transmissive_inner(node_make_bsdf(&a, covers[i].text)) != NULL,
+		bool removed = lenient_transmissive_inner(node_make_bsdf(&a, covers[i].text)) != NULL,
 		     refused = bsdf_try(&a, covers[i].text, true, &b, &e) < 0;
-		if (goes != covers[i].goes || refused != covers[i].goes)
+		if (removed != covers[i].is_removed || refused != covers[i].is_removed)
 			fail_msg("%s is %ssupported and %s", covers[i].text, refused ? "not " : "",
-				 goes ? "goes" : "stays");
+				 removed ? "goes" : "stays");
 		arena_fini(&a);
 	}
 }
 
 /* A measured material whose file is missing, and one whose file is there. */
-static void test_lost_measurements(void **state)
+static void test_missing_measurements_are_replaced(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -290,7 +291,7 @@ static void test_lost_measurements(void **state)
 
 /* Textures with a missing file or an unknown plug-in: an object that is useless without its texture is removed as
  * well. */
-static void test_lost_textures(void **state)
+static void test_textures_without_files_are_left_out(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -345,7 +346,7 @@ static void test_lost_textures(void **state)
 }
 
 /* An unsupported light in a shape becomes an area light with the same radiance; elsewhere it is left out. */
-static void test_lights_in_shapes(void **state)
+static void test_unsupported_lights_of_shapes_become_area_lights(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>\n<emitter type='photon'/>\n<shape type='rectangle'>\n"
@@ -375,7 +376,7 @@ static void test_lights_in_shapes(void **state)
 
 /* A volume whose value has a wrong name has no value: the volume is left out, and the medium that needs it. In 3.x
  * the value has a default. */
-static void test_volumes_without_a_value(void **state)
+static void test_volumes_without_a_value_are_left_out(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -406,7 +407,7 @@ static void test_volumes_without_a_value(void **state)
 
 /* Names of 0.6 in a file of 3.x are read in lenient mode, in any object, and refused in strict mode. A value of an
  * unsupported plug-in may have another meaning, so one that is invalid for the stand-in is dropped. */
-static void test_names_and_values_of_others(void **state)
+static void test_names_of_the_other_dialect_are_read(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -474,7 +475,7 @@ static void test_picture_of_projector(void **state)
 
 /* A parameter or object given twice to an unsupported plug-in is no mistake; of several layers, the stand-in is not
  * the glass. */
-static void test_more_than_the_stand_in_has(void **state)
+static void test_surplus_parameters_and_objects_are_dropped(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -511,21 +512,21 @@ static void test_more_than_the_stand_in_has(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stand_ins),
-		cmocka_unit_test(test_openpbr),
-		cmocka_unit_test(test_likely_stand_ins),
-		cmocka_unit_test(test_absent_by_reference),
-		cmocka_unit_test(test_textures_around_others),
-		cmocka_unit_test(test_portals),
-		cmocka_unit_test(test_colours_are_kept),
-		cmocka_unit_test(test_covers),
-		cmocka_unit_test(test_lost_measurements),
-		cmocka_unit_test(test_lost_textures),
-		cmocka_unit_test(test_lights_in_shapes),
-		cmocka_unit_test(test_volumes_without_a_value),
-		cmocka_unit_test(test_names_and_values_of_others),
+		cmocka_unit_test(test_each_unsupported_plugin_has_its_stand_in),
+		cmocka_unit_test(test_openpbr_weights_become_those_of_principled),
+		cmocka_unit_test(test_stand_in_follows_from_the_element),
+		cmocka_unit_test(test_references_to_objects_left_out_are_dropped),
+		cmocka_unit_test(test_unsupported_textures_are_replaced_by_inner_ones),
+		cmocka_unit_test(test_portals_are_ignored),
+		cmocka_unit_test(test_parameters_are_renamed_for_the_stand_in),
+		cmocka_unit_test(test_unsupported_coverings_are_removed),
+		cmocka_unit_test(test_missing_measurements_are_replaced),
+		cmocka_unit_test(test_textures_without_files_are_left_out),
+		cmocka_unit_test(test_unsupported_lights_of_shapes_become_area_lights),
+		cmocka_unit_test(test_volumes_without_a_value_are_left_out),
+		cmocka_unit_test(test_names_of_the_other_dialect_are_read),
 		cmocka_unit_test(test_picture_of_projector),
-		cmocka_unit_test(test_more_than_the_stand_in_has),
+		cmocka_unit_test(test_surplus_parameters_and_objects_are_dropped),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,7 +17,7 @@
 
 #include <cmocka.h>
 
-enum { VARIANTS = 3000, SIZE_MAX_BYTES = 8192 };
+enum { VARIANTS = 3000, FILE_BYTES_MAX = 8192 };
 
 static size_t index_below(double u, size_t n)
 {
@@ -26,7 +26,7 @@ static size_t index_below(double u, size_t n)
 
 /* Writes a damaged copy with one to four changes: a bit flipped, a byte replaced, a range removed or repeated, the
  * end cut off. */
-static size_t damage(unsigned char *out, const unsigned char *in, size_t size, uint64_t index)
+static size_t damage_copy(unsigned char *out, const unsigned char *in, size_t size, uint64_t index)
 {
 	memcpy(out, in, size);
 	double u[4];
@@ -47,7 +47,7 @@ static size_t damage(unsigned char *out, const unsigned char *in, size_t size, u
 			size -= n;
 			break;
 		case 3:
-			if (size + n > SIZE_MAX_BYTES)
+			if (size + n > FILE_BYTES_MAX)
 				break;
 			memmove(out + at + n, out + at, size - at);
 			size += n;
@@ -73,7 +73,7 @@ static void check_geometry(const struct shape_geometry *g)
 }
 
 /* Returns the number of variants that were read as a scene with all its shapes and settings. */
-static int read_scene(const struct memory_file *files)
+static int is_read_in_full(const struct memory_file *files)
 {
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -100,7 +100,7 @@ static int read_scene(const struct memory_file *files)
 	return good;
 }
 
-static const char xml[] =
+static const char valid_scene[] =
 	"<?xml version='1.0' encoding='utf-8'?>\n<scene version='0.6.0'><default name='x' value='0.5'/><mode/>"
 	"<sensor type='perspective'><float name='fov' value='40'/><transform name='toWorld'><lookat origin='0,0,5' target='0 0 0' "
 	"up='0 1 0'/></transform><film type='ldrfilm'><integer name='width' value='64'/><rfilter type='tent'/></film></sensor>"
@@ -113,42 +113,44 @@ static const char xml[] =
 	"<shape type='sphere'><point name='center' x='1' y='0' z='0'/><emitter type='area'><rgb name='radiance' value='1 2 3'/>"
 	"</emitter></shape></scene>";
 
-static const char obj[] =
+static const char valid_mesh[] =
 	"# cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1e0\nvt 0 0\nvt 1 0\nvt 1 1 0\nvn 0 0 1\nvn 0 3 4\n"
 	"g one\nusemtl two\nf 1/1/1 2/2/1 3/3/1 4/1/1\nf -1//2 1//1 \\\n2//2\nf 1 5 4\n";
 
-static void test_scenes(void **state)
+static void test_damaged_scenes_are_read_or_refused(void **state)
 {
 	(void)state;
-	static unsigned char bytes[SIZE_MAX_BYTES];
+	static unsigned char bytes[FILE_BYTES_MAX];
 	int good = 0;
 	for (uint64_t i = 0; i < VARIANTS; i++) {
-		size_t n = damage(bytes, (const unsigned char *)xml, sizeof xml - 1, i);
-		const struct memory_file files[] = {{"s.xml", bytes, n}, {"m.obj", obj, sizeof obj - 1}, {0}};
-		good += read_scene(files);
+		size_t n = damage_copy(bytes, (const unsigned char *)valid_scene, sizeof valid_scene - 1, i);
+		const struct memory_file files[] = {
+			{"s.xml", bytes, n}, {"m.obj", valid_mesh, sizeof valid_mesh - 1}, {0}};
+		good += is_read_in_full(files);
 	}
 	assert_true(good > 0 && good < VARIANTS / 2); /* the damage is neither harmless nor always fatal */
 }
 
-static void test_meshes(void **state)
+static void test_damaged_meshes_are_read_or_refused(void **state)
 {
 	(void)state;
-	static unsigned char bytes[SIZE_MAX_BYTES];
+	static unsigned char bytes[FILE_BYTES_MAX];
 	int good = 0;
 	for (uint64_t i = 0; i < VARIANTS; i++) {
-		size_t n = damage(bytes, (const unsigned char *)obj, sizeof obj - 1, i);
-		const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"m.obj", bytes, n}, {0}};
-		good += read_scene(files);
+		size_t n = damage_copy(bytes, (const unsigned char *)valid_mesh, sizeof valid_mesh - 1, i);
+		const struct memory_file files[] = {
+			{"s.xml", valid_scene, sizeof valid_scene - 1}, {"m.obj", bytes, n}, {0}};
+		good += is_read_in_full(files);
 	}
 	assert_true(good > 0 && good < VARIANTS);
 }
 
-static void damage_image(const unsigned char *file, size_t size)
+static void read_damaged_images(const unsigned char *file, size_t size)
 {
-	static unsigned char bytes[SIZE_MAX_BYTES];
-	assert_true(size <= SIZE_MAX_BYTES);
+	static unsigned char bytes[FILE_BYTES_MAX];
+	assert_true(size <= FILE_BYTES_MAX);
 	for (uint64_t i = 0; i < VARIANTS; i++) {
-		size_t n = damage(bytes, file, size, i);
+		size_t n = damage_copy(bytes, file, size, i);
 		const struct memory_file files[] = {{"i", bytes, n}, {0}};
 		struct asset_source assets = memory_assets(files);
 		struct arena arena = {.limit = 64 << 20};
@@ -163,7 +165,7 @@ static void damage_image(const unsigned char *file, size_t size)
 	}
 }
 
-static void test_images(void **state)
+static void test_damaged_images_are_read_or_refused(void **state)
 {
 	(void)state;
 	static const unsigned char orange[] = {220, 130, 40};
@@ -172,25 +174,25 @@ static void test_images(void **state)
 		"\7\210\210\2\2\0\10\210\200\203\1\5\2\3\4\5\6\210\7\210\210";
 	size_t size;
 	unsigned char *file = sample_png(5, 4, SAMPLE_RGBA, 8, 1, &size);
-	damage_image(file, size);
+	read_damaged_images(file, size);
 	free(file);
 	file = sample_png(5, 4, SAMPLE_PALETTE, 8, 0, &size);
-	damage_image(file, size);
+	read_damaged_images(file, size);
 	free(file);
 	for (int progressive = 0; progressive < 2; progressive++) {
 		file = sample_jpeg(17, 9, orange, 3, progressive, &size);
-		damage_image(file, size);
+		read_damaged_images(file, size);
 		free(file);
 	}
-	damage_image(hdr, sizeof hdr - 1);
+	read_damaged_images(hdr, sizeof hdr - 1);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_scenes),
-		cmocka_unit_test(test_meshes),
-		cmocka_unit_test(test_images),
+		cmocka_unit_test(test_damaged_scenes_are_read_or_refused),
+		cmocka_unit_test(test_damaged_meshes_are_read_or_refused),
+		cmocka_unit_test(test_damaged_images_are_read_or_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

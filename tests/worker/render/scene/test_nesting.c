@@ -33,7 +33,7 @@ static int read_files(const struct memory_file *files, struct error *e)
 }
 
 /* Reads the scene built with put(). sentence: part of the expected error; NULL: the scene must be accepted. */
-static void expect(const char *sentence)
+static void expect_result(const char *sentence)
 {
 	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
 	struct error e = {""};
@@ -57,7 +57,7 @@ static void nest_elements(const char *element, const char *type, const char *lea
 	}
 }
 
-static void test_ladders(void **state)
+static void test_ladders_of_references_are_limited(void **state)
 {
 	(void)state;
 	static const struct {
@@ -77,17 +77,17 @@ static void test_ladders(void **state)
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
 		nest_elements(all[i].element, all[i].type, all[i].leaf, all[i].allowed, 2, all[i].more);
 		put("</scene>");
-		expect(NULL);
+		expect_result(NULL);
 		for (int rungs = all[i].allowed + 1; rungs <= 200; rungs += 92) {
 			nest_elements(all[i].element, all[i].type, all[i].leaf, rungs, 2, all[i].more);
 			put("</scene>");
-			expect(all[i].sentence);
+			expect_result(all[i].sentence);
 		}
 	}
 }
 
 /* An instance counts with all objects in its group. */
-static void test_instances(void **state)
+static void test_instances_count_all_objects_of_their_group(void **state)
 {
 	(void)state;
 	nest_elements("shape", "merge", "merge", 16, 2, "");
@@ -95,27 +95,27 @@ static void test_instances(void **state)
 	for (int i = 0; i < 1000; i++)
 		put("<shape type='instance'><ref id='g'/></shape>\n");
 	put("</scene>");
-	expect("<shape type=\"instance\">: the scene has more than 67108864 objects");
+	expect_result("<shape type=\"instance\">: the scene has more than 67108864 objects");
 }
 
 /* A material shared by many shapes is built once and counts once. */
-static void test_shared_materials(void **state)
+static void test_shared_materials_count_once(void **state)
 {
 	(void)state;
 	nest_elements("bsdf", "blendbsdf", "diffuse", 14, 2, "");
 	for (int i = 0; i < 5000; i++)
 		put("<shape type='cube'><ref id='m14'/></shape>\n");
 	put("</scene>");
-	expect(NULL);
+	expect_result(NULL);
 	/* but nested materials count for each shape: 2048 * 32768 and more */
 	nest_elements("bsdf", "blendbsdf", "diffuse", 14, 2, "");
 	for (int i = 0; i < 2048; i++)
 		put("<shape type='cube'><bsdf type='mask'><ref id='m14'/></bsdf></shape>\n");
 	put("</scene>");
-	expect("<bsdf type=\"mask\">: the scene has more than 67108864 objects");
+	expect_result("<bsdf type=\"mask\">: the scene has more than 67108864 objects");
 }
 
-static void test_chains(void **state)
+static void test_chains_of_references_are_limited(void **state)
 {
 	(void)state;
 	static const struct {
@@ -130,18 +130,18 @@ static void test_chains(void **state)
 		snprintf(sentence, sizeof sentence, "%s: objects are nested more than 8192 deep", all[i].place);
 		nest_elements(all[i].element, all[i].type, all[i].leaf, 8191, 1, "");
 		put("</scene>");
-		expect(NULL);
+		expect_result(NULL);
 		nest_elements(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
 		put("</scene>");
-		expect(sentence);
+		expect_result(sentence);
 		nest_elements(all[i].element, all[i].type, all[i].leaf, test_is_scaled() ? 10000 : 60000, 1, "");
 		put("</scene>");
-		expect(sentence);
+		expect_result(sentence);
 	}
 }
 
 /* Expects one problem, however long the chain is, and although each object in it is also read by itself. */
-static void expect_one(const char *sentence)
+static void expect_single_problem(const char *sentence)
 {
 	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
 	struct asset_source assets = memory_assets(files);
@@ -155,20 +155,20 @@ static void expect_one(const char *sentence)
 	scene_fini(&s);
 }
 
-static void test_limits_are_told_once(void **state)
+static void test_exceeded_limits_are_reported_once(void **state)
 {
 	(void)state;
 	nest_elements("shape", "merge", "merge", 20000, 1, "");
 	put("</scene>");
-	expect_one("s.xml:8194: <ref>: objects are nested more than 8192 deep");
+	expect_single_problem("s.xml:8194: <ref>: objects are nested more than 8192 deep");
 	nest_elements("bsdf", "blendbsdf", "diffuse", 200, 2, "");
 	put("</scene>");
-	expect_one("s.xml:18: <ref>: makes a bsdf of more than 65536 objects");
+	expect_single_problem("s.xml:18: <ref>: makes a bsdf of more than 65536 objects");
 	nest_elements("shape", "merge", "merge", 25, 2, "");
 	for (int i = 0; i < 100; i++)
 		put("<shape type='merge'><ref id='m25'/></shape>\n");
 	put("</scene>");
-	expect_one("the scene has more than 67108864 objects");
+	expect_single_problem("the scene has more than 67108864 objects");
 	/* each object refers to the next, the last within the limit twice to the first beyond it; the first object
 	 * leads to all others */
 	used = 0;
@@ -177,11 +177,11 @@ static void test_limits_are_told_once(void **state)
 		put("<shape type='merge' id='m%d'><ref id='m%d'/>%s</shape>\n", i, i + 1,
 		    i == 63 ? "<ref id='m64'/>" : "");
 	put("<shape type='merge' id='m1000'/></scene>");
-	expect_one("s.xml:66: <shape type=\"merge\">: objects refer to each other more than 64 deep");
+	expect_single_problem("s.xml:66: <shape type=\"merge\">: objects refer to each other more than 64 deep");
 }
 
 /* The deepest accepted scene can be built and freed, although the functions that follow references recurse. */
-static void test_the_deepest_is_built(void **state)
+static void test_deepest_accepted_scene_is_built(void **state)
 {
 	(void)state;
 	nest_elements("bsdf", "coating", "diffuse", 8190, 1, "");
@@ -194,7 +194,7 @@ static void test_the_deepest_is_built(void **state)
 	struct render_summary summary;
 	int r = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
 	if (!r) {
-		r = render_check(&s, &assets, NULL, &summary, &e);
+		r = world_check(&s, &assets, NULL, &summary, &e);
 		scene_fini(&s);
 	}
 	if (r)
@@ -202,7 +202,7 @@ static void test_the_deepest_is_built(void **state)
 }
 
 /* Files include the next one forty times; then the last file includes itself. */
-static void test_includes(void **state)
+static void test_repeated_includes_are_limited(void **state)
 {
 	(void)state;
 	static char text[10][4096];
@@ -227,7 +227,7 @@ static void test_includes(void **state)
 }
 
 /* A chain of files, each of which includes only the next one: as deep as in Mitsuba 3, no deeper. */
-static void test_includes_in_a_row(void **state)
+static void test_depth_of_includes_is_limited(void **state)
 {
 	(void)state;
 	enum { DEEPEST = 15 };
@@ -251,7 +251,7 @@ static void test_includes_in_a_row(void **state)
 
 /* Included as often as the number of files allows, a file of blanks would keep the reader busy for minutes. Six
  * inclusions exceed the limit on bytes; blanks within a comment are read faster. */
-static void test_bytes_included(void **state)
+static void test_included_bytes_are_limited(void **state)
 {
 	(void)state;
 	enum { BLANKS = 48 << 20 };
@@ -274,7 +274,7 @@ static void test_bytes_included(void **state)
 }
 
 /* A long spectrum with many references: one with many blanks, and one with many parts. */
-static void test_long_spectra(void **state)
+static void test_long_spectra_are_parsed_once(void **state)
 {
 	(void)state;
 	enum { BLANKS = 1 << 19, PARTS = 20000, USERS = 2000 };
@@ -289,12 +289,12 @@ static void test_long_spectra(void **state)
 		for (int i = 0; i < USERS; i++)
 			put("<emitter type='point'><ref name='intensity' id='s'/></emitter>");
 		put("</scene>");
-		expect("s.xml:3: <ref>: spectra have more than 256 MB when all references are followed");
+		expect_result("s.xml:3: <ref>: spectra have more than 256 MB when all references are followed");
 	}
 }
 
 /* A file with as many missing names as ids: comparing each name with each id for suggestions would take hours. */
-static void test_many_missing_names(void **state)
+static void test_many_missing_names_are_reported_quickly(void **state)
 {
 	(void)state;
 	used = 0;
@@ -318,17 +318,17 @@ static void test_many_missing_names(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ladders),
-		cmocka_unit_test(test_instances),
-		cmocka_unit_test(test_shared_materials),
-		cmocka_unit_test(test_chains),
-		cmocka_unit_test(test_limits_are_told_once),
-		cmocka_unit_test(test_the_deepest_is_built),
-		cmocka_unit_test(test_includes),
-		cmocka_unit_test(test_includes_in_a_row),
-		cmocka_unit_test(test_bytes_included),
-		cmocka_unit_test(test_long_spectra),
-		cmocka_unit_test(test_many_missing_names),
+		cmocka_unit_test(test_ladders_of_references_are_limited),
+		cmocka_unit_test(test_instances_count_all_objects_of_their_group),
+		cmocka_unit_test(test_shared_materials_count_once),
+		cmocka_unit_test(test_chains_of_references_are_limited),
+		cmocka_unit_test(test_exceeded_limits_are_reported_once),
+		cmocka_unit_test(test_deepest_accepted_scene_is_built),
+		cmocka_unit_test(test_repeated_includes_are_limited),
+		cmocka_unit_test(test_depth_of_includes_is_limited),
+		cmocka_unit_test(test_included_bytes_are_limited),
+		cmocka_unit_test(test_long_spectra_are_parsed_once),
+		cmocka_unit_test(test_many_missing_names_are_reported_quickly),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

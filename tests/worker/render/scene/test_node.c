@@ -13,7 +13,7 @@
 #include <cmocka.h>
 
 /* Equal objects, and the same objects with one word changed. */
-static void test_same_objects(void **state)
+static void test_equal_objects_are_recognised(void **state)
 {
 	(void)state;
 	static const char format[] =
@@ -26,7 +26,7 @@ static void test_same_objects(void **state)
 #define TILES(color) "<texture type='checkerboard'>" color "</texture>"
 	static const struct {
 		const char *a, *b;
-		bool same;
+		bool is_equal;
 	} all[] = {
 		{PICTURE(FILE_NAME("p.png") RAW("true") MAP("2")), PICTURE(MAP("2") RAW("true") FILE_NAME("p.png")),
 		 true},
@@ -58,14 +58,14 @@ static void test_same_objects(void **state)
 		struct asset_source assets = memory_assets(pictures);
 		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 			fail_msg("%s", e.text);
-		if (node_equals(s.objects[0], s.objects[1]) != all[i].same)
+		if (node_equals(s.objects[0], s.objects[1]) != all[i].is_equal)
 			fail_msg("%s and %s", all[i].a, all[i].b);
 		scene_fini(&s);
 	}
 }
 
 /* A long name is shortened to its end, which differs between the files of a scene. */
-static void test_places(void **state)
+static void test_places_in_long_file_names_are_shortened(void **state)
 {
 	(void)state;
 	char text[NODE_TITLE_MAX], place[NODE_PLACE_MAX];
@@ -94,6 +94,7 @@ static void test_places(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_objects), cmocka_unit_test(test_places)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_equal_objects_are_recognised),
+					   cmocka_unit_test(test_places_in_long_file_names_are_shortened)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

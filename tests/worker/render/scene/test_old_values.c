@@ -27,7 +27,7 @@ static int read_scene(struct scene *s, const char *version, const char *content,
 }
 
 /* note: part of the only note; NULL: there must be none. */
-static struct scene read_old(const char *content, const char *note)
+static struct scene read_with_note(const char *content, const char *note)
 {
 	struct scene s;
 	struct error e;
@@ -38,7 +38,7 @@ static struct scene read_old(const char *content, const char *note)
 	return s;
 }
 
-static void refuses(const char *version, const char *content, const char *text)
+static void expect_refused(const char *version, const char *content, const char *text)
 {
 	struct scene s;
 	struct error e;
@@ -46,7 +46,7 @@ static void refuses(const char *version, const char *content, const char *text)
 		fail_msg("%s: %s\n not: %s", content, e.text, text);
 }
 
-static bool near(double a, double b)
+static bool is_near(double a, double b)
 {
 	return fabs(a - b) <= 1e-15;
 }
@@ -54,49 +54,54 @@ static bool near(double a, double b)
 static void test_reflectances_are_scaled(void **state)
 {
 	(void)state;
-	struct scene s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>",
-				  "s.xml:1: <bsdf type=\"diffuse\">: reflectance=2 is above 1: scaled by 0.495, as in "
-				  "Mitsuba");
+	struct scene s =
+		read_with_note("<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>",
+			       "s.xml:1: <bsdf type=\"diffuse\">: reflectance=2 is above 1: scaled by 0.495, as in "
+			       "Mitsuba");
 	const struct value *v = &node_find_property(s.objects[0], "reflectance")->value;
-	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
+	assert_true(is_near(v->as.rgb[0], 0.99) && is_near(v->as.rgb[1], 0.495) && is_near(v->as.rgb[2], 0.2475));
 	scene_fini(&s);
 
-	s = read_old("<bsdf type='phong'><spectrum name='specularReflectance' value='400:0.5, 500:4, 700:1'/></bsdf>",
-		     "specularReflectance=4 is above 1: scaled by 0.2475");
+	s = read_with_note(
+		"<bsdf type='phong'><spectrum name='specularReflectance' value='400:0.5, 500:4, 700:1'/></bsdf>",
+		"specularReflectance=4 is above 1: scaled by 0.2475");
 	v = &node_find_property(s.objects[0], "specular_reflectance")->value;
 	assert_int_equal(v->as.spectrum.count, 3);
-	assert_true(near(v->as.spectrum.value[0], 0.12375) && near(v->as.spectrum.value[1], 0.99) &&
-		    near(v->as.spectrum.value[2], 0.2475) && v->as.spectrum.nm[1] == 500);
+	assert_true(is_near(v->as.spectrum.value[0], 0.12375) && is_near(v->as.spectrum.value[1], 0.99) &&
+		    is_near(v->as.spectrum.value[2], 0.2475) && v->as.spectrum.nm[1] == 500);
 	scene_fini(&s);
 
-	s = read_old("<bsdf type='difftrans'><spectrum name='transmittance' value='3'/></bsdf>", "scaled by 0.33");
+	s = read_with_note("<bsdf type='difftrans'><spectrum name='transmittance' value='3'/></bsdf>",
+			   "scaled by 0.33");
 	scene_fini(&s);
-	s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='1 1 1'/></bsdf>", NULL);
+	s = read_with_note("<bsdf type='diffuse'><rgb name='reflectance' value='1 1 1'/></bsdf>", NULL);
 	assert_true(node_find_property(s.objects[0], "reflectance")->value.as.rgb[0] == 1);
 	scene_fini(&s);
 
-	refuses("3.0.0", "<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>", "outside [0, 1]");
-	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectance' value='-1 2 0.5'/></bsdf>", "outside [0, 1]");
-	s = read_old("<bsdf type='mask'><rgb name='opacity' value='2 1 0.5'/><bsdf type='diffuse'/></bsdf>",
-		     "opacity=2 is above 1: scaled by 0.495");
+	expect_refused("3.0.0", "<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>",
+		       "outside [0, 1]");
+	expect_refused("0.6.0", "<bsdf type='diffuse'><rgb name='reflectance' value='-1 2 0.5'/></bsdf>",
+		       "outside [0, 1]");
+	s = read_with_note("<bsdf type='mask'><rgb name='opacity' value='2 1 0.5'/><bsdf type='diffuse'/></bsdf>",
+			   "opacity=2 is above 1: scaled by 0.495");
 	v = &node_find_property(s.objects[0], "opacity")->value;
-	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
+	assert_true(is_near(v->as.rgb[0], 0.99) && is_near(v->as.rgb[1], 0.495) && is_near(v->as.rgb[2], 0.2475));
 	scene_fini(&s);
-	refuses("0.6.0",
-		"<bsdf type='phong'><rgb name='specularReflectance' value='2 2 2'/>"
-		"<boolean name='ensureEnergyConservation' value='false'/></bsdf>",
-		"outside [0, 1]");
+	expect_refused("0.6.0",
+		       "<bsdf type='phong'><rgb name='specularReflectance' value='2 2 2'/>"
+		       "<boolean name='ensureEnergyConservation' value='false'/></bsdf>",
+		       "outside [0, 1]");
 }
 
 /* Values that Mitsuba clips when it uses them; in 0.6 only weights. */
-static void test_clipped(void **state)
+static void test_weights_are_clipped(void **state)
 {
 	(void)state;
 #define MIX(weight) "<bsdf type='blendbsdf'>" weight "<bsdf type='diffuse'/><bsdf type='diffuse'/></bsdf>"
 #define MASK(opacity) "<bsdf type='mask'>" opacity "<bsdf type='diffuse'/></bsdf>"
 	static const struct {
 		const char *version, *bsdf, *note;
-		double wanted;
+		double expected;
 	} cases[] = {
 		{"0.6.0", MIX("<float name='weight' value='1.5'/>"), "weight=1.5 is outside [0, 1] and counts as 1", 1},
 		{"3.0.0", MIX("<float name='weight' value='-2'/>"), "weight=-2 is outside [0, 1] and counts as 0", 0},
@@ -115,14 +120,15 @@ static void test_clipped(void **state)
 		const struct property *p = node_find_property(s.objects[0], "weight");
 		const struct value *v = &(p ? p : node_find_property(s.objects[0], "opacity"))->value;
 		double got = v->type == VALUE_RGB ? v->as.rgb[1] : v->as.number;
-		assert_true(got == cases[i].wanted);
+		assert_true(got == cases[i].expected);
 		scene_fini(&s);
 	}
-	refuses("3.0.0", MIX("<spectrum name='weight' value='400:0.5, 500:1.5'/>"), "weight=1.5 is outside [0, 1]");
+	expect_refused("3.0.0", MIX("<spectrum name='weight' value='400:0.5, 500:1.5'/>"),
+		       "weight=1.5 is outside [0, 1]");
 }
 
 /* Parameters that plug-ins have in 3.x and not in 0.6. */
-static void test_newer_names(void **state)
+static void test_parameters_newer_than_0_6_are_ignored(void **state)
 {
 	(void)state;
 #define BENT(type, scale)                                                                            \
@@ -132,8 +138,8 @@ static void test_newer_names(void **state)
 #define GRID(value) "<volume type='gridvolume'><string name='filename' value='g'/>" value "</volume>"
 #define FILTER(type, name) "<rfilter type='" type "'><float name='" name "' value='2'/></rfilter>"
 	static const struct {
-		const char *content, *name, *written;
-		bool kept; /* the parameter exists in 0.6 as well */
+		const char *content, *name, *written_name;
+		bool is_kept; /* the parameter exists in 0.6 as well */
 	} cases[] = {
 		{BENT("bumpmap", "scale"), "scale", "scale", false},
 		{BENT("normalmap", "scale"), "scale", "scale", false},
@@ -148,9 +154,9 @@ static void test_newer_names(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char note[128];
 		snprintf(note, sizeof note, "`%s` is not a parameter of Mitsuba 0.6 and is ignored, as there",
-			 cases[i].written);
-		struct scene s = read_old(cases[i].content, cases[i].kept ? NULL : note);
-		assert_true((node_find_property(s.objects[0], cases[i].name) != NULL) == cases[i].kept);
+			 cases[i].written_name);
+		struct scene s = read_with_note(cases[i].content, cases[i].is_kept ? NULL : note);
+		assert_true((node_find_property(s.objects[0], cases[i].name) != NULL) == cases[i].is_kept);
 		scene_fini(&s);
 		struct error e;
 		if (read_scene(&s, "3.0.0", cases[i].content, &e))
@@ -163,28 +169,28 @@ static void test_newer_names(void **state)
 #undef FILTER
 }
 
-static void test_capitals(void **state)
+static void test_capitals_are_ignored_in_0_6(void **state)
 {
 	(void)state;
 #define IMAGE(name, value)                                                                                          \
 	"<texture type='bitmap'><string name='filename' value='A.png'/><string name='" name "' value='" value "'/>" \
 	"</texture>"
-	struct scene s = read_old(IMAGE("filterType", "EWA"), NULL);
+	struct scene s = read_with_note(IMAGE("filterType", "EWA"), NULL);
 	assert_string_equal(node_string(s.objects[0], "filter_type", ""), "ewa");
 	assert_string_equal(node_string(s.objects[0], "filename", ""), "A.png");
 	scene_fini(&s);
-	s = read_old(IMAGE("channel", "R"), NULL);
+	s = read_with_note(IMAGE("channel", "R"), NULL);
 	assert_string_equal(node_string(s.objects[0], "channel", ""), "r");
 	scene_fini(&s);
-	s = read_old("<bsdf type='roughconductor'><string name='distribution' value='GGX'/></bsdf>", NULL);
+	s = read_with_note("<bsdf type='roughconductor'><string name='distribution' value='GGX'/></bsdf>", NULL);
 	assert_string_equal(node_string(s.objects[0], "distribution", ""), "ggx");
 	scene_fini(&s);
-	refuses("3.0.0", IMAGE("filter_type", "Nearest"), "did you mean `nearest`?");
-	refuses("0.6.0", IMAGE("filterType", "Nearer"), "is not supported");
+	expect_refused("3.0.0", IMAGE("filter_type", "Nearest"), "did you mean `nearest`?");
+	expect_refused("0.6.0", IMAGE("filterType", "Nearer"), "is not supported");
 #undef IMAGE
 }
 
-static void test_distributions(void **state)
+static void test_other_distributions_become_beckmann(void **state)
 {
 	(void)state;
 #define ROUGH(x) "<bsdf type='roughconductor'><string name='distribution' value='" x "'/></bsdf>"
@@ -192,63 +198,64 @@ static void test_distributions(void **state)
 	for (size_t i = 0; i < sizeof old / sizeof *old; i++) {
 		char note[128];
 		snprintf(note, sizeof note, "the distribution `%s` becomes `beckmann`, which falls off faster", old[i]);
-		struct scene s = read_old(i ? ROUGH("as") : ROUGH("phong"), note);
+		struct scene s = read_with_note(i ? ROUGH("as") : ROUGH("phong"), note);
 		assert_string_equal(node_string(s.objects[0], "distribution", ""), "beckmann");
 		scene_fini(&s);
 	}
-	refuses("3.0.0", ROUGH("phong"), "is not supported (supported: beckmann, ggx)");
-	refuses("0.6.0", ROUGH("ggy"), "did you mean `ggx`?");
+	expect_refused("3.0.0", ROUGH("phong"), "is not supported (supported: beckmann, ggx)");
+	expect_refused("0.6.0", ROUGH("ggy"), "did you mean `ggx`?");
 }
 
-static void test_metals_lose_their_signs(void **state)
+static void test_negative_metal_indices_become_positive(void **state)
 {
 	(void)state;
-	struct scene s = read_old("<bsdf type='roughconductor'><rgb name='eta' value='-0.0485226, 4.14275, 4.66977'/>"
-				  "</bsdf>",
-				  "eta=-0.0485226 is below 0: its sign is ignored, as in Mitsuba");
+	struct scene s =
+		read_with_note("<bsdf type='roughconductor'><rgb name='eta' value='-0.0485226, 4.14275, 4.66977'/>"
+			       "</bsdf>",
+			       "eta=-0.0485226 is below 0: its sign is ignored, as in Mitsuba");
 	const double *eta = node_find_property(s.objects[0], "eta")->value.as.rgb;
 	assert_true(eta[0] == 0.0485226 && eta[1] == 4.14275 && eta[2] == 4.66977);
 	scene_fini(&s);
-	s = read_old("<bsdf type='conductor'><float name='k' value='-3'/></bsdf>", "k=-3 is below 0");
+	s = read_with_note("<bsdf type='conductor'><float name='k' value='-3'/></bsdf>", "k=-3 is below 0");
 	assert_true(node_find_property(s.objects[0], "k")->value.as.number == 3);
 	scene_fini(&s);
-	s = read_old("<bsdf type='conductor'><rgb name='k' value='3 2 0'/></bsdf>", NULL);
+	s = read_with_note("<bsdf type='conductor'><rgb name='k' value='3 2 0'/></bsdf>", NULL);
 	scene_fini(&s);
-	refuses("3.0.0", "<bsdf type='conductor'><rgb name='k' value='3 -2 1'/></bsdf>", "k=-2 is outside");
+	expect_refused("3.0.0", "<bsdf type='conductor'><rgb name='k' value='3 -2 1'/></bsdf>", "k=-2 is outside");
 }
 
-static void test_unknown_names(void **state)
+static void test_unknown_parameters_are_ignored_in_0_6(void **state)
 {
 	(void)state;
-	struct scene s = read_old("<bsdf type='diffuse'><string name='guidingFile' value='x'/></bsdf>",
-				  "s.xml:1: <bsdf type=\"diffuse\">: `guidingFile` is not known and is ignored");
+	struct scene s = read_with_note("<bsdf type='diffuse'><string name='guidingFile' value='x'/></bsdf>",
+					"s.xml:1: <bsdf type=\"diffuse\">: `guidingFile` is not known and is ignored");
 	scene_fini(&s);
-	s = read_old("<integer name='maxDepth' value='10'/>", "<integer>: `maxDepth` is ignored");
+	s = read_with_note("<integer name='maxDepth' value='10'/>", "<integer>: `maxDepth` is ignored");
 	scene_fini(&s);
-	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
-		"did you mean `reflectance`?");
+	expect_refused("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
+		       "did you mean `reflectance`?");
 	/* In 3.x only, a parameter of another plug-in is a mistake. */
-	s = read_old("<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>",
-		     "`exponent` is not known and is ignored");
+	s = read_with_note("<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>",
+			   "`exponent` is not known and is ignored");
 	scene_fini(&s);
-	refuses("3.0.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
-	s = read_old("<emitter type='constant'><float name='scale' value='2'/></emitter>",
-		     "`scale` is not known and is ignored");
+	expect_refused("3.0.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
+	s = read_with_note("<emitter type='constant'><float name='scale' value='2'/></emitter>",
+			   "`scale` is not known and is ignored");
 	scene_fini(&s);
-	refuses("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
+	expect_refused("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
 	/* A name that resembles a parameter without effect is harmless. */
-	s = read_old("<emitter type='constant'><float name='samplingWeights' value='2'/></emitter>",
-		     "`samplingWeights` is not known and is ignored");
+	s = read_with_note("<emitter type='constant'><float name='samplingWeights' value='2'/></emitter>",
+			   "`samplingWeights` is not known and is ignored");
 	scene_fini(&s);
-	refuses("0.6.0", "<emitter type='sky'><float name='turbidit' value='3'/></emitter>",
-		"did you mean `turbidity`?");
-	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
-	refuses("0.6.0", "<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'/></bsdf>",
-		"there is no spectrum of this type");
+	expect_refused("0.6.0", "<emitter type='sky'><float name='turbidit' value='3'/></emitter>",
+		       "did you mean `turbidity`?");
+	expect_refused("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
+	expect_refused("0.6.0", "<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'/></bsdf>",
+		       "there is no spectrum of this type");
 }
 
 /* Mitsuba 0.6 warns of parameters that no plug-in reads, in objects of every class. */
-static void test_unknown_names_of_all_classes(void **state)
+static void test_unknown_parameters_are_noted_in_every_class(void **state)
 {
 	(void)state;
 #define INSIDE(x) "<medium type='homogeneous'>" x "</medium>"
@@ -262,35 +269,36 @@ static void test_unknown_names_of_all_classes(void **state)
 		SENSOR("<string name='guidingFile' value='x'/>"),
 	};
 	for (size_t i = 0; i < sizeof kept / sizeof *kept; i++) {
-		struct scene s = read_old(kept[i], "is not known and is ignored");
+		struct scene s = read_with_note(kept[i], "is not known and is ignored");
 		scene_fini(&s);
 	}
 	/* Samplers and integrators get only the note that says which of their parameters count. */
-	struct scene s = read_old("<integrator type='path'><string name='guidingFile' value='x'/></integrator>",
-				  "is ignored except for");
+	struct scene s = read_with_note("<integrator type='path'><string name='guidingFile' value='x'/></integrator>",
+					"is ignored except for");
 	scene_fini(&s);
-	refuses("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"), "has no `sigmaT1`; did you mean `sigma_t`?");
+	expect_refused("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"),
+		       "has no `sigmaT1`; did you mean `sigma_t`?");
 #undef INSIDE
 #undef SENSOR
 }
 
 /* The default parameters that the Blender exporter of 0.5 writes for images. */
-static void test_labels(void **state)
+static void test_undefined_parameters_of_the_blender_exporter_are_kept(void **state)
 {
 	(void)state;
-	struct scene s = read_old("<default name='a' value='7'/><bsdf type='diffuse'>"
-				  "<string name='label[10,10]' value=\"Time: $scene['renderTime'], $a\"/></bsdf>",
-				  "`label[10,10]` is not known and is ignored");
+	struct scene s = read_with_note("<default name='a' value='7'/><bsdf type='diffuse'>"
+					"<string name='label[10,10]' value=\"Time: $scene['renderTime'], $a\"/></bsdf>",
+					"`label[10,10]` is not known and is ignored");
 	scene_fini(&s);
-	s = read_old("<default name='ab' value='7'/><bsdf type='diffuse' id='$x[$ab]$'/>", NULL);
+	s = read_with_note("<default name='ab' value='7'/><bsdf type='diffuse' id='$x[$ab]$'/>", NULL);
 	assert_string_equal(s.objects[0]->id, "$x[7]$");
 	scene_fini(&s);
-	refuses("0.6.0", "<bsdf type='diffuse' id='$x'/>", "$x is not defined");
-	refuses("3.0.0", "<bsdf type='diffuse' id='$x[0]'/>", "$x is not defined");
+	expect_refused("0.6.0", "<bsdf type='diffuse' id='$x'/>", "$x is not defined");
+	expect_refused("3.0.0", "<bsdf type='diffuse' id='$x[0]'/>", "$x is not defined");
 }
 
 /* The Blender exporter for 3.x writes values slightly above 1. */
-static void test_specular(void **state)
+static void test_specular_may_exceed_one(void **state)
 {
 	(void)state;
 	struct scene s;
@@ -299,11 +307,11 @@ static void test_specular(void **state)
 		read_scene(&s, "3.0.0", "<bsdf type='principled'><float name='specular' value='1.001'/></bsdf>", &e),
 		0);
 	scene_fini(&s);
-	refuses("3.0.0", "<bsdf type='principled'><float name='specular' value='9'/></bsdf>", "outside [0, 8]");
+	expect_refused("3.0.0", "<bsdf type='principled'><float name='specular' value='9'/></bsdf>", "outside [0, 8]");
 }
 
 /* Parameters given twice: the last one with the same name counts, and the name that belongs to 0.6. */
-static void test_given_twice(void **state)
+static void test_last_of_repeated_parameters_counts(void **state)
 {
 	(void)state;
 	static const struct {
@@ -330,27 +338,28 @@ static void test_given_twice(void **state)
 			"<emitter type='constant'/>",
 			cases[i].first, cases[i].second);
 		/* clang-format on */
-		struct scene s = read_old(xml, cases[i].note);
+		struct scene s = read_with_note(xml, cases[i].note);
 		assert_int_equal(s.objects[0]->property_count, 2);
 		assert_string_equal(node_string(s.objects[0], "fov_axis", ""), cases[i].axis);
 		scene_fini(&s);
-		refuses("3.0.0",
-			"<sensor type='perspective'><string name='fov_axis' value='x'/>"
-			"<string name='fov_axis' value='x'/></sensor>",
-			"`fov_axis` is given twice (first in line 1)");
+		expect_refused("3.0.0",
+			       "<sensor type='perspective'><string name='fov_axis' value='x'/>"
+			       "<string name='fov_axis' value='x'/></sensor>",
+			       "`fov_axis` is given twice (first in line 1)");
 	}
 	/* Two names of 0.6 for the same parameter. */
-	refuses("0.6.0",
+	expect_refused(
+		"0.6.0",
 		"<bsdf type='diffuse'><rgb name='reflectance' value='1'/><rgb name='diffuseReflectance' value='1'/></bsdf>",
 		"`reflectance` is given twice");
 }
 
 /* Files of 0.5 and 0.6 without an emitter get the sun and sky that Mitsuba adds; those of 3.x do not. */
-static void test_default_light(void **state)
+static void test_sun_and_sky_are_added_to_dark_old_scenes(void **state)
 {
 	(void)state;
-	struct scene s =
-		read_old("<shape type='sphere'/>", "s.xml: has no emitter: sun and sky are added, as by Mitsuba 0.6");
+	struct scene s = read_with_note("<shape type='sphere'/>",
+					"s.xml: has no emitter: sun and sky are added, as by Mitsuba 0.6");
 	assert_int_equal(s.object_count, 2);
 	const struct scene_node *n = s.objects[1];
 	assert_string_equal(n->type, "sunsky");
@@ -368,12 +377,12 @@ static void test_default_light(void **state)
 		"<shape type='shapegroup' id='g'><shape type='sphere'><emitter type='area'/></shape></shape>",
 	};
 	for (size_t i = 0; i < sizeof lit / sizeof *lit; i++) {
-		s = read_old(lit[i], NULL);
+		s = read_with_note(lit[i], NULL);
 		for (uint32_t k = 0; k < s.object_count; k++)
 			assert_true(strcmp(s.objects[k]->type, "sunsky") != 0);
 		scene_fini(&s);
 	}
-	s = read_old("<bsdf type='diffuse'/>", NULL); /* a file meant to be included */
+	s = read_with_note("<bsdf type='diffuse'/>", NULL); /* a file meant to be included */
 	assert_int_equal(s.object_count, 1);
 	scene_fini(&s);
 	struct error e;
@@ -386,17 +395,17 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_reflectances_are_scaled),
-		cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_newer_names),
-		cmocka_unit_test(test_capitals),
-		cmocka_unit_test(test_distributions),
-		cmocka_unit_test(test_metals_lose_their_signs),
-		cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_unknown_names_of_all_classes),
-		cmocka_unit_test(test_labels),
-		cmocka_unit_test(test_specular),
-		cmocka_unit_test(test_given_twice),
-		cmocka_unit_test(test_default_light),
+		cmocka_unit_test(test_weights_are_clipped),
+		cmocka_unit_test(test_parameters_newer_than_0_6_are_ignored),
+		cmocka_unit_test(test_capitals_are_ignored_in_0_6),
+		cmocka_unit_test(test_other_distributions_become_beckmann),
+		cmocka_unit_test(test_negative_metal_indices_become_positive),
+		cmocka_unit_test(test_unknown_parameters_are_ignored_in_0_6),
+		cmocka_unit_test(test_unknown_parameters_are_noted_in_every_class),
+		cmocka_unit_test(test_undefined_parameters_of_the_blender_exporter_are_kept),
+		cmocka_unit_test(test_specular_may_exceed_one),
+		cmocka_unit_test(test_last_of_repeated_parameters_counts),
+		cmocka_unit_test(test_sun_and_sky_are_added_to_dark_old_scenes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

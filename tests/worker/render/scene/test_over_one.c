@@ -35,7 +35,7 @@ static struct scene read_leniently(const char *version, const char *body)
 	return s;
 }
 
-static void refuses(const char *version, const char *body, bool lenient, const char *why)
+static void expect_refused(const char *version, const char *body, bool lenient, const char *why)
 {
 	struct scene s;
 	struct error e;
@@ -46,13 +46,13 @@ static void refuses(const char *version, const char *body, bool lenient, const c
 
 #define DIFFUSE(value) "<bsdf type='diffuse' id='b'>" value "</bsdf>"
 
-static void test_values(void **state)
+static void test_values_above_one_are_clipped(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *body, *note;
-		double after[3];
-	} of[] = {
+		double clipped[3];
+	} cases[] = {
 		{DIFFUSE("<float name='reflectance' value='1.1'/>"), "reflectance=1.1", {1}},
 		{DIFFUSE("<integer name='reflectance' value='3'/>"), "reflectance=3", {1}},
 		{DIFFUSE("<rgb name='reflectance' value='0.25,1.5,2'/>"), "reflectance=2", {0.25, 1, 1}},
@@ -60,20 +60,20 @@ static void test_values(void **state)
 		 "reflectance=1.25",
 		 {1, 0.5, 0.75}},
 	};
-	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char note[160];
 		uint32_t count;
-		refuses("3.0.0", of[i].body, false, "; --lenient counts it as 1");
-		refuses("3.0.0", of[i].body, false, "s.xml:2: <");
-		struct scene s = read_leniently("3.0.0", of[i].body);
+		expect_refused("3.0.0", cases[i].body, false, "; --lenient counts it as 1");
+		expect_refused("3.0.0", cases[i].body, false, "s.xml:2: <");
+		struct scene s = read_leniently("3.0.0", cases[i].body);
 		snprintf(note, sizeof note, "s.xml:2: <bsdf type=\"diffuse\">: %s is above 1 and counts as 1 (lenient)",
-			 of[i].note);
+			 cases[i].note);
 		assert_true(scene_has_note(&s, note));
 		const struct property *p = node_find_property(scene_find_object(&s, "b"), "reflectance");
 		double room[3];
 		const double *x = value_numbers(&p->value, room, &count);
 		for (uint32_t k = 0; k < count; k++)
-			assert_true(x[k] == of[i].after[k]);
+			assert_true(x[k] == cases[i].clipped[k]);
 		scene_fini(&s);
 	}
 	struct scene s =
@@ -83,18 +83,18 @@ static void test_values(void **state)
 }
 
 /* Values that are invalid in another way stay errors, and so do values beyond ranges that do not end at 1. */
-static void test_still_refused(void **state)
+static void test_other_invalid_values_stay_errors(void **state)
 {
 	(void)state;
-	refuses("3.0.0", DIFFUSE("<float name='reflectance' value='-0.1'/>"), true,
-		"reflectance=-0.1 is outside [0, 1]");
-	refuses("3.0.0", DIFFUSE("<rgb name='reflectance' value='2,-1,0'/>"), true, "is outside [0, 1]");
-	refuses("3.0.0", "<bsdf type='roughconductor'><float name='alpha' value='11'/></bsdf>", true,
-		"is outside [0, 10]");
+	expect_refused("3.0.0", DIFFUSE("<float name='reflectance' value='-0.1'/>"), true,
+		       "reflectance=-0.1 is outside [0, 1]");
+	expect_refused("3.0.0", DIFFUSE("<rgb name='reflectance' value='2,-1,0'/>"), true, "is outside [0, 1]");
+	expect_refused("3.0.0", "<bsdf type='roughconductor'><float name='alpha' value='11'/></bsdf>", true,
+		       "is outside [0, 10]");
 }
 
 /* The same texture is used as a height of 2 and as a reflectance of 1. */
-static void test_textures(void **state)
+static void test_texture_is_clipped_only_as_reflectance(void **state)
 {
 	(void)state;
 	static const char body[] =
@@ -104,7 +104,8 @@ static void test_textures(void **state)
 		"<bsdf type='bumpmap' id='b'><ref id='t'/><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
 		"<bsdf type='phong' id='p'><ref name='exponent' id='t'/></bsdf>";
 	for (int version = 0; version < 2; version++) {
-		refuses(version ? "3.0.0" : "0.6.0", body, false,
+		expect_refused(
+			version ? "3.0.0" : "0.6.0", body, false,
 			"s.xml:2: <texture type=\"checkerboard\">: color0=2 is above 1, which no reflectance can be; "
 			"--lenient counts it as 1");
 		struct scene s = read_leniently(version ? "3.0.0" : "0.6.0", body);
@@ -122,7 +123,7 @@ static void test_textures(void **state)
 		struct error e;
 		struct texture made;
 		struct arena a = {0};
-		const struct texture_build build = {.arena = &a, .dialect_3 = version};
+		const struct texture_build build = {.arena = &a, .is_dialect_3 = version};
 		assert_int_equal(texture_create(&made, t, COLOR_REFLECTANCE, &build, &e), 0);
 		assert_true(texture_max(&made) <= 1);
 		arena_fini(&a);
@@ -130,7 +131,7 @@ static void test_textures(void **state)
 	}
 }
 
-static void test_a_texture_is_refused_once(void **state)
+static void test_shared_texture_is_refused_once(void **state)
 {
 	(void)state;
 	static const char text[] =
@@ -147,7 +148,7 @@ static void test_a_texture_is_refused_once(void **state)
 }
 
 /* Many materials that share a texture with many numbers share the clipped copy, too. */
-static void test_materials_share_the_copy(void **state)
+static void test_materials_share_the_clipped_copy(void **state)
 {
 	(void)state;
 	struct scene s =
@@ -161,7 +162,7 @@ static void test_materials_share_the_copy(void **state)
 }
 
 /* Mitsuba 0.6 scales reflectances; `lenient` applies only to values that 0.6 does not scale. */
-static void test_scaled_in_old_files(void **state)
+static void test_values_above_one_are_scaled_in_old_files(void **state)
 {
 	(void)state;
 	struct scene s = read_leniently("0.6.0", DIFFUSE("<float name='reflectance' value='2'/>"));
@@ -176,12 +177,12 @@ static void test_scaled_in_old_files(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_values),
-		cmocka_unit_test(test_still_refused),
-		cmocka_unit_test(test_textures),
-		cmocka_unit_test(test_a_texture_is_refused_once),
-		cmocka_unit_test(test_materials_share_the_copy),
-		cmocka_unit_test(test_scaled_in_old_files),
+		cmocka_unit_test(test_values_above_one_are_clipped),
+		cmocka_unit_test(test_other_invalid_values_stay_errors),
+		cmocka_unit_test(test_texture_is_clipped_only_as_reflectance),
+		cmocka_unit_test(test_shared_texture_is_refused_once),
+		cmocka_unit_test(test_materials_share_the_clipped_copy),
+		cmocka_unit_test(test_values_above_one_are_scaled_in_old_files),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,10 +12,10 @@
 
 #include <cmocka.h>
 
-struct expected {
+struct expected_scene {
 	const char *folder, *file;
-	bool dialect_3;
-	uint32_t shapes, assets, notes_least;
+	bool is_dialect_3;
+	uint32_t shapes, assets, min_notes;
 	uint64_t triangles, spheres;
 	uint32_t width, height;
 	enum filter_kind filter;
@@ -24,7 +24,7 @@ struct expected {
 	double fov;
 };
 
-static const struct expected all[] = {
+static const struct expected_scene expected_scenes[] = {
 	{"cornell-box", "scene.xml", false, 8, 0, 3, 36, 0, 1024, 1024, FILTER_TENT, 64, 65, 19.5},
 	{"veach-mis", "scene.xml", false, 9, 0, 4, 52, 3, 1280, 720, FILTER_TENT, 512, 5, 35},
 	{"veach-door", "scene.xml", false, 22, 28, 3, 0, 0, 1280, 720, FILTER_BOX, 0, 128, 54.6003},
@@ -33,7 +33,7 @@ static const struct expected all[] = {
 	{".", "half-sunk-rough.xml", true, 3, 0, 1, 4, 1, 512, 288, FILTER_BOX, 64, 31, 38.58},
 };
 
-static void check_shapes(const struct scene *s, const struct asset_source *assets, const struct expected *x)
+static void check_shapes(const struct scene *s, const struct asset_source *assets, const struct expected_scene *x)
 {
 	struct arena arena = {0};
 	uint32_t shapes = 0;
@@ -58,7 +58,7 @@ static void check_shapes(const struct scene *s, const struct asset_source *asset
 	arena_fini(&arena);
 }
 
-static void check(const char *root, const struct expected *x)
+static void check_scene(const char *root, const struct expected_scene *x)
 {
 	char folder[1024];
 	snprintf(folder, sizeof folder, "%s/%s", root, x->folder);
@@ -69,9 +69,9 @@ static void check(const char *root, const struct expected *x)
 		fail_msg("%s", e.text);
 	for (uint32_t i = 0; i < s.note_count; i++)
 		print_message("%s\n", s.notes[i]);
-	assert_int_equal(s.is_dialect_3, x->dialect_3);
+	assert_int_equal(s.is_dialect_3, x->is_dialect_3);
 	assert_int_equal(s.asset_count, x->assets);
-	assert_true(s.note_count >= x->notes_least);
+	assert_true(s.note_count >= x->min_notes);
 	check_shapes(&s, &assets, x);
 	struct scene_settings set;
 	if (scene_settings_read(&s, 0, 0, 1, &set, &e))
@@ -85,7 +85,7 @@ static void check(const char *root, const struct expected *x)
 	scene_fini(&s);
 }
 
-static void test_public_scenes(void **state)
+static void test_public_scenes_are_read_as_expected(void **state)
 {
 	(void)state;
 	const char *root = getenv("HSLT_SCENES");
@@ -93,12 +93,12 @@ static void test_public_scenes(void **state)
 		print_message("skipped: HSLT_SCENES is not set\n");
 		skip();
 	}
-	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-		check(root, &all[i]);
+	for (size_t i = 0; i < sizeof expected_scenes / sizeof *expected_scenes; i++)
+		check_scene(root, &expected_scenes[i]);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_public_scenes)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_public_scenes_are_read_as_expected)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,33 +18,34 @@
 
 static struct memory_file files[4];
 
-static int read_with(struct scene *s, const char *xml, const struct scene_define *defines, size_t n, struct error *e)
+static int read_with_defines(struct scene *s, const char *xml, const struct scene_define *defines, size_t n,
+			     struct error *e)
 {
 	files[0] = (struct memory_file){"s.xml", xml, strlen(xml)};
 	struct asset_source assets = memory_assets(files);
 	return scene_read(s, &assets, "s.xml", scene_tables(), defines, n, e);
 }
 
-static struct scene read_ok(const char *xml)
+static struct scene read_valid(const char *xml)
 {
 	struct scene s;
 	struct error e;
-	if (read_with(&s, xml, NULL, 0, &e))
+	if (read_with_defines(&s, xml, NULL, 0, &e))
 		fail_msg("%s", e.text);
 	return s;
 }
 
 /* Reads a scene with one element around `content`, such as <bsdf type="roughconductor">. */
-static struct scene read_inside(const char *version, const char *begin, const char *content, const char *end)
+static struct scene read_wrapped(const char *version, const char *begin, const char *content, const char *end)
 {
 	char xml[4096];
 	snprintf(xml, sizeof xml, "<scene version=\"%s\">%s%s%s</scene>", version, begin, content, end);
-	return read_ok(xml);
+	return read_valid(xml);
 }
 
 static struct scene read_bsdf(const char *version, const char *content)
 {
-	return read_inside(version, "<bsdf type=\"roughconductor\">", content, "</bsdf>");
+	return read_wrapped(version, "<bsdf type=\"roughconductor\">", content, "</bsdf>");
 }
 
 static void assert_rgb(const struct scene *s, double r, double g, double b)
@@ -58,7 +59,7 @@ static void assert_rgb(const struct scene *s, double r, double g, double b)
 			fail_msg("component %d is %.17g, not %.17g", i, p->value.as.rgb[i], want[i]);
 }
 
-static void test_rgb(void **state)
+static void test_rgb_notations_are_read(void **state)
 {
 	(void)state;
 	static const struct {
@@ -79,7 +80,7 @@ static void test_rgb(void **state)
 	}
 }
 
-static void test_spectra(void **state)
+static void test_sampled_spectra_are_read(void **state)
 {
 	(void)state;
 	struct scene s = read_bsdf("3.0.0", "<spectrum name='eta' value='400:0.5, 500:1.5 ,600:2e0'/>"
@@ -94,13 +95,13 @@ static void test_spectra(void **state)
 	scene_fini(&s);
 }
 
-static void test_plain_values(void **state)
+static void test_points_numbers_and_booleans_are_read(void **state)
 {
 	(void)state;
-	struct scene s = read_inside("0.6.0", "<shape type='sphere'>",
-				     "<point name='center' x='1' z='-3'/><float name='radius' value='2'/>"
-				     "<boolean name='flipNormals' value='true'/>",
-				     "</shape>");
+	struct scene s = read_wrapped("0.6.0", "<shape type='sphere'>",
+				      "<point name='center' x='1' z='-3'/><float name='radius' value='2'/>"
+				      "<boolean name='flipNormals' value='true'/>",
+				      "</shape>");
 	const struct scene_node *n = s.objects[0];
 	vec3 c = node_find_property(n, "center")->value.as.point;
 	assert_true(c.x == 1 && c.y == 0 && c.z == -3);
@@ -109,23 +110,23 @@ static void test_plain_values(void **state)
 	assert_int_equal(node_int(n, "absent", 7), 7);
 	assert_string_equal(node_string(n, "absent", "fallback"), "fallback");
 	scene_fini(&s);
-	s = read_inside("3.0.0", "<shape type='sphere'>",
-			"<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>", "</shape>");
+	s = read_wrapped("3.0.0", "<shape type='sphere'>",
+			 "<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>", "</shape>");
 	assert_true(node_find_property(s.objects[0], "center")->value.as.point.z == 3);
 	assert_int_equal(node_find_property(s.objects[0], "radius")->value.type, VALUE_FLOAT);
 	scene_fini(&s);
-	s = read_inside("3.0.0", "<shape type='sphere'>", "<point name='center' value='0.5'/>", "</shape>");
+	s = read_wrapped("3.0.0", "<shape type='sphere'>", "<point name='center' value='0.5'/>", "</shape>");
 	c = node_find_property(s.objects[0], "center")->value.as.point;
 	assert_true(c.x == 0.5 && c.y == 0.5 && c.z == 0.5);
 	scene_fini(&s);
 }
 
-static void check_transform_of(const char *version, const char *content, vec3 p, vec3 want)
+static void check_transform_in(const char *version, const char *content, vec3 p, vec3 want)
 {
 	char all[1024];
 	snprintf(all, sizeof all, "<transform name='%s'>%s</transform>", *version == '0' ? "toWorld" : "to_world",
 		 content);
-	struct scene s = read_inside(version, "<shape type='cube'>", all, "</shape>");
+	struct scene s = read_wrapped(version, "<shape type='cube'>", all, "</shape>");
 	mat4 m = node_transform(s.objects[0], "to_world");
 	vec3 d = vec3_sub(mat4_point(&m, p), want);
 	if (!(vec3_length(d) < 1e-12))
@@ -137,17 +138,17 @@ static void check_transform_of(const char *version, const char *content, vec3 p,
 
 static void check_transform(const char *content, vec3 p, vec3 want)
 {
-	check_transform_of("0.6.0", content, p, want);
+	check_transform_in("0.6.0", content, p, want);
 }
 
-static void test_transforms(void **state)
+static void test_transform_steps_apply_in_order(void **state)
 {
 	(void)state;
 	vec3 p = {1, 2, 3};
 	check_transform("", p, p);
 	check_transform("<translate x='1' z='-1'/>", p, (vec3){2, 2, 2});
 	check_transform("<translate value='1 2 3'/>", p, (vec3){2, 4, 6});
-	check_transform_of("3.0.0", "<translate value='2'/>", p, (vec3){3, 4, 5});
+	check_transform_in("3.0.0", "<translate value='2'/>", p, (vec3){3, 4, 5});
 	check_transform("<scale value='2'/>", p, (vec3){2, 4, 6});
 	check_transform("<scale x='151' z='60' y='1'/>", p, (vec3){151, 2, 180});
 	check_transform("<scale x='3'/>", p, (vec3){3, 2, 3});
@@ -171,12 +172,12 @@ static void test_transforms(void **state)
 	check_transform("<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
 	check_transform("<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0, -1, 0});
 	check_transform("<lookat origin='0,0,0' target='0,3,4' up='0,0,0'/>", y, (vec3){1, 0, 0});
-	check_transform_of("3.0.0", "<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
-	check_transform_of("3.0.0", "<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0.8, 0, -0.6});
-	check_transform_of("3.0.0", "<lookat origin='0,0,0' target='3,0,-4'/>", y, (vec3){0.8, 0, 0.6});
+	check_transform_in("3.0.0", "<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
+	check_transform_in("3.0.0", "<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0.8, 0, -0.6});
+	check_transform_in("3.0.0", "<lookat origin='0,0,0' target='3,0,-4'/>", y, (vec3){0.8, 0, 0.6});
 }
 
-static void test_dialects(void **state)
+static void test_names_follow_the_dialect_of_the_file(void **state)
 {
 	(void)state;
 	struct scene s = read_bsdf("0.5.0", "<float name='extEta' value='1'/>");
@@ -188,16 +189,17 @@ static void test_dialects(void **state)
 	scene_fini(&s);
 	/* 3.x does not know the old names. */
 	struct error e;
-	assert_int_equal(read_with(&s,
-				   "<scene version='3.0.0'><bsdf type='roughconductor'><float name='extEta' value='1'/>"
-				   "</bsdf></scene>",
-				   NULL, 0, &e),
-			 -EINVAL);
+	assert_int_equal(
+		read_with_defines(&s,
+				  "<scene version='3.0.0'><bsdf type='roughconductor'><float name='extEta' value='1'/>"
+				  "</bsdf></scene>",
+				  NULL, 0, &e),
+		-EINVAL);
 	assert_non_null(strstr(e.text, "did you mean `ext_eta`?"));
 }
 
 /* Names in each file follow the version of that file; the names of both dialects have the meaning of 3.x. */
-static void test_both_dialects(void **state)
+static void test_files_of_both_dialects_can_be_combined(void **state)
 {
 	(void)state;
 	static const char metal_6[] =
@@ -214,7 +216,7 @@ static void test_both_dialects(void **state)
 			 "<scene version='%s'><include filename='m.xml'/><include filename='m.xml'/>"
 			 "<bsdf type='roughconductor'><float name='%s' value='3'/></bsdf></scene>",
 			 old ? "3.0.0" : "0.4.0", old ? "ext_eta" : "extEta");
-		struct scene s = read_ok(xml);
+		struct scene s = read_valid(xml);
 		assert_true(s.is_dialect_3);
 		assert_int_equal(s.object_count, 3);
 		assert_true(node_float(s.objects[0], "ext_eta", 0) == 2);
@@ -227,14 +229,14 @@ static void test_both_dialects(void **state)
 }
 
 /* A file may contain one object without a <scene> around it, which is read like any other object. */
-static void test_one_object_in_a_file(void **state)
+static void test_included_file_may_be_a_single_object(void **state)
 {
 	(void)state;
 	static const char metal[] = "<bsdf type='roughconductor' id='m' version='3.0.0'><float name='ext_eta' "
 				    "value='2'/></bsdf>";
 	files[1] = (struct memory_file){"m.xml", metal, sizeof metal - 1};
-	struct scene s = read_ok("<scene version='3.0.0'><shape type='sphere'><ref id='m'/></shape>"
-				 "<include filename='m.xml'/></scene>");
+	struct scene s = read_valid("<scene version='3.0.0'><shape type='sphere'><ref id='m'/></shape>"
+				    "<include filename='m.xml'/></scene>");
 	assert_int_equal(s.object_count, 2);
 	assert_true(node_float(s.objects[1], "ext_eta", 0) == 2);
 	assert_ptr_equal(node_child(s.objects[0], PLUGIN_BSDF, 0), s.objects[1]);
@@ -242,20 +244,21 @@ static void test_one_object_in_a_file(void **state)
 	files[1] = (struct memory_file){0};
 }
 
-static void test_capitals_of_types(void **state)
+static void test_capitals_in_type_names_are_ignored(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='2.0.0'><shape type='Sphere'/><bsdf type='RoughConductor'/></scene>");
+	struct scene s =
+		read_valid("<scene version='2.0.0'><shape type='Sphere'/><bsdf type='RoughConductor'/></scene>");
 	assert_string_equal(s.objects[0]->type, "sphere");
 	assert_string_equal(s.objects[1]->type, "roughconductor");
 	scene_fini(&s);
 }
 
 /* Parameters added by forks of Mitsuba are noted and have no effect. */
-static void test_parameters_of_forks(void **state)
+static void test_parameters_of_forks_are_noted(void **state)
 {
 	(void)state;
-	struct scene s = read_ok(
+	struct scene s = read_valid(
 		"<scene version='3.0.0'>\n<sensor type='perspective'>\n<vector name='min_bounds' value='?'/></sensor>\n"
 		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n"
 		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n</scene>");
@@ -270,46 +273,47 @@ static void test_parameters_of_forks(void **state)
 }
 
 /* In Mitsuba 3, textures of any name are attributes of a shape; nothing in these scenes uses them. */
-static void test_textures_of_shapes(void **state)
+static void test_textures_of_shapes_may_have_any_name(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'><texture type='checkerboard' id='t'/>\n<shape type='sphere'>"
-				 "<texture type='checkerboard' name='heat'/></shape>\n"
-				 "<shape type='cube'><ref name='vertex_wear' id='t'/></shape></scene>");
+	struct scene s =
+		read_valid("<scene version='3.0.0'><texture type='checkerboard' id='t'/>\n<shape type='sphere'>"
+			   "<texture type='checkerboard' name='heat'/></shape>\n"
+			   "<shape type='cube'><ref name='vertex_wear' id='t'/></shape></scene>");
 	assert_true(scene_has_note(&s, "s.xml:2: <shape type=\"sphere\">: `heat` is not known and is ignored"));
 	assert_true(scene_has_note(&s, "s.xml:3: <shape type=\"cube\">: `vertex_wear` is not known and is ignored"));
 	scene_fini(&s);
 }
 
 /* A file of a version that does not exist yet is read as one of version 3. */
-static void test_newer_versions(void **state)
+static void test_newer_versions_are_read_as_version_3(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='9.0.0'><shape type='sphere'/></scene>");
+	struct scene s = read_valid("<scene version='9.0.0'><shape type='sphere'/></scene>");
 	assert_true(scene_has_note(
 		&s, "s.xml: version=\"9.0.0\" in s.xml:1 is newer than any known: read as by Mitsuba 3"));
 	scene_fini(&s);
-	s = read_ok("<scene version='3.9'><shape type='sphere'/></scene>");
+	s = read_valid("<scene version='3.9'><shape type='sphere'/></scene>");
 	assert_false(scene_has_note(&s, "newer"));
 	scene_fini(&s);
 }
 
 /* Groups without shapes are noted, once for each type. */
-static void test_empty_groups(void **state)
+static void test_empty_groups_are_noted_once(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'><shape type='merge'/>\n<shape type='merge'/>"
-				 "<shape type='shapegroup' id='g'/></scene>");
+	struct scene s = read_valid("<scene version='3.0.0'><shape type='merge'/>\n<shape type='merge'/>"
+				    "<shape type='shapegroup' id='g'/></scene>");
 	assert_true(scene_has_note(&s, "s.xml:1: <shape type=\"merge\"> holds no shape: nothing of it is seen"));
 	assert_false(scene_has_note(&s, "s.xml:2: <shape type=\"merge\">"));
 	assert_true(scene_has_note(&s, "s.xml:2: <shape type=\"shapegroup\"> holds no shape"));
 	scene_fini(&s);
-	s = read_ok("<scene version='3.0.0'><shape type='merge'><shape type='sphere'/></shape></scene>");
+	s = read_valid("<scene version='3.0.0'><shape type='merge'><shape type='sphere'/></shape></scene>");
 	assert_false(scene_has_note(&s, "holds no shape"));
 	scene_fini(&s);
 }
 
-static void test_numbers_given_as_colours(void **state)
+static void test_grey_colours_are_accepted_as_numbers(void **state)
 {
 	(void)state;
 	static const char *const given[] = {"<rgb name='alpha' value='.25 .25 .25'/>",
@@ -323,7 +327,7 @@ static void test_numbers_given_as_colours(void **state)
 }
 
 /* If a texture is given for a parameter that must be a number, lenient reading keeps the default. */
-static void test_lenient_numbers(void **state)
+static void test_lenient_reading_drops_textures_of_numbers(void **state)
 {
 	(void)state;
 	static const char xml[] =
@@ -331,7 +335,7 @@ static void test_lenient_numbers(void **state)
 		"<float name='ext_eta' value='2'/></bsdf></scene>";
 	struct scene s;
 	struct error e;
-	assert_int_equal(read_with(&s, xml, NULL, 0, &e), -EINVAL);
+	assert_int_equal(read_with_defines(&s, xml, NULL, 0, &e), -EINVAL);
 	struct asset_source assets = memory_assets(files);
 	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
 	assert_null(node_find_property(s.objects[0], "alpha"));
@@ -342,10 +346,10 @@ static void test_lenient_numbers(void **state)
 	scene_fini(&s);
 }
 
-static void test_nesting_and_references(void **state)
+static void test_nested_and_referenced_objects_are_found(void **state)
 {
 	(void)state;
-	struct scene s = read_ok(
+	struct scene s = read_valid(
 		"<scene version='3.0.0'>"
 		"<texture type='bitmap' id='t'><string name='filename' value='a/b.png'/></texture>"
 		"<bsdf type='twosided' id='m'><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
@@ -373,46 +377,47 @@ static void test_nesting_and_references(void **state)
 	scene_fini(&s);
 }
 
-static void test_forward_references_and_aliases(void **state)
+static void test_forward_references_and_aliases_are_resolved(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><ref id='other'/></shape>"
-				 "<bsdf type='diffuse' id='m'/><alias id='m' as='other'/><alias id='other' as='third'/>"
-				 "<shape type='cube'><ref id='third'/></shape></scene>");
+	struct scene s =
+		read_valid("<scene version='3.0.0'><shape type='cube'><ref id='other'/></shape>"
+			   "<bsdf type='diffuse' id='m'/><alias id='m' as='other'/><alias id='other' as='third'/>"
+			   "<shape type='cube'><ref id='third'/></shape></scene>");
 	assert_ptr_equal(node_child(s.objects[0], PLUGIN_BSDF, 0), s.objects[1]);
 	assert_ptr_equal(node_child(s.objects[2], PLUGIN_BSDF, 0), s.objects[1]);
 	scene_fini(&s);
 }
 
-static void test_parameters(void **state)
+static void test_defines_override_defaults(void **state)
 {
 	(void)state;
 	const char *xml = "<scene version='3.0.0'><default name='a' value='0.25'/><default name='dir' value='x$a'/>"
 			  "<bsdf type='roughconductor'><float name='alpha' value='$a'/></bsdf>"
 			  "<texture type='bitmap'><string name='filename' value='$dir/$a.png'/></texture></scene>";
-	struct scene s = read_ok(xml);
+	struct scene s = read_valid(xml);
 	assert_true(node_float(s.objects[0], "alpha", 0) == 0.25);
 	assert_string_equal(s.assets[0], "x0.25/0.25.png");
 	scene_fini(&s);
 	struct scene_define d[] = {{"a", "0.5"}, {"dir", "y"}};
 	struct error e;
-	assert_int_equal(read_with(&s, xml, d, 2, &e), 0);
+	assert_int_equal(read_with_defines(&s, xml, d, 2, &e), 0);
 	assert_true(node_float(s.objects[0], "alpha", 0) == 0.5);
 	assert_string_equal(s.assets[0], "y/0.5.png");
 	scene_fini(&s);
 	struct scene_define wrong[] = {{"aa", "0.5"}};
-	assert_int_equal(read_with(&s, xml, wrong, 1, &e), -EINVAL);
+	assert_int_equal(read_with_defines(&s, xml, wrong, 1, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "did you mean `a`?"));
 }
 
-static void test_include(void **state)
+static void test_included_objects_and_defaults_are_shared(void **state)
 {
 	(void)state;
 	static const char inner[] = "<scene version='3.0.0'><default name='x' value='diffuse'/>"
 				    "<bsdf type='$x' id='m'/></scene>";
 	files[1] = (struct memory_file){"parts/m.xml", inner, sizeof inner - 1};
-	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><ref id='m'/></shape>"
-				 "<include filename='parts/m.xml'/><bsdf type='$x'/></scene>");
+	struct scene s = read_valid("<scene version='3.0.0'><shape type='cube'><ref id='m'/></shape>"
+				    "<include filename='parts/m.xml'/><bsdf type='$x'/></scene>");
 	assert_int_equal(s.object_count, 3);
 	assert_string_equal(s.objects[1]->file, "parts/m.xml");
 	assert_string_equal(s.objects[2]->file, "s.xml");
@@ -425,16 +430,17 @@ static void test_include(void **state)
 }
 
 /* An <include> inside an object: two files deep, and used twice. */
-static void test_include_in_objects(void **state)
+static void test_objects_may_contain_includes(void **state)
 {
 	(void)state;
 	static const char inner[] = "<bsdf type='twosided' version='3.0.0'><include filename='parts/n.xml'/></bsdf>",
 			  innermost[] = "<bsdf type='phong' id='p' version='3.0.0'/>";
 	files[1] = (struct memory_file){"parts/m.xml", inner, sizeof inner - 1};
 	files[2] = (struct memory_file){"parts/n.xml", innermost, sizeof innermost - 1};
-	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><float name='displacement' value='1'/>"
-				 "<include filename='parts/m.xml'/></shape><shape type='sphere'><ref id='p'/></shape>"
-				 "</scene>");
+	struct scene s =
+		read_valid("<scene version='3.0.0'><shape type='cube'><float name='displacement' value='1'/>"
+			   "<include filename='parts/m.xml'/></shape><shape type='sphere'><ref id='p'/></shape>"
+			   "</scene>");
 	assert_int_equal(s.object_count, 2);
 	const struct scene_node *sides = node_child(s.objects[0], PLUGIN_BSDF, 0);
 	assert_string_equal(sides->type, "twosided");
@@ -447,25 +453,25 @@ static void test_include_in_objects(void **state)
 	files[1] = files[2] = (struct memory_file){0};
 }
 
-static void test_escaped_dollar(void **state)
+static void test_escaped_dollar_is_literal(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'><default name='x' value='y'/>"
-				 "<bsdf type='diffuse' id='a\\$x $x \\\\$x\\'/></scene>");
+	struct scene s = read_valid("<scene version='3.0.0'><default name='x' value='y'/>"
+				    "<bsdf type='diffuse' id='a\\$x $x \\\\$x\\'/></scene>");
 	assert_string_equal(s.objects[0]->id, "a$x y \\$x\\");
 	scene_fini(&s);
 }
 
-static void test_ignored_is_noted_once(void **state)
+static void test_ignored_elements_are_noted_once(void **state)
 {
 	(void)state;
-	struct scene s =
-		read_ok("<scene version='0.5.0'>\n<mode type='x'><junk/>words</mode><mode/>\n"
-			"<integrator type='unheard'><float name='q' value='nan'/><integer name='maxDepth' value='7'/>"
-			"<junk/></integrator>\n"
-			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
-			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
-			"<dpt/></scene>");
+	struct scene s = read_valid(
+		"<scene version='0.5.0'>\n<mode type='x'><junk/>words</mode><mode/>\n"
+		"<integrator type='unheard'><float name='q' value='nan'/><integer name='maxDepth' value='7'/>"
+		"<junk/></integrator>\n"
+		"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+		"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+		"<dpt/></scene>");
 	assert_int_equal(s.note_count, 5);
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> is ignored with its contents");
 	assert_string_equal(
@@ -484,19 +490,19 @@ static void test_depths_beyond_the_limit_are_noted(void **state)
 {
 	(void)state;
 	struct scene s =
-		read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='129'/>"
-			"</integrator></scene>");
+		read_valid("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='129'/>"
+			   "</integrator></scene>");
 	assert_int_equal(s.note_count, 2);
 	assert_non_null(strstr(s.notes[1], "max_depth 129 becomes 128"));
 	scene_fini(&s);
-	s = read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='128'/>"
-		    "</integrator></scene>");
+	s = read_valid("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='128'/>"
+		       "</integrator></scene>");
 	assert_int_equal(s.note_count, 1);
 	scene_fini(&s);
 }
 
 /* All errors are listed, each with its place; an object that cannot be read is listed once. */
-static void test_every_problem_is_told(void **state)
+static void test_every_problem_is_listed_with_its_place(void **state)
 {
 	(void)state;
 	const char *xml =
@@ -521,17 +527,17 @@ static void test_every_problem_is_told(void **state)
 }
 
 /* 0.6 has two names for the colour of a diffuse surface; 3.x has one. */
-static void test_second_name(void **state)
+static void test_second_name_of_reflectance_is_read_in_0_6(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='0.6.0'><bsdf type='diffuse'><texture name='diffuseReflectance' "
-				 "type='checkerboard'/></bsdf><bsdf type='diffuse'>"
-				 "<rgb name='diffuseReflectance' value='0.1 0.2 0.3'/></bsdf></scene>");
+	struct scene s = read_valid("<scene version='0.6.0'><bsdf type='diffuse'><texture name='diffuseReflectance' "
+				    "type='checkerboard'/></bsdf><bsdf type='diffuse'>"
+				    "<rgb name='diffuseReflectance' value='0.1 0.2 0.3'/></bsdf></scene>");
 	assert_non_null(node_ref(s.objects[0], "reflectance"));
 	assert_true(node_find_property(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
 	scene_fini(&s);
 	/* With a value and a texture, the texture counts in 0.6, in either order. */
-	s = read_ok(
+	s = read_valid(
 		"<scene version='0.6.0'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/>"
 		"<spectrum name='reflectance' value='0.5'/></bsdf><bsdf type='diffuse'>"
 		"<spectrum name='reflectance' value='0.5'/><texture name='reflectance' type='checkerboard'/></bsdf></scene>");
@@ -539,49 +545,49 @@ static void test_second_name(void **state)
 		assert_true(node_ref(s.objects[i], "reflectance") && s.objects[i]->property_count == 1);
 	scene_fini(&s);
 	struct error e;
-	assert_true(read_with(&s,
-			      "<scene version='3.0.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
-			      "<texture name='reflectance' type='checkerboard'/></bsdf></scene>",
-			      NULL, 0, &e) < 0);
-	assert_true(read_with(&s,
-			      "<scene version='0.6.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
-			      "<rgb name='diffuseReflectance' value='1'/></bsdf></scene>",
-			      NULL, 0, &e) < 0);
+	assert_true(read_with_defines(&s,
+				      "<scene version='3.0.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
+				      "<texture name='reflectance' type='checkerboard'/></bsdf></scene>",
+				      NULL, 0, &e) < 0);
+	assert_true(read_with_defines(&s,
+				      "<scene version='0.6.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
+				      "<rgb name='diffuseReflectance' value='1'/></bsdf></scene>",
+				      NULL, 0, &e) < 0);
 	assert_non_null(strstr(e.text, "`reflectance` is given twice"));
-	assert_true(read_with(&s,
-			      "<scene version='3.0.0'><bsdf type='diffuse'>"
-			      "<rgb name='diffuse_reflectance' value='1'/></bsdf></scene>",
-			      NULL, 0, &e) < 0);
+	assert_true(read_with_defines(&s,
+				      "<scene version='3.0.0'><bsdf type='diffuse'>"
+				      "<rgb name='diffuse_reflectance' value='1'/></bsdf></scene>",
+				      NULL, 0, &e) < 0);
 	assert_non_null(strstr(e.text, "has no `diffuse_reflectance`"));
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_every_problem_is_told),
-		cmocka_unit_test(test_rgb),
-		cmocka_unit_test(test_spectra),
-		cmocka_unit_test(test_plain_values),
-		cmocka_unit_test(test_transforms),
-		cmocka_unit_test(test_dialects),
-		cmocka_unit_test(test_both_dialects),
-		cmocka_unit_test(test_one_object_in_a_file),
-		cmocka_unit_test(test_capitals_of_types),
-		cmocka_unit_test(test_parameters_of_forks),
-		cmocka_unit_test(test_textures_of_shapes),
-		cmocka_unit_test(test_newer_versions),
-		cmocka_unit_test(test_empty_groups),
-		cmocka_unit_test(test_numbers_given_as_colours),
-		cmocka_unit_test(test_lenient_numbers),
-		cmocka_unit_test(test_nesting_and_references),
-		cmocka_unit_test(test_forward_references_and_aliases),
-		cmocka_unit_test(test_parameters),
-		cmocka_unit_test(test_include),
-		cmocka_unit_test(test_include_in_objects),
-		cmocka_unit_test(test_escaped_dollar),
-		cmocka_unit_test(test_ignored_is_noted_once),
+		cmocka_unit_test(test_every_problem_is_listed_with_its_place),
+		cmocka_unit_test(test_rgb_notations_are_read),
+		cmocka_unit_test(test_sampled_spectra_are_read),
+		cmocka_unit_test(test_points_numbers_and_booleans_are_read),
+		cmocka_unit_test(test_transform_steps_apply_in_order),
+		cmocka_unit_test(test_names_follow_the_dialect_of_the_file),
+		cmocka_unit_test(test_files_of_both_dialects_can_be_combined),
+		cmocka_unit_test(test_included_file_may_be_a_single_object),
+		cmocka_unit_test(test_capitals_in_type_names_are_ignored),
+		cmocka_unit_test(test_parameters_of_forks_are_noted),
+		cmocka_unit_test(test_textures_of_shapes_may_have_any_name),
+		cmocka_unit_test(test_newer_versions_are_read_as_version_3),
+		cmocka_unit_test(test_empty_groups_are_noted_once),
+		cmocka_unit_test(test_grey_colours_are_accepted_as_numbers),
+		cmocka_unit_test(test_lenient_reading_drops_textures_of_numbers),
+		cmocka_unit_test(test_nested_and_referenced_objects_are_found),
+		cmocka_unit_test(test_forward_references_and_aliases_are_resolved),
+		cmocka_unit_test(test_defines_override_defaults),
+		cmocka_unit_test(test_included_objects_and_defaults_are_shared),
+		cmocka_unit_test(test_objects_may_contain_includes),
+		cmocka_unit_test(test_escaped_dollar_is_literal),
+		cmocka_unit_test(test_ignored_elements_are_noted_once),
 		cmocka_unit_test(test_depths_beyond_the_limit_are_noted),
-		cmocka_unit_test(test_second_name),
+		cmocka_unit_test(test_second_name_of_reflectance_is_read_in_0_6),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

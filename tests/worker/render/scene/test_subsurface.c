@@ -44,7 +44,7 @@ static double integrated_dipole(double albedo, double inside)
 	return sum;
 }
 
-static void test_reflectance(void **state)
+static void test_reflectance_matches_the_integrated_dipole(void **state)
 {
 	(void)state;
 	static const double albedos[] = {0.1, 0.5, 0.9, 0.99, 0.999}, etas[] = {1.1, 1.33, 1.5046};
@@ -62,7 +62,7 @@ static void test_reflectance(void **state)
 	assert_true(subsurface_reflectance(0, 1.5) == 0 && subsurface_reflectance(1, 1.5) == 1);
 }
 
-static void test_base(void **state)
+static void test_base_colour_reproduces_the_albedo(void **state)
 {
 	(void)state;
 	for (double r = 0.05; r < 1; r += 0.1) {
@@ -94,7 +94,7 @@ static const double *base_colour(const struct scene *s, unsigned i)
 	return p->value.as.rgb;
 }
 
-static void is_base(const double *rgb, int k, double albedo, double eta)
+static void assert_base_colour(const double *rgb, int k, double albedo, double eta)
 {
 	double want = subsurface_base_reflectance(subsurface_reflectance(albedo, eta), eta);
 	if (!(fabs(rgb[k] / want - 1) < 1e-12))
@@ -122,18 +122,18 @@ static const char scene_xml[] =
 	"<emitter type='constant'/></scene>";
 /* clang-format on */
 
-static void test_scene(void **state)
+static void test_subsurface_scenes_get_base_colours(void **state)
 {
 	(void)state;
 	struct scene s = read_leniently(scene_xml);
 	const double eta = 1.5046 / 1.000277;
-	is_base(base_colour(&s, 1), 0, 0.70 / 0.7014, eta); /* skim milk: Jensen et al. 2001, figure 5 */
-	is_base(base_colour(&s, 1), 2, 1.90 / 1.9142, eta);
+	assert_base_colour(base_colour(&s, 1), 0, 0.70 / 0.7014, eta); /* skim milk: Jensen et al. 2001, figure 5 */
+	assert_base_colour(base_colour(&s, 1), 2, 1.90 / 1.9142, eta);
 	assert_true(node_float(node_child(s.objects[1], PLUGIN_BSDF, 0), "alpha", 0) == 0.3);
 	for (int k = 0; k < 3; k++)
-		is_base(base_colour(&s, 2), k, (const double[]){0.9, 0.75, 0.5}[k], 1.3);
-	is_base(base_colour(&s, 3), 1, 4.5 / 5.5, eta);
-	is_base(base_colour(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
+		assert_base_colour(base_colour(&s, 2), k, (const double[]){0.9, 0.75, 0.5}[k], 1.3);
+	assert_base_colour(base_colour(&s, 3), 1, 4.5 / 5.5, eta);
+	assert_base_colour(base_colour(&s, 4), 0, 0.74 / 0.772, eta); /* skin1 */
 	/* The coefficients are incomplete, or the BSDF has no base: no stand-in. Other shapes that refer to the same
 	 * BSDF keep it unchanged. */
 	assert_null(node_find_property(node_child(s.objects[5], PLUGIN_BSDF, 0), "diffuse_reflectance"));
@@ -150,9 +150,9 @@ static void test_scene(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_reflectance),
-		cmocka_unit_test(test_base),
-		cmocka_unit_test(test_scene),
+		cmocka_unit_test(test_reflectance_matches_the_integrated_dipole),
+		cmocka_unit_test(test_base_colour_reproduces_the_albedo),
+		cmocka_unit_test(test_subsurface_scenes_get_base_colours),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

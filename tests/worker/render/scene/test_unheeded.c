@@ -20,7 +20,7 @@
 	"' value='" value "'/></bsdf>"
 
 /* note: expected note; NULL: no note about visible differences */
-static void check(const char *inside, const char *note)
+static void check_note(const char *inside, const char *note)
 {
 	char xml[1024];
 	struct scene s;
@@ -39,24 +39,25 @@ static void check(const char *inside, const char *note)
 	scene_fini(&s);
 }
 
-static void test_notes(void **state)
+static void test_unsupported_parameters_are_noted(void **state)
 {
 	(void)state;
-	check("<emitter type='sky'><rgb name='albedo' value='1 0 0'/></emitter>", NULL);
-	check("<emitter type='sky'/>", NULL);
-	check(BENT("bumpmap", "flip_invalid_normals", "true"), NULL);
-	check(BENT("bumpmap", "use_shadowing_function", "true"), NULL);
-	check("<emitter type='directional'><float name='angle' value='0.53'/></emitter>",
-	      "`angle` is not supported: the image differs a little from Mitsuba's");
-	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
-	check("<shape type='sphere'><medium type='homogeneous'/></shape>", "s.xml:1: a medium in a shape is ignored");
-	check("<medium type='homogeneous' id='m'/><shape type='sphere'><ref id='m'/></shape>",
-	      "s.xml:1: a medium in a shape is ignored");
+	check_note("<emitter type='sky'><rgb name='albedo' value='1 0 0'/></emitter>", NULL);
+	check_note("<emitter type='sky'/>", NULL);
+	check_note(BENT("bumpmap", "flip_invalid_normals", "true"), NULL);
+	check_note(BENT("bumpmap", "use_shadowing_function", "true"), NULL);
+	check_note("<emitter type='directional'><float name='angle' value='0.53'/></emitter>",
+		   "`angle` is not supported: the image differs a little from Mitsuba's");
+	check_note("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
+	check_note("<shape type='sphere'><medium type='homogeneous'/></shape>",
+		   "s.xml:1: a medium in a shape is ignored");
+	check_note("<medium type='homogeneous' id='m'/><shape type='sphere'><ref id='m'/></shape>",
+		   "s.xml:1: a medium in a shape is ignored");
 }
 
 /* The ignored parameters of an object share a note, one for each kind; a second film's note adds those that the first
  * film did not have. */
-static void test_lines_of_objects(void **state)
+static void test_ignored_parameters_share_a_note(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -93,20 +94,21 @@ static void test_lines_of_objects(void **state)
 	for (size_t i = 0; i < sizeof notes / sizeof *notes; i++)
 		if (!scene_has_note(&s, notes[i]))
 			fail_msg("there is no %s", notes[i]);
-	unsigned about = 0;
+	unsigned effect_notes = 0;
 	for (uint32_t i = 0; i < s.note_count; i++)
-		about += strstr(s.notes[i], "no effect on light") != NULL;
-	assert_int_equal(about, 3);
+		effect_notes += strstr(s.notes[i], "no effect on light") != NULL;
+	assert_int_equal(effect_notes, 3);
 	scene_fini(&s);
 }
 
 /* An element that is ignored as a whole may contain the maximum path depth, which is visible in the image. */
-static void test_depths(void **state)
+static void test_depth_in_ignored_elements_is_noted(void **state)
 {
 	(void)state;
-	check("<dpt><string name='a' value='b'/><integer name='maxdepth' value='8'/></dpt>",
-	      "s.xml:1: <dpt> is ignored with its contents, including `maxdepth`: --max-depth 8 limits paths");
-	check("<mode><integer name='max_Depth' value='12'/></mode>", "including `max_Depth`: --max-depth 12 limits");
+	check_note("<dpt><string name='a' value='b'/><integer name='maxdepth' value='8'/></dpt>",
+		   "s.xml:1: <dpt> is ignored with its contents, including `maxdepth`: --max-depth 8 limits paths");
+	check_note("<mode><integer name='max_Depth' value='12'/></mode>",
+		   "including `max_Depth`: --max-depth 12 limits");
 	static const char *const others[] = {"<integer name='maxdepth' value='-1'/>",
 					     "<integer name='maxdepth' value='8x'/>",
 					     "<integer name='maxdepths' value='8'/>",
@@ -116,27 +118,29 @@ static void test_depths(void **state)
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		char text[256];
 		snprintf(text, sizeof text, "<dpt>%s</dpt>", others[i]);
-		check(text, "<dpt> is ignored with its contents");
-		check(text, NULL);
+		check_note(text, "<dpt> is ignored with its contents");
+		check_note(text, NULL);
 	}
 }
 
-static void test_names_of_integrators(void **state)
+static void test_mistyped_integrator_parameters_are_noted(void **state)
 {
 	(void)state;
-	check("<integrator type='path'><integer name='maxdepth' value='8'/></integrator>",
-	      "s.xml:1: <integrator type=\"path\">: `maxdepth` is not known and is ignored; did you mean `max_depth`?");
-	check("<integrator type='path'><boolean name='hide_emiters' value='true'/></integrator>",
-	      "did you mean `hide_emitters`?");
-	check("<sampler type='independent'><integer name='sample_cout' value='8'/></sampler>",
-	      "did you mean `sample_count`?");
-	check("<integrator type='path'><integer name='max_depth' value='8'/><boolean name='use_path_guiding' value='true'/>"
-	      "</integrator>",
-	      NULL);
+	check_note(
+		"<integrator type='path'><integer name='maxdepth' value='8'/></integrator>",
+		"s.xml:1: <integrator type=\"path\">: `maxdepth` is not known and is ignored; did you mean `max_depth`?");
+	check_note("<integrator type='path'><boolean name='hide_emiters' value='true'/></integrator>",
+		   "did you mean `hide_emitters`?");
+	check_note("<sampler type='independent'><integer name='sample_cout' value='8'/></sampler>",
+		   "did you mean `sample_count`?");
+	check_note(
+		"<integrator type='path'><integer name='max_depth' value='8'/><boolean name='use_path_guiding' value='true'/>"
+		"</integrator>",
+		NULL);
 }
 
 /* None of Mitsuba's integrators that render all light is unknown, nor are those of this renderer. */
-static void test_known_integrators(void **state)
+static void test_only_unknown_integrators_are_noted(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"path",
@@ -164,38 +168,42 @@ static void test_known_integrators(void **state)
 	for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
 		char xml[128];
 		snprintf(xml, sizeof xml, "<integrator type='%s'/>", types[i]);
-		check(xml, NULL);
+		check_note(xml, NULL);
 	}
-	check("<integrator type='my_direct'/>",
-	      "<integrator type=\"my_direct\">: is not known: the image shows all light, on surfaces and in media");
-	check("<integrator type='pathh'/>",
-	      "<integrator type=\"pathh\">: is not known: the image shows all light, on surfaces and in media; did you mean "
-	      "`path`?");
-	check("<integrator type='stokes'><integrator type='my_direct'/></integrator>",
-	      "<integrator type=\"stokes\">: the `my_direct` inside it is not known: the image shows all light, on "
-	      "surfaces and in media, without its polarization");
+	check_note(
+		"<integrator type='my_direct'/>",
+		"<integrator type=\"my_direct\">: is not known: the image shows all light, on surfaces and in media");
+	check_note(
+		"<integrator type='pathh'/>",
+		"<integrator type=\"pathh\">: is not known: the image shows all light, on surfaces and in media; did you mean "
+		"`path`?");
+	check_note(
+		"<integrator type='stokes'><integrator type='my_direct'/></integrator>",
+		"<integrator type=\"stokes\">: the `my_direct` inside it is not known: the image shows all light, on "
+		"surfaces and in media, without its polarization");
 }
 
 /* Filters over a pixel's footprint are read as the closest supported filter. */
-static void test_wide_filters(void **state)
+static void test_footprint_filters_become_bilinear(void **state)
 {
 	(void)state;
 #define MAP(filter)                                                                                               \
 	"<texture type='bitmap'><string name='filename' value='e.png'/><string name='filter_type' value='" filter \
 	"'/></texture>"
-	check(MAP("bilinear") MAP("nearest") MAP("ewa"), NULL);
-	check(MAP("trilinear"), "s.xml:1: <texture type=\"bitmap\">: filter_type `trilinear` is read as `bilinear`");
-	check(MAP("anisotropic"), "filter_type `anisotropic` is read as `bilinear`");
+	check_note(MAP("bilinear") MAP("nearest") MAP("ewa"), NULL);
+	check_note(MAP("trilinear"),
+		   "s.xml:1: <texture type=\"bitmap\">: filter_type `trilinear` is read as `bilinear`");
+	check_note(MAP("anisotropic"), "filter_type `anisotropic` is read as `bilinear`");
 #undef MAP
 }
 
 /* A sampler that only asks for a number of independent samples has nothing that is ignored. */
-static void test_independent_samples(void **state)
+static void test_plain_independent_samplers_have_no_note(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *version, *sampler;
-		bool told;
+		bool has_note;
 	} cases[] = {
 		{"3.0.0", "<sampler type='independent'><integer name='sample_count' value='9'/></sampler>", false},
 		{"0.6.0", "<sampler type='Independent'><integer name='sampleCount' value='9'/></sampler>", false},
@@ -213,8 +221,8 @@ static void test_independent_samples(void **state)
 		struct asset_source assets = memory_assets(files);
 		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 			fail_msg("%s: %s", xml, e.text);
-		if (scene_has_note(&s, "is ignored except for") != cases[i].told)
-			fail_msg("%s: %s", xml, cases[i].told ? "no note" : s.notes[0]);
+		if (scene_has_note(&s, "is ignored except for") != cases[i].has_note)
+			fail_msg("%s: %s", xml, cases[i].has_note ? "no note" : s.notes[0]);
 		scene_fini(&s);
 	}
 }
@@ -222,13 +230,13 @@ static void test_independent_samples(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_notes),
-		cmocka_unit_test(test_lines_of_objects),
-		cmocka_unit_test(test_depths),
-		cmocka_unit_test(test_names_of_integrators),
-		cmocka_unit_test(test_known_integrators),
-		cmocka_unit_test(test_wide_filters),
-		cmocka_unit_test(test_independent_samples),
+		cmocka_unit_test(test_unsupported_parameters_are_noted),
+		cmocka_unit_test(test_ignored_parameters_share_a_note),
+		cmocka_unit_test(test_depth_in_ignored_elements_is_noted),
+		cmocka_unit_test(test_mistyped_integrator_parameters_are_noted),
+		cmocka_unit_test(test_only_unknown_integrators_are_noted),
+		cmocka_unit_test(test_footprint_filters_become_bilinear),
+		cmocka_unit_test(test_plain_independent_samplers_have_no_note),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,7 +20,7 @@
 
 #include <cmocka.h>
 
-static void test_names(void **state)
+static void test_attribute_names_are_grouped(void **state)
 {
 	(void)state;
 	/* Properties, the group and channel of each, and the resulting groups. */
@@ -95,13 +95,13 @@ static struct built build(const char *type, const char *content, const void *byt
 	return b;
 }
 
-static void release(struct built *b)
+static void release_built(struct built *b)
 {
 	arena_fini(&b->arena);
 	scene_fini(&b->scene);
 }
 
-static const struct attribute *find(const struct built *b, const char *name)
+static const struct attribute *find_attribute(const struct built *b, const char *name)
 {
 	if (b->result)
 		fail_msg("%s", b->error.text);
@@ -112,7 +112,7 @@ static const struct attribute *find(const struct built *b, const char *name)
 	return NULL;
 }
 
-static bool near(float a, double b)
+static bool is_near(float a, double b)
 {
 	return fabs((double)a - b) <= 1e-7 * fabs(b);
 }
@@ -121,7 +121,7 @@ static bool near(float a, double b)
 
 /* Integers stand for 0 to 1 and are sRGB, unless the shape says otherwise; a polygon's number applies to each of its
  * triangles, and that of a triangle without area is dropped with it. */
-static void test_ply_values(void **state)
+static void test_ply_values_become_attributes(void **state)
 {
 	(void)state;
 	static const char text[] =
@@ -135,38 +135,39 @@ static void test_ply_values(void **state)
 		"1 3 0 2 4 2 3 1e300\n"
 		"0 0 0 0.5 0.25 65535 1\n1 0 0 2 -1 0 0\n1 1 0 1e13 0 13107 0\n0 1 0 0 0 0 0\n0 0 1 0 0 0 0\n";
 	struct built b = build("ply", "", text, sizeof text - 1);
-	const struct attribute *c = find(&b, "face_color"), *heat = find(&b, "face_heat"),
-			       *v = find(&b, "vertex_color"), *w = find(&b, "vertex_w");
+	const struct attribute *c = find_attribute(&b, "face_color"), *heat = find_attribute(&b, "face_heat"),
+			       *v = find_attribute(&b, "vertex_color"), *w = find_attribute(&b, "vertex_w");
 	assert_int_equal(b.g.mesh.triangle_count, 3);
 	assert_int_equal(b.g.mesh.attribute_count, 4);
 	assert_true(c->is_per_face && heat->is_per_face && !v->is_per_face && !w->is_per_face);
 	assert_true(c->channels == 3 && heat->channels == 1 && v->channels == 3 && w->channels == 1);
 	for (int t = 0; t < 2; t++) {
-		assert_true(near(c->value[3 * t], srgb_to_linear(0.2)));
-		assert_true(near(c->value[3 * t + 1], srgb_to_linear(0.4)) && c->value[3 * t + 2] == 1);
+		assert_true(is_near(c->value[3 * t], srgb_to_linear(0.2)));
+		assert_true(is_near(c->value[3 * t + 1], srgb_to_linear(0.4)) && c->value[3 * t + 2] == 1);
 		assert_true(heat->value[t] == -2.5F);
 	}
-	assert_true(near(c->value[8], srgb_to_linear(3 / 255.0)));
+	assert_true(is_near(c->value[8], srgb_to_linear(3 / 255.0)));
 	assert_true(v->value[0] == 0.5F && v->value[1] == 0.25F && v->value[2] == 1);
 	assert_true(v->value[3] == 2 && v->value[4] == -1 && v->value[6] == 0);
-	assert_true(w->value[0] == 1 && near(w->value[2], srgb_to_linear(0.2)));
+	assert_true(w->value[0] == 1 && is_near(w->value[2], srgb_to_linear(0.2)));
 	/* A value that is not finite marks its own attribute as damaged, and no other. */
 	assert_true(v->has_invalid_value && heat->has_invalid_value && !c->has_invalid_value && !w->has_invalid_value);
 	assert_true(v->is_srgb && heat->is_srgb && !c->is_srgb && !w->is_srgb);
-	release(&b);
+	release_built(&b);
 
 	b = build("ply", "<boolean name='srgb' value='false'/>", text, sizeof text - 1);
-	assert_true(near(find(&b, "face_color")->value[0], 0.2) && find(&b, "vertex_color")->value[0] == 0.5F);
-	assert_false(find(&b, "vertex_color")->is_srgb);
-	release(&b);
+	assert_true(is_near(find_attribute(&b, "face_color")->value[0], 0.2) &&
+		    find_attribute(&b, "vertex_color")->value[0] == 0.5F);
+	assert_false(find_attribute(&b, "vertex_color")->is_srgb);
+	release_built(&b);
 	b = build("ply", "<boolean name='srgb' value='true'/>", text, sizeof text - 1);
-	assert_true(near(find(&b, "vertex_color")->value[0], srgb_to_linear(0.5)));
-	assert_false(find(&b, "vertex_color")->is_srgb);
-	release(&b);
+	assert_true(is_near(find_attribute(&b, "vertex_color")->value[0], srgb_to_linear(0.5)));
+	assert_false(find_attribute(&b, "vertex_color")->is_srgb);
+	release_built(&b);
 }
 
 /* One polygon with many corners and many attributes would make far more numbers than the file has bytes. */
-static void test_ply_bound(void **state)
+static void test_ply_attributes_are_limited(void **state)
 {
 	(void)state;
 	enum { CORNERS = 20000, ROOM = 1 << 17 };
@@ -184,58 +185,58 @@ static void test_ply_bound(void **state)
 		at += snprintf(at, (size_t)(end - at), " 1");
 	struct built b = build("ply", "", text, (size_t)(at - text));
 	assert_true(b.result == -E2BIG && strstr(b.error.text, "1199880 numbers of attributes"));
-	release(&b);
+	release_built(&b);
 	free(text);
 }
 
-static void test_serialized(void **state)
+static void test_serialized_colours_become_attributes(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
 	for (int doubles = 0; doubles < 2; doubles++) {
 		mesh_file_make_serialized(&f, 4, doubles, 8, 1);
 		struct built b = build("serialized", "", f.bytes, f.size);
-		const struct attribute *c = find(&b, "vertex_color");
+		const struct attribute *c = find_attribute(&b, "vertex_color");
 		assert_true(c->channels == 3 && !c->is_per_face && !c->is_srgb && !c->has_invalid_value);
 		for (int i = 0; i < 3 * SOLID_VERTICES; i++)
 			assert_true((double)c->value[i] == SOLID_COLOUR(i));
-		release(&b);
+		release_built(&b);
 		mesh_file_make_serialized(&f, 4, doubles, 3, 1);
 		b = build("serialized", "", f.bytes, f.size);
 		assert_true(b.result == 0 && b.g.mesh.attribute_count == 0);
-		release(&b);
+		release_built(&b);
 	}
 }
 
 /* Three numbers after a position are an sRGB colour, also for the faces of one material; a single weight is not, and
  * colours are used only if each vertex of the file has one. */
-static void test_obj(void **state)
+static void test_obj_colours_become_attributes(void **state)
 {
 	(void)state;
 #define FACES "vt 0 0\nf 1 2 4\nusemtl a\nf 2/1 3/1 4/1\n"
 	static const char text[] =
 		"v 0 0 0 1 0 0 # red\nv 1 0 0 0.2 0.4 0.02\nv 1 1 0 2 \\\n-0.5 1\nv 0 1 0 0 0 1 \n" FACES;
 	struct built b = build("obj", "", text, sizeof text - 1);
-	const struct attribute *c = find(&b, "vertex_color");
+	const struct attribute *c = find_attribute(&b, "vertex_color");
 	assert_true(c->channels == 3 && !c->is_per_face && !c->is_srgb && !c->has_invalid_value);
 	assert_int_equal(b.g.mesh.vertex_count, 6);
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
 		static const double at[4][3] = {{1, 0, 0}, {0.2, 0.4, 0.02}, {0, 0, 1}, {2, -0.5, 1}};
 		const double *p = b.g.mesh.position[i];
 		for (int k = 0; k < 3; k++)
-			assert_true(
-				near(c->value[3 * i + (uint32_t)k], srgb_to_linear(at[(int)p[0] + 2 * (int)p[1]][k])));
+			assert_true(is_near(c->value[3 * i + (uint32_t)k],
+					    srgb_to_linear(at[(int)p[0] + 2 * (int)p[1]][k])));
 	}
-	release(&b);
+	release_built(&b);
 	b = build("obj", "<string name='material' value='a'/>", text, sizeof text - 1);
 	assert_int_equal(b.g.mesh.vertex_count, 3);
-	assert_true(near(find(&b, "vertex_color")->value[0], srgb_to_linear(0.2)));
-	release(&b);
+	assert_true(is_near(find_attribute(&b, "vertex_color")->value[0], srgb_to_linear(0.2)));
+	release_built(&b);
 
 	static const char damaged[] = "v 0 0 0 1 0 0\nv 1 0 0 1e300 0 0\nv 1 1 0 0 0 0\nf 1 2 3\n";
 	b = build("obj", "", damaged, sizeof damaged - 1);
-	assert_true(find(&b, "vertex_color")->has_invalid_value);
-	release(&b);
+	assert_true(find_attribute(&b, "vertex_color")->has_invalid_value);
+	release_built(&b);
 	static const char *const without[] = {
 		"v 0 0 0 1\nv 1 0 0 1\nv 1 1 0 1\nv 0 1 0 1\n" FACES,
 		"v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 1 1 0 1 1 1\nv 0 1 0\n" FACES,
@@ -246,15 +247,18 @@ static void test_obj(void **state)
 	for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
 		b = build("obj", "", without[i], strlen(without[i]));
 		assert_true(b.result == 0 && b.g.mesh.attribute_count == 0);
-		release(&b);
+		release_built(&b);
 	}
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names),	   cmocka_unit_test(test_ply_values), cmocka_unit_test(test_ply_bound),
-		cmocka_unit_test(test_serialized), cmocka_unit_test(test_obj),
+		cmocka_unit_test(test_attribute_names_are_grouped),
+		cmocka_unit_test(test_ply_values_become_attributes),
+		cmocka_unit_test(test_ply_attributes_are_limited),
+		cmocka_unit_test(test_serialized_colours_become_attributes),
+		cmocka_unit_test(test_obj_colours_become_attributes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,9 +47,9 @@ static struct built_shape built_ok(const char *type, const char *content, const 
 /* ---- the distance to a curve, by searching ---- */
 
 /* A point of the curve and its radius, at x from 0 to 1. */
-typedef void curve_at(const double (*p)[4], int count, double x, vec3 *c, double *r);
+typedef void curve_function(const double (*p)[4], int count, double x, vec3 *c, double *r);
 
-static void chain_at(const double (*p)[4], int count, double x, vec3 *c, double *r)
+static void chain_position(const double (*p)[4], int count, double x, vec3 *c, double *r)
 {
 	int i = (int)fmin(count - 2, floor(x * (count - 1)));
 	double t = x * (count - 1) - i;
@@ -58,7 +58,7 @@ static void chain_at(const double (*p)[4], int count, double x, vec3 *c, double 
 }
 
 /* By de Boor's recursion over the uniform knots. */
-static void spline_at(const double (*p)[4], int count, double x, vec3 *c, double *r)
+static void spline_position(const double (*p)[4], int count, double x, vec3 *c, double *r)
 {
 	int i = (int)fmin(count - 4, floor(x * (count - 3)));
 	double t = x * (count - 3) - i, d[4][4];
@@ -74,14 +74,14 @@ static void spline_at(const double (*p)[4], int count, double x, vec3 *c, double
 }
 
 /* Returns the distance of q from the spheres along the curve, over the radius of the nearest one. */
-static double distance(curve_at *at, const double (*p)[4], int count, vec3 q)
+static double distance_from_curve(curve_function *evaluate, const double (*p)[4], int count, vec3 q)
 {
 	enum { STEPS = 20000 };
 	double least = INFINITY, radius = 1;
 	for (int i = 0; i <= STEPS; i++) {
 		vec3 c;
 		double r;
-		at(p, count, (double)i / STEPS, &c, &r);
+		evaluate(p, count, (double)i / STEPS, &c, &r);
 		double d = vec3_length(vec3_sub(q, c)) - r;
 		if (d < least) {
 			least = d;
@@ -105,7 +105,8 @@ static void print_points(char *text, size_t size, int columns)
 		}
 }
 
-static void check_surface(const char *type, curve_at *at, double inwards, uint32_t least)
+static void check_distance_from_curve(const char *type, curve_function *evaluate, double inwards,
+				      uint32_t min_triangles)
 {
 	char text[1024];
 	uint32_t outside = 0;
@@ -114,33 +115,33 @@ static void check_surface(const char *type, curve_at *at, double inwards, uint32
 	const struct mesh *m = &b.geometry.mesh;
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		vec3 q = vec3_load(m->position[i]), n = vec3_load(m->normal[i]);
-		double d = distance(at, points, POINTS, q);
+		double d = distance_from_curve(evaluate, points, POINTS, q);
 		if (d > SCALE - 1 + 2e-3)
 			fail_msg("%s: vertex %u is %g radii outside", type, i, d);
 		if (d < -inwards)
 			continue; /* on the inside of a joint or of a bend */
 		outside++;
 		/* The distance grows along the normal. */
-		double further = distance(at, points, POINTS, vec3_madd(q, 0.02, n)),
-		       nearer = distance(at, points, POINTS, vec3_madd(q, -0.02, n));
+		double further = distance_from_curve(evaluate, points, POINTS, vec3_madd(q, 0.02, n)),
+		       nearer = distance_from_curve(evaluate, points, POINTS, vec3_madd(q, -0.02, n));
 		if (!(further > d && d > nearer))
 			fail_msg("%s: vertex %u: %g, %g, %g radii along its normal", type, i, nearer, d, further);
 		assert_true(m->uv[i][0] >= 0 && m->uv[i][0] <= 1 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1 + 1e-12);
 	}
-	assert_true(outside >= least);
+	assert_true(outside >= min_triangles);
 	built_shape_fini(&b);
 }
 
-static void test_surfaces(void **state)
+static void test_surfaces_lie_on_their_curves(void **state)
 {
 	(void)state;
-	check_surface("linearcurve", chain_at, 1e-3, 200);
-	check_surface("bsplinecurve", spline_at, 0.05, 150);
+	check_distance_from_curve("linearcurve", chain_position, 1e-3, 200);
+	check_distance_from_curve("bsplinecurve", spline_position, 0.05, 150);
 }
 
 /* Normals are those of the surface between the rings, computed as the mean over the triangles around a vertex. The
  * radius changes fast here. */
-static void test_normals(void **state)
+static void test_normals_are_those_of_the_surface(void **state)
 {
 	(void)state;
 	static const char text[] = "0 0 0 0.1\n1 0 0 0.2\n2 0 0 0.6\n3 1 0 0.7\n3 2 0 0.4\n3 3 1 0.1\n3 4 1 0.1\n";
@@ -154,8 +155,9 @@ static void test_normals(void **state)
 			vec3 a = built_shape_corner(m, t, k),
 			     u = vec3_unit_or_zero(vec3_sub(built_shape_corner(m, t, (k + 1) % 3), a)),
 			     v = vec3_unit_or_zero(vec3_sub(built_shape_corner(m, t, (k + 2) % 3), a));
-			double *at = sum[m->index[t][k]];
-			vec3_store(at, vec3_madd(vec3_load(at), vec3_angle(u, v), vec3_unit_or_zero(vec3_cross(u, v))));
+			double *evaluate = sum[m->index[t][k]];
+			vec3_store(evaluate, vec3_madd(vec3_load(evaluate), vec3_angle(u, v),
+						       vec3_unit_or_zero(vec3_cross(u, v))));
 		}
 	for (uint32_t i = TUBE_SIDES + 1; i < last; i++) {
 		uint32_t ring = i / (TUBE_SIDES + 1) * (TUBE_SIDES + 1);
@@ -177,25 +179,25 @@ static void test_normals(void **state)
 	built_shape_fini(&b);
 }
 
-static bool near(double a, double b, double share)
+static bool is_near(double a, double b, double share)
 {
 	return fabs(a - b) <= share * fabs(b);
 }
 
-static void test_areas_and_volumes(void **state)
+static void test_areas_and_volumes_are_exact(void **state)
 {
 	(void)state;
 	/* A straight tube with open ends has exactly the right area. */
 	struct built_shape b = built_ok("bsplinecurve", "", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n4 0 0 0.5\n");
-	assert_true(near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 2, 1e-12));
+	assert_true(is_near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 2, 1e-12));
 	for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++)
-		assert_true(near(b.geometry.mesh.uv[i][1], (b.geometry.mesh.position[i][0] - 1) / 2, 1e-12) ||
+		assert_true(is_near(b.geometry.mesh.uv[i][1], (b.geometry.mesh.position[i][0] - 1) / 2, 1e-12) ||
 			    b.geometry.mesh.position[i][0] == 1);
 	built_shape_fini(&b);
 	/* With round ends, it is closed and faces outwards. */
 	b = built_ok("linearcurve", "", "0 0 0 0.5\n0 0 3 0.5\n");
-	assert_true(near(built_shape_volume(&b.geometry.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
-	assert_true(near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
+	assert_true(is_near(built_shape_volume(&b.geometry.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
+	assert_true(is_near(built_shape_area(&b.geometry.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
 	built_shape_fini(&b);
 	/* If one sphere is inside another, or a point is given twice, only the larger sphere remains, whichever comes
 	 * first. */
@@ -214,7 +216,7 @@ static void test_areas_and_volumes(void **state)
 
 /* Cones between the points of a chain, compared with the spline at the same v, deviate by at most a twentieth of the
  * largest radius nearby, in position and radius together. */
-static void test_chain_of_spline(void **state)
+static void test_chain_approximates_its_spline(void **state)
 {
 	(void)state;
 	char text[1024];
@@ -234,7 +236,7 @@ static void test_chain_of_spline(void **state)
 			double x = k / 8.0, r, widest = 0;
 			vec3 c, q = vec3_madd(vec3_scale(1 - x, p[i].center), x, p[i + 1].center);
 			double v = (1 - x) * p[i].v + x * p[i + 1].v;
-			spline_at(points, POINTS, v, &c, &r);
+			spline_position(points, POINTS, v, &c, &r);
 			int first = (int)fmin(POINTS - 4, floor(v * (POINTS - 3)));
 			for (int j = first; j < first + 4; j++)
 				widest = fmax(widest, points[j][3]);
@@ -249,7 +251,7 @@ static void test_chain_of_spline(void **state)
 }
 
 /* v grows over all pieces of all curves, by the same amount for each piece. */
-static void test_v(void **state)
+static void test_v_grows_evenly_over_all_pieces(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"linearcurve", "bsplinecurve"};
@@ -261,9 +263,9 @@ static void test_v(void **state)
 		/* Pieces: 4 and 3 from 0 to 36 and to 27; 2 and 1 from 9 to 27 and to 18. */
 		double pieces = k ? 3 : 7, from = k ? 9 : 0;
 		for (uint32_t i = 0; i < m->vertex_count; i++) {
-			double x = m->position[i][0], at = (fmin(fmax(x, from), k ? 27 : 36) - from) / 9;
+			double x = m->position[i][0], evaluate = (fmin(fmax(x, from), k ? 27 : 36) - from) / 9;
 			bool second = m->position[i][1] > 4.5, end = !k && (x < 1 || x > 26);
-			if (!end && !(fabs(m->uv[i][1] - (at + (second ? k ? 2 : 4 : 0)) / pieces) < 0.02))
+			if (!end && !(fabs(m->uv[i][1] - (evaluate + (second ? k ? 2 : 4 : 0)) / pieces) < 0.02))
 				fail_msg("%s: v is %g at x = %g of curve %d", types[k], m->uv[i][1], x, second);
 		}
 		built_shape_fini(&b);
@@ -271,7 +273,7 @@ static void test_v(void **state)
 }
 
 /* to_world transforms the control points, but not their radii. */
-static void test_placed(void **state)
+static void test_to_world_leaves_radii_unchanged(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"linearcurve", "bsplinecurve"};
@@ -297,7 +299,7 @@ static void test_placed(void **state)
 	}
 }
 
-static size_t put_float(unsigned char *to, float v)
+static size_t store_float(unsigned char *to, float v)
 {
 	uint32_t bits;
 	memcpy(&bits, &v, sizeof bits);
@@ -307,24 +309,24 @@ static size_t put_float(unsigned char *to, float v)
 }
 
 /* Two hairs, and between them one of a single point, which is left out. */
-static size_t binary_hair(unsigned char *to)
+static size_t write_binary_hair(unsigned char *to)
 {
 	static const float v[] = {0, 0, 0, 1, 0, 0, 2, 1, 0, INFINITY, 9, 9, 9, INFINITY, 0, 2, 0, 0, 3, 0};
 	size_t size = 15;
 	memcpy(to, "BINARY_HAIR\6\0\0\0", size);
 	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
-		size += put_float(to + size, v[i]);
+		size += store_float(to + size, v[i]);
 	return size;
 }
 
-static void test_hair(void **state)
+static void test_binary_and_text_hair_are_read(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
 	static const char text[] = "0 0 0\n1 0 0\n2 1 0\n\n9 9 9\n\n0 2 0\n0 3 0\n";
 	const char *radius = "<float name='radius' value='0.1'/>";
 	struct built_shape a = built_ok("hair", radius, text),
-			   b = build_curves("hair", radius, bytes, binary_hair(bytes)),
+			   b = build_curves("hair", radius, bytes, write_binary_hair(bytes)),
 			   c = built_ok("linearcurve", "", "0 0 0 0.1\n1 0 0 0.1\n2 1 0 0.1\n\n0 2 0 0.1\n0 3 0 0.1\n"),
 			   d = built_ok("hair", "", text),
 			   s = built_ok("hair",
@@ -332,7 +334,7 @@ static void test_hair(void **state)
 					"<scale x='7' y='7' z='2'/><rotate y='1' angle='30'/></transform>",
 					"0 0 0\n0 1 0\n");
 	/* to_world scales radii like its z axis. A tube of 12 sides has the area of the cylinder, without the ends. */
-	assert_true(near(built_shape_area(&s.geometry.mesh), 2 * M_PI * 0.1 * 7, 0.03));
+	assert_true(is_near(built_shape_area(&s.geometry.mesh), 2 * M_PI * 0.1 * 7, 0.03));
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	assert_int_equal(a.geometry.mesh.vertex_count, b.geometry.mesh.vertex_count);
@@ -342,7 +344,7 @@ static void test_hair(void **state)
 	assert_memory_equal(a.geometry.mesh.position, c.geometry.mesh.position,
 			    b.geometry.mesh.vertex_count * sizeof *b.geometry.mesh.position);
 	/* 0.025 is the default radius. */
-	assert_true(near(built_shape_area(&d.geometry.mesh) / built_shape_area(&a.geometry.mesh), 0.25, 0.1));
+	assert_true(is_near(built_shape_area(&d.geometry.mesh) / built_shape_area(&a.geometry.mesh), 0.25, 0.1));
 	built_shape_fini(&a);
 	built_shape_fini(&b);
 	built_shape_fini(&c);
@@ -350,7 +352,7 @@ static void test_hair(void **state)
 	built_shape_fini(&s);
 }
 
-static void test_bad_files(void **state)
+static void test_invalid_curve_files_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -378,7 +380,7 @@ static void test_bad_files(void **state)
 		built_shape_fini(&b);
 	}
 	unsigned char bytes[256];
-	size_t size = binary_hair(bytes);
+	size_t size = write_binary_hair(bytes);
 	for (size_t n = 15; n < size; n++) {
 		struct built_shape b = build_curves("hair", "", bytes, n);
 		if (b.result >= 0 || !strstr(b.error.text, "m: ends before its last"))
@@ -391,7 +393,7 @@ static void test_bad_files(void **state)
 }
 
 /* Numbers of any size, repeated points and abrupt turns give a mesh of finite numbers, or an error. */
-static void test_extremes(void **state)
+static void test_extreme_curves_give_finite_meshes(void **state)
 {
 	(void)state;
 	static const char *const numbers[] = {"0",	"1",	"-1",	 "1e60",  "-1e60", "1e-60", "1e-200",
@@ -420,7 +422,7 @@ static void test_extremes(void **state)
 	assert_true(meshes > 1000);
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	char text[1024];
@@ -437,16 +439,16 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),
-		cmocka_unit_test(test_normals),
-		cmocka_unit_test(test_areas_and_volumes),
-		cmocka_unit_test(test_placed),
-		cmocka_unit_test(test_v),
-		cmocka_unit_test(test_chain_of_spline),
-		cmocka_unit_test(test_hair),
-		cmocka_unit_test(test_bad_files),
-		cmocka_unit_test(test_extremes),
-		cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_surfaces_lie_on_their_curves),
+		cmocka_unit_test(test_normals_are_those_of_the_surface),
+		cmocka_unit_test(test_areas_and_volumes_are_exact),
+		cmocka_unit_test(test_to_world_leaves_radii_unchanged),
+		cmocka_unit_test(test_v_grows_evenly_over_all_pieces),
+		cmocka_unit_test(test_chain_approximates_its_spline),
+		cmocka_unit_test(test_binary_and_text_hair_are_read),
+		cmocka_unit_test(test_invalid_curve_files_are_refused),
+		cmocka_unit_test(test_extreme_curves_give_finite_meshes),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -53,7 +53,7 @@ static struct built build_ok(const char *type, const char *content, const char *
 	return b;
 }
 
-static void release(struct built *b)
+static void release_built(struct built *b)
 {
 	arena_fini(&b->arena);
 	scene_fini(&b->scene);
@@ -67,7 +67,7 @@ static double rough_height(const void *user, double u, double v)
 	return x - floor(x);
 }
 
-static double waves(const void *user, double u, double v)
+static double wave_height(const void *user, double u, double v)
 {
 	(void)user;
 	return sin(2 * M_PI * u) * cos(2 * M_PI * v) + 0.3 * u * v;
@@ -79,14 +79,14 @@ static double unit_height(const void *user, double u, double v)
 	return 1;
 }
 
-struct side {
+struct triangle_side {
 	double p[2][3];
-	int way; /* +1: from the smaller end to the larger */
+	int direction; /* +1: from the smaller end to the larger */
 };
 
 static int compare_sides(const void *a, const void *b)
 {
-	const struct side *x = a, *y = b;
+	const struct triangle_side *x = a, *y = b;
 	for (int k = 0; k < 6; k++)
 		if (x->p[k / 3][k % 3] != y->p[k / 3][k % 3])
 			return x->p[k / 3][k % 3] < y->p[k / 3][k % 3] ? -1 : 1;
@@ -105,25 +105,25 @@ static int compare_points(const double *a, const double *b)
 static void assert_closed(const struct mesh *m)
 {
 	size_t n = 3 * (size_t)m->triangle_count;
-	struct side *s = calloc(n, sizeof *s);
+	struct triangle_side *s = calloc(n, sizeof *s);
 	for (size_t i = 0; i < n; i++) {
 		const double *a = m->position[m->index[i / 3][i % 3]], *b = m->position[m->index[i / 3][(i + 1) % 3]];
 		bool up = compare_points(a, b) < 0;
 		memcpy(s[i].p[0], up ? a : b, sizeof s[i].p[0]);
 		memcpy(s[i].p[1], up ? b : a, sizeof s[i].p[1]);
-		s[i].way = up ? 1 : -1;
+		s[i].direction = up ? 1 : -1;
 	}
 	qsort(s, n, sizeof *s, compare_sides);
 	assert_int_equal(n % 2, 0);
 	for (size_t i = 0; i < n; i += 2) {
-		if (compare_sides(&s[i], &s[i + 1]) != 0 || s[i].way + s[i + 1].way != 0 ||
+		if (compare_sides(&s[i], &s[i + 1]) != 0 || s[i].direction + s[i + 1].direction != 0 ||
 		    (i + 2 < n && compare_sides(&s[i + 1], &s[i + 2]) == 0))
 			fail_msg("a crack at (%g, %g, %g)", s[i].p[0][0], s[i].p[0][1], s[i].p[0][2]);
 	}
 	free(s);
 }
 
-static double volume(const struct mesh *m)
+static double enclosed_volume(const struct mesh *m)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++)
@@ -140,12 +140,12 @@ static double volume(const struct mesh *m)
 /* clang-format on */
 /* The same, each triangle with vertices of its own. */
 /* clang-format off */
-#define LOOSE                                                                                                                  \
-	"v 1 1 1\nv -1 1 -1\nv -1 -1 1\nv 1 1 1\nv -1 -1 1\nv 1 -1 -1\nv 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\n"          \
+#define TETRAHEDRON_UNSHARED \
+	"v 1 1 1\nv -1 1 -1\nv -1 -1 1\nv 1 1 1\nv -1 -1 1\nv 1 -1 -1\nv 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\n" \
 	"v -1 1 -1\nv 1 -1 -1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 4/1 5/2 6/3\nf 7/1 8/2 9/3\nf 10/1 11/2 12/3\n"
 /* clang-format on */
 
-static void test_no_cracks(void **state)
+static void test_displaced_meshes_stay_closed(void **state)
 {
 	(void)state;
 	static const struct {
@@ -163,7 +163,7 @@ static void test_no_cracks(void **state)
 		 NULL, 8, 1},
 		{"obj", "", TETRAHEDRON, 4, 1},
 		{"obj", "<boolean name='face_normals' value='true'/>", TETRAHEDRON, 4, 1},
-		{"obj", "", LOOSE, 4, 1},
+		{"obj", "", TETRAHEDRON_UNSHARED, 4, 1},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		for (uint32_t level = 0; level < 5; level++) {
@@ -172,15 +172,15 @@ static void test_no_cracks(void **state)
 			const struct mesh *m = &b.g.mesh;
 			assert_int_equal(m->triangle_count, cases[i].base << 2 * level);
 			assert_closed(m);
-			assert_true(cases[i].sign * volume(m) > 0);
+			assert_true(cases[i].sign * enclosed_volume(m) > 0);
 			for (uint32_t k = 0; k < m->vertex_count; k++)
 				assert_true(fabs(vec3_length(vec3_load(m->normal[k])) - 1) < 1e-12);
-			release(&b);
+			release_built(&b);
 		}
 }
 
 /* Likewise those of triangles without area, such as the second face. */
-static void test_unused_vertices_stay(void **state)
+static void test_unused_vertices_are_not_displaced(void **state)
 {
 	(void)state;
 	struct displacement d = {unit_height, NULL, true, 3, 2, 1};
@@ -191,10 +191,10 @@ static void test_unused_vertices_stay(void **state)
 		const double *p = b.g.mesh.position[i];
 		assert_true(p[2] == 3 || (p[0] == 9 && p[2] == 9));
 	}
-	release(&b);
+	release_built(&b);
 }
 
-static void test_height_zero_is_the_base(void **state)
+static void test_height_zero_keeps_the_base_mesh(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"cube", "rectangle", "sphere", "obj", "obj"};
@@ -225,12 +225,12 @@ static void test_height_zero_is_the_base(void **state)
 					assert_true(vec3_length(vec3_sub(n[c], g)) < 1e-13);
 			}
 		}
-		release(&b);
+		release_built(&b);
 	}
 }
 
 /* A cube enlarged by a constant height: its faces are further out, with their own normals except where they meet. */
-static void test_constant_on_a_cube(void **state)
+static void test_constant_height_enlarges_a_cube(void **state)
 {
 	(void)state;
 	struct displacement d = {unit_height, NULL, true, 0.25, 3, 1};
@@ -259,11 +259,11 @@ static void test_constant_on_a_cube(void **state)
 	assert_int_equal(corners, 24);
 	assert_int_equal(edges, 24 * 7);
 	assert_int_equal(faces, 6 * 49);
-	release(&b);
+	release_built(&b);
 }
 
 /* Largest deviations from the analytic surface over all vertices and triangles. */
-struct misses {
+struct deviations {
 	double position, normal, derivative;
 };
 
@@ -271,7 +271,7 @@ typedef void surface(double u, double v, vec3 *p, vec3 *n);
 
 /* Compares the derivatives of the unit normal with respect to u and v inside a triangle, of the mesh and of the
  * surface. */
-static double derivative_off(const struct mesh *m, const uint32_t t[3], surface *of)
+static double derivative_error(const struct mesh *m, const uint32_t t[3], surface *reference)
 {
 	const double *c0 = m->uv[t[0]], *c1 = m->uv[t[1]], *c2 = m->uv[t[2]];
 	double du1 = c1[0] - c0[0], dv1 = c1[1] - c0[1], du2 = c2[0] - c0[0], dv2 = c2[1] - c0[1],
@@ -288,17 +288,17 @@ static double derivative_off(const struct mesh *m, const uint32_t t[3], surface 
 		change = vec3_madd(change, -vec3_dot(change, n), n);
 		vec3 p, a, b;
 		double u = (c0[0] + c1[0] + c2[0]) / 3, v = (c0[1] + c1[1] + c2[1]) / 3, h = 1e-5;
-		of(k ? u : u + h, k ? v + h : v, &p, &a);
-		of(k ? u : u - h, k ? v - h : v, &p, &b);
+		reference(k ? u : u + h, k ? v + h : v, &p, &a);
+		reference(k ? u : u - h, k ? v - h : v, &p, &b);
 		worst = fmax(worst, vec3_length(vec3_sub(change, vec3_scale(0.5 / h, vec3_sub(a, b)))));
 	}
 	return worst;
 }
 
 /* With a margin in v for spheres, since u is undefined at the poles. */
-static struct misses measure(const struct mesh *m, surface *of, double margin)
+static struct deviations measure_deviations(const struct mesh *m, surface *reference, double margin)
 {
-	struct misses r = {0, 0, 0};
+	struct deviations r = {0, 0, 0};
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
 		bool skip = false;
 		for (int k = 0; k < 3; k++) {
@@ -308,18 +308,18 @@ static struct misses measure(const struct mesh *m, surface *of, double margin)
 			if (skip)
 				continue;
 			vec3 p, n;
-			of(u, v, &p, &n);
+			reference(u, v, &p, &n);
 			r.position = fmax(r.position, vec3_length(vec3_sub(p, vec3_load(m->position[t]))));
 			r.normal = fmax(r.normal, vec3_length(vec3_sub(n, vec3_load(m->normal[t]))));
 		}
 		if (!skip)
-			r.derivative = fmax(r.derivative, derivative_off(m, m->index[i], of));
+			r.derivative = fmax(r.derivative, derivative_error(m, m->index[i], reference));
 	}
 	return r;
 }
 
 /* Returns the normal of a surface, from differences of positions with steps far smaller than those of the meshes. */
-static vec3 normal_of(vec3 (*at)(double, double), double u, double v, double sign)
+static vec3 surface_normal(vec3 (*at)(double, double), double u, double v, double sign)
 {
 	double h = 1e-4;
 	vec3 d[2];
@@ -331,47 +331,47 @@ static vec3 normal_of(vec3 (*at)(double, double), double u, double v, double sig
 	return vec3_scale(sign, vec3_normalize(vec3_cross(d[0], d[1])));
 }
 
-static vec3 plane_at(double u, double v)
+static vec3 plane_point(double u, double v)
 {
-	return (vec3){2 * u - 1, 2 * v - 1, 0.2 * waves(NULL, u, v)};
+	return (vec3){2 * u - 1, 2 * v - 1, 0.2 * wave_height(NULL, u, v)};
 }
 
-static void plane(double u, double v, vec3 *p, vec3 *n)
+static void wavy_plane(double u, double v, vec3 *p, vec3 *n)
 {
-	*p = plane_at(u, v);
-	*n = normal_of(plane_at, u, v, 1);
+	*p = plane_point(u, v);
+	*n = surface_normal(plane_point, u, v, 1);
 }
 
 /* A height that is periodic in u, and has a single value at each pole. */
-static double bumps(const void *user, double u, double v)
+static double bump_height(const void *user, double u, double v)
 {
 	(void)user;
 	double s = sin(M_PI * v), c = cos(M_PI * v), a = 2 * M_PI * u;
 	return s * s * cos(2 * a) + 0.5 * c + s * sin(a);
 }
 
-static vec3 ball_at(double u, double v)
+static vec3 ball_point(double u, double v)
 {
-	double s = sin(M_PI * v), r = 1 + 0.1 * bumps(NULL, u, v);
+	double s = sin(M_PI * v), r = 1 + 0.1 * bump_height(NULL, u, v);
 	return (vec3){r * s * cos(2 * M_PI * u), r * s * sin(2 * M_PI * u), r * cos(M_PI * v)};
 }
 
-static void ball(double u, double v, vec3 *p, vec3 *n)
+static void bumpy_ball(double u, double v, vec3 *p, vec3 *n)
 {
-	*p = ball_at(u, v);
-	*n = normal_of(ball_at, u, v, -1);
+	*p = ball_point(u, v);
+	*n = surface_normal(ball_point, u, v, -1);
 }
 
 /* Positions lie on the surface; the error of normals is proportional to the square of the step (a quarter at the next
  * level), and that of the derivatives of interpolated normals to the step (a half). */
 static void expect_convergence(const char *type, double (*height)(const void *, double, double), double scale,
-			       surface *of, double margin)
+			       surface *reference, double margin)
 {
-	struct misses last = {0, 0, 0};
+	struct deviations last = {0, 0, 0};
 	for (uint32_t level = 5; level <= 7; level++) {
 		struct displacement d = {height, NULL, false, scale, level, 1};
 		struct built b = build_ok(type, "", NULL, &d);
-		struct misses r = measure(&b.g.mesh, of, margin);
+		struct deviations r = measure_deviations(&b.g.mesh, reference, margin);
 		print_message("%s, level %u: positions off by %.1e, normals by %.2e, their derivatives by %.3f\n", type,
 			      level, r.position, r.normal, r.derivative);
 		assert_true(r.position < 1e-14);
@@ -380,28 +380,28 @@ static void expect_convergence(const char *type, double (*height)(const void *, 
 			assert_true(r.derivative < last.derivative / 1.8 && r.derivative > last.derivative / 2.2);
 		}
 		last = r;
-		release(&b);
+		release_built(&b);
 	}
 	assert_true(last.normal < 1e-3);
 }
 
-static void test_plane_approaches(void **state)
+static void test_displaced_plane_converges(void **state)
 {
 	(void)state;
-	expect_convergence("rectangle", waves, 0.2, plane, 0);
+	expect_convergence("rectangle", wave_height, 0.2, wavy_plane, 0);
 }
 
-static void test_ball_approaches(void **state)
+static void test_displaced_ball_converges(void **state)
 {
 	(void)state;
-	expect_convergence("sphere", bumps, 0.1, ball, 0.1);
+	expect_convergence("sphere", bump_height, 0.1, bumpy_ball, 0.1);
 }
 
 /* The normal is also right at the poles, where u is undefined. */
-static void test_poles(void **state)
+static void test_normals_are_right_at_the_poles(void **state)
 {
 	(void)state;
-	struct displacement d = {bumps, NULL, false, 0.1, 7, 1};
+	struct displacement d = {bump_height, NULL, false, 0.1, 7, 1};
 	struct built b = build_ok("sphere", "", NULL, &d);
 	uint32_t poles = 0;
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
@@ -416,35 +416,35 @@ static void test_poles(void **state)
 		assert_true(vec3_length(vec3_sub(n, expected)) < 2e-4);
 	}
 	assert_int_equal(poles, 8);
-	release(&b);
+	release_built(&b);
 }
 
-static void test_refused(void **state)
+static void test_invalid_displacements_are_refused(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 1, 13, 1};
+	struct displacement d = {wave_height, NULL, false, 1, 13, 1};
 	struct built b = build("cube", "", NULL, &d);
 	assert_int_equal(b.result, -E2BIG);
 	assert_non_null(strstr(
 		b.error.text,
 		"s.xml:2: <shape type=\"cube\">: displacement_level 13 makes 805306368 triangles; at most 134217728"));
-	release(&b);
+	release_built(&b);
 	d.level = 2;
 	b = build("obj", "", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", &d);
 	assert_int_equal(b.result, -EINVAL);
 	assert_non_null(strstr(b.error.text, "needs texture coordinates"));
-	release(&b);
+	release_built(&b);
 	d.scale = 1e60;
 	b = build("sphere", "<float name='radius' value='9e59'/>", NULL, &d);
 	assert_int_equal(b.result, -ERANGE);
 	assert_non_null(strstr(b.error.text, "displacement moves a vertex beyond"));
-	release(&b);
+	release_built(&b);
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 0.1, 2, 1};
+	struct displacement d = {wave_height, NULL, false, 0.1, 2, 1};
 	int r = -1;
 	for (long n = 0; r && n < 100; n++) {
 		struct scene_node node = {.cls = PLUGIN_SHAPE, .type = "sphere", .file = "s.xml"};
@@ -461,31 +461,31 @@ static void test_memory_runs_out(void **state)
 }
 
 /* A million triangles: the time is printed; only an algorithm that is not linear exceeds a limit this wide. */
-static void test_a_million(void **state)
+static void test_million_triangles_take_linear_time(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 0.1, 9, 1};
+	struct displacement d = {wave_height, NULL, false, 0.1, 9, 1};
 	clock_t begin = clock();
 	struct built b = build_ok("cube", "", NULL, &d);
 	double seconds = (double)(clock() - begin) / CLOCKS_PER_SEC;
 	print_message("%u triangles in %.2f s\n", b.g.mesh.triangle_count, seconds);
 	assert_true(seconds < 60);
-	release(&b);
+	release_built(&b);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_no_cracks),
-		cmocka_unit_test(test_unused_vertices_stay),
-		cmocka_unit_test(test_height_zero_is_the_base),
-		cmocka_unit_test(test_constant_on_a_cube),
-		cmocka_unit_test(test_plane_approaches),
-		cmocka_unit_test(test_ball_approaches),
-		cmocka_unit_test(test_poles),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_memory_runs_out),
-		cmocka_unit_test(test_a_million),
+		cmocka_unit_test(test_displaced_meshes_stay_closed),
+		cmocka_unit_test(test_unused_vertices_are_not_displaced),
+		cmocka_unit_test(test_height_zero_keeps_the_base_mesh),
+		cmocka_unit_test(test_constant_height_enlarges_a_cube),
+		cmocka_unit_test(test_displaced_plane_converges),
+		cmocka_unit_test(test_displaced_ball_converges),
+		cmocka_unit_test(test_normals_are_right_at_the_poles),
+		cmocka_unit_test(test_invalid_displacements_are_refused),
+		cmocka_unit_test(test_failed_allocations_are_reported),
+		cmocka_unit_test(test_million_triangles_take_linear_time),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

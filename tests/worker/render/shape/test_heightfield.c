@@ -17,17 +17,19 @@
 
 enum { WIDTH = 9, HEIGHT = 5 };
 
-static const void *picture;
+static const void *height_picture;
 static size_t picture_size;
-static char obj[1 << 16];
+static char mesh_text[1 << 16];
 
 /* Builds a shape of 0.6; its files are a.hdr and m.obj. */
 static struct built_shape build(const char *type, const char *content)
 {
 	char xml[2048];
 	snprintf(xml, sizeof xml, "<scene version='0.6.0'>\n<shape type='%s'>%s</shape></scene>", type, content);
-	const struct memory_file files[] = {
-		{"s.xml", xml, strlen(xml)}, {"a.hdr", picture, picture_size}, {"m.obj", obj, strlen(obj)}, {0}};
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)},
+					    {"a.hdr", height_picture, picture_size},
+					    {"m.obj", mesh_text, strlen(mesh_text)},
+					    {0}};
 	return built_shape_make(files, render_plugins());
 }
 
@@ -48,7 +50,7 @@ static double height(uint32_t x, uint32_t y)
 	return (double)((x * 5 + y * 3) % 8) / 8;
 }
 
-static void take_picture(struct pictures *p, uint32_t width, uint32_t height_, double (*f)(uint32_t x, uint32_t y))
+static void encode_picture(struct pictures *p, uint32_t width, uint32_t height_, double (*f)(uint32_t x, uint32_t y))
 {
 	double *rgb = calloc((size_t)width * height_ * 3, sizeof *rgb);
 	assert_non_null(rgb);
@@ -58,7 +60,7 @@ static void take_picture(struct pictures *p, uint32_t width, uint32_t height_, d
 				rgb[3 * (y * width + x) + (uint32_t)k] = f(x, y);
 	pictures_add(p, width, height_, rgb);
 	free(rgb);
-	picture = p->file[p->count - 1].bytes;
+	height_picture = p->file[p->count - 1].bytes;
 	picture_size = p->file[p->count - 1].size;
 }
 
@@ -68,23 +70,24 @@ static void write_obj(double scale)
 	size_t n = 0;
 	for (int y = 0; y < HEIGHT; y++)
 		for (int x = 0; x < WIDTH; x++)
-			n += (size_t)snprintf(obj + n, sizeof obj - n, "v %.17g %.17g %.17g\nvt %.17g %.17g\n",
-					      -1 + 2.0 * x / (WIDTH - 1), -1 + 2.0 * y / (HEIGHT - 1),
-					      scale * height((uint32_t)x, (uint32_t)y), 1.0 * x / (WIDTH - 1),
-					      1.0 * y / (HEIGHT - 1));
+			n += (size_t)snprintf(mesh_text + n, sizeof mesh_text - n,
+					      "v %.17g %.17g %.17g\nvt %.17g %.17g\n", -1 + 2.0 * x / (WIDTH - 1),
+					      -1 + 2.0 * y / (HEIGHT - 1), scale * height((uint32_t)x, (uint32_t)y),
+					      1.0 * x / (WIDTH - 1), 1.0 * y / (HEIGHT - 1));
 	for (int y = 0; y + 1 < HEIGHT; y++)
 		for (int x = 0; x + 1 < WIDTH; x++) {
 			int a = y * WIDTH + x + 1, b = a + 1, c = a + WIDTH, d = c + 1;
-			n += (size_t)snprintf(obj + n, sizeof obj - n, "f %d/%d %d/%d %d/%d\nf %d/%d %d/%d %d/%d\n", c,
-					      c, a, a, d, d, d, d, a, a, b, b);
+			n += (size_t)snprintf(mesh_text + n, sizeof mesh_text - n,
+					      "f %d/%d %d/%d %d/%d\nf %d/%d %d/%d %d/%d\n", c, c, a, a, d, d, d, d, a,
+					      a, b, b);
 		}
 }
 
-static void test_as_obj(void **state)
+static void test_heightfield_equals_its_mesh(void **state)
 {
 	(void)state;
 	struct pictures p = {0};
-	take_picture(&p, WIDTH, HEIGHT, height);
+	encode_picture(&p, WIDTH, HEIGHT, height);
 	write_obj(-1.5);
 	struct built_shape field = build_ok("heightfield",
 					    FILENAME PLACE "<float name='scale' value='-1.5'/>"
@@ -109,23 +112,23 @@ static void test_as_obj(void **state)
 	pictures_fini(&p);
 }
 
-static double slope(uint32_t x, uint32_t y)
+static double slope_height(uint32_t x, uint32_t y)
 {
 	return x / 8.0 + y / 16.0;
 }
 
-static double bowl(uint32_t x, uint32_t y)
+static double bowl_height(uint32_t x, uint32_t y)
 {
 	double a = (double)x - 8, b = (double)y - 8;
 	return (a * a + b * b) / 64;
 }
 
 /* The normals of a plane are exact, also at the borders; those of a bowl up to the square of a pixel's width. */
-static void test_normals(void **state)
+static void test_normals_follow_the_heights(void **state)
 {
 	(void)state;
 	struct pictures p = {0};
-	take_picture(&p, WIDTH, HEIGHT, slope);
+	encode_picture(&p, WIDTH, HEIGHT, slope_height);
 	struct built_shape b = build_ok("heightfield", FILENAME "<float name='scale' value='2'/>");
 	assert_non_null(b.geometry.mesh.normal);
 	/* z = 2 (4 (x + 1) / 8 + 2 (y + 1) / 16) = x + y / 4 + ... */
@@ -135,7 +138,7 @@ static void test_normals(void **state)
 		assert_true(fabs(n[0] + 1 / length) < 1e-6 && fabs(n[1] + 0.25 / length) < 1e-6);
 	}
 	built_shape_fini(&b);
-	take_picture(&p, 17, 17, bowl);
+	encode_picture(&p, 17, 17, bowl_height);
 	b = build_ok("heightfield", FILENAME "<boolean name='flipNormals' value='true'/>");
 	for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++) {
 		const double *q = b.geometry.mesh.position[i], *n = b.geometry.mesh.normal[i];
@@ -152,11 +155,11 @@ static void test_normals(void **state)
 }
 
 /* The texture of the picture determines whether numbers are used as stored, or decoded like colours. */
-static void test_decoding(void **state)
+static void test_texture_decides_how_pixels_are_decoded(void **state)
 {
 	(void)state;
 	unsigned char *png = sample_png(4, 3, SAMPLE_RGB, 8, 0, &picture_size);
-	picture = png;
+	height_picture = png;
 	static const char *const ways[] = {
 		FILENAME,
 		"<texture type='bitmap'>" FILENAME "</texture>",
@@ -182,11 +185,11 @@ static void test_decoding(void **state)
 }
 
 /* As in the documentation of Mitsuba 0.6, a bitmap inside `scale`, here nested in another one. */
-static void test_scaled(void **state)
+static void test_scale_textures_scale_the_heights(void **state)
 {
 	(void)state;
 	struct pictures p = {0};
-	take_picture(&p, WIDTH, HEIGHT, height);
+	encode_picture(&p, WIDTH, HEIGHT, height);
 	struct built_shape
 		a = build_ok("heightfield", FILENAME "<float name='scale' value='-0.75'/>"),
 		b = build_ok("heightfield",
@@ -203,7 +206,7 @@ static void test_scaled(void **state)
 	pictures_fini(&p);
 }
 
-static void refuses(const char *content, const char *sentence)
+static void expect_refused(const char *content, const char *sentence)
 {
 	struct built_shape b = build("heightfield", content);
 	if (b.result >= 0 || !strstr(b.error.text, sentence))
@@ -212,7 +215,7 @@ static void refuses(const char *content, const char *sentence)
 }
 
 /* The bitmap may have any name, and be defined elsewhere. */
-static void test_named(void **state)
+static void test_bitmap_may_be_named_or_referenced(void **state)
 {
 	(void)state;
 #define ELSEWHERE(inside) "</shape><texture id='t' type='bitmap'>" FILENAME "</texture>" inside "<shape type='sphere'>"
@@ -224,7 +227,7 @@ static void test_named(void **state)
 		"<ref id='t'/><bsdf type='diffuse'><ref id='t' name='reflectance'/></bsdf>" ELSEWHERE(""),
 	};
 	struct pictures p = {0};
-	take_picture(&p, WIDTH, HEIGHT, height);
+	encode_picture(&p, WIDTH, HEIGHT, height);
 	struct built_shape wanted = build_ok("heightfield", FILENAME);
 	for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
 		struct built_shape b = build_ok("heightfield", ways[i]);
@@ -238,28 +241,31 @@ static void test_named(void **state)
 	pictures_fini(&p);
 }
 
-static void test_bad_input(void **state)
+static void test_invalid_heightfields_are_refused(void **state)
 {
 	(void)state;
 	struct pictures p = {0};
-	take_picture(&p, 1, 5, height);
-	refuses("", "s.xml:2: <shape type=\"heightfield\">: needs either a filename or a bitmap inside");
-	refuses(FILENAME "<texture type='bitmap'>" FILENAME "</texture>", "needs either a filename or a bitmap");
-	refuses("<texture type='checkerboard'/>", "the heights of a heightfield come from a bitmap");
-	refuses("<texture type='scale'><rgb name='scale' value='1 2 3'/><texture type='bitmap'>" FILENAME
-		"</texture></texture>",
-		"<texture type=\"scale\">: the heights of a heightfield come from a bitmap");
-	refuses("<texture type='scale'/>", "needs either a filename or a bitmap inside");
-	refuses(FILENAME, "an image of 1 x 5 pixels is too small; heights need 2 x 2");
-	refuses("<string name='filename' value='m.obj'/>", "m.obj");
-	refuses("<string name='filename' value='none.png'/>", "none.png: no such file");
+	encode_picture(&p, 1, 5, height);
+	expect_refused("", "s.xml:2: <shape type=\"heightfield\">: needs either a filename or a bitmap inside");
+	expect_refused(FILENAME "<texture type='bitmap'>" FILENAME "</texture>", "needs either a filename or a bitmap");
+	expect_refused("<texture type='checkerboard'/>", "the heights of a heightfield come from a bitmap");
+	expect_refused("<texture type='scale'><rgb name='scale' value='1 2 3'/><texture type='bitmap'>" FILENAME
+		       "</texture></texture>",
+		       "<texture type=\"scale\">: the heights of a heightfield come from a bitmap");
+	expect_refused("<texture type='scale'/>", "needs either a filename or a bitmap inside");
+	expect_refused(FILENAME, "an image of 1 x 5 pixels is too small; heights need 2 x 2");
+	expect_refused("<string name='filename' value='m.obj'/>", "m.obj");
+	expect_refused("<string name='filename' value='none.png'/>", "none.png: no such file");
 	pictures_fini(&p);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_as_obj),   cmocka_unit_test(test_normals),
-					   cmocka_unit_test(test_decoding), cmocka_unit_test(test_scaled),
-					   cmocka_unit_test(test_named),    cmocka_unit_test(test_bad_input)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_heightfield_equals_its_mesh),
+					   cmocka_unit_test(test_normals_follow_the_heights),
+					   cmocka_unit_test(test_texture_decides_how_pixels_are_decoded),
+					   cmocka_unit_test(test_scale_textures_scale_the_heights),
+					   cmocka_unit_test(test_bitmap_may_be_named_or_referenced),
+					   cmocka_unit_test(test_invalid_heightfields_are_refused)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,7 +52,7 @@ static void assert_solid(const char *type, const char *content, const struct mes
 }
 
 /* Makes lines end in a carriage return alone, as Rhino writes them. */
-static void return_only(struct mesh_file *f)
+static void use_carriage_returns(struct mesh_file *f)
 {
 	const char *last = "end_header\n";
 	for (size_t i = 0, stop = f->size; i < stop; i++) {
@@ -63,13 +63,13 @@ static void return_only(struct mesh_file *f)
 	}
 }
 
-static void test_ply(void **state)
+static void test_ply_is_read_in_every_format(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
 	for (enum ply_kind k = 0; k < PLY_KINDS; k++) {
 		mesh_file_make_ply(&f, k);
-		return_only(&f);
+		use_carriage_returns(&f);
 		assert_solid("ply", "", &f, 1, true, true, false);
 		mesh_file_make_ply(&f, k);
 		assert_solid("ply", "", &f, 1, true, true, false);
@@ -81,7 +81,7 @@ static void test_ply(void **state)
 #define HEAD "ply\nformat ascii 1.0\n"
 #define QUAD HEAD "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 
-static void test_ply_polygons(void **state)
+static void test_ply_polygons_become_triangles(void **state)
 {
 	(void)state;
 	/* Faces before vertices, carriage returns, a polygon of four, no normals. */
@@ -101,7 +101,7 @@ static void test_ply_polygons(void **state)
 }
 
 /* Points and lines written as faces become triangles without area; the other faces keep their colours. */
-static void test_ply_lines(void **state)
+static void test_ply_lines_are_dropped(void **state)
 {
 	(void)state;
 	const char *text =
@@ -124,7 +124,7 @@ static void test_ply_lines(void **state)
 
 /* An arrow head, whose fan around the first corner would contain a reversed triangle. */
 #define ARROW "-1 -1 0\n0 0.5 0\n1 -1 0\n0 1 0\n"
-static void test_concave_faces(void **state)
+static void test_concave_faces_are_triangulated(void **state)
 {
 	(void)state;
 	static const struct {
@@ -157,7 +157,7 @@ static void test_concave_faces(void **state)
 	}
 }
 
-static void test_serialized(void **state)
+static void test_serialized_is_read_in_every_version(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
@@ -180,7 +180,7 @@ static void test_serialized(void **state)
 }
 
 /* Version 5 has named attributes, of which the one with spectral coefficients is left out. */
-static void test_serialized_attributes(void **state)
+static void test_serialized_attributes_are_read(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
@@ -202,7 +202,7 @@ static void test_serialized_attributes(void **state)
 	built_shape_fini(&b);
 }
 
-static void refuses(const char *type, const char *content, const void *bytes, size_t size, const char *text)
+static void expect_refused(const char *type, const char *content, const void *bytes, size_t size, const char *text)
 {
 	struct built_shape b = build(type, content, bytes, size);
 	if (b.result >= 0 || !strstr(b.error.text, text))
@@ -210,7 +210,7 @@ static void refuses(const char *type, const char *content, const void *bytes, si
 	built_shape_fini(&b);
 }
 
-static void test_bad_ply(void **state)
+static void test_invalid_ply_is_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -271,7 +271,7 @@ static void test_bad_ply(void **state)
 		 "too short for 99999999999"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-		refuses("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
+		expect_refused("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
 	/* NaN, in formats that can store it. */
 	static struct mesh_file f;
 	mesh_file_make_ply(&f, PLY_LITTLE);
@@ -280,11 +280,11 @@ static void test_bad_ply(void **state)
 	while (memcmp(f.bytes + at, end, strlen(end)) != 0)
 		at++;
 	memcpy(f.bytes + at + strlen(end), "\0\0\xc0\x7f", 4);
-	refuses("ply", "", f.bytes, f.size, "m: vertex 0: a number that is not finite");
+	expect_refused("ply", "", f.bytes, f.size, "m: vertex 0: a number that is not finite");
 }
 
 /* Programs write NaN if a vertex has no triangle with an area: it counts as a missing normal. */
-static void test_normals_that_are_none(void **state)
+static void test_nan_normals_count_as_missing(void **state)
 {
 	(void)state;
 	static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
@@ -312,31 +312,31 @@ static void test_normals_that_are_none(void **state)
 	}
 }
 
-static void test_bad_serialized(void **state)
+static void test_invalid_serialized_is_refused(void **state)
 {
 	(void)state;
 	static struct mesh_file f, g;
 	mesh_file_make_serialized(&f, 4, 0, 3, 2);
-	refuses("serialized", "", "", 0, "m: this is not a serialized mesh");
-	refuses("serialized", "", "plyplyply", 9, "this is not a serialized mesh");
-	refuses("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
-		"m: shape_index=2, but the file has 2 meshes, counted from 0");
+	expect_refused("serialized", "", "", 0, "m: this is not a serialized mesh");
+	expect_refused("serialized", "", "plyplyply", 9, "this is not a serialized mesh");
+	expect_refused("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
+		       "m: shape_index=2, but the file has 2 meshes, counted from 0");
 	mesh_file_make_serialized(&g, 4, 0, 3, 1);
-	refuses("serialized", "<integer name='shape_index' value='7'/>", g.bytes, g.size,
-		"m: shape_index=7, but the file has 1 mesh, counted from 0");
+	expect_refused("serialized", "<integer name='shape_index' value='7'/>", g.bytes, g.size,
+		       "m: shape_index=7, but the file has 1 mesh, counted from 0");
 	g = f;
 	g.bytes[2] = 9;
-	refuses("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4, 5)");
+	expect_refused("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4, 5)");
 	g = f;
 	g.bytes[g.size - 1] = 0xff;
-	refuses("serialized", "", g.bytes, g.size, "the table of meshes at its end is damaged");
+	expect_refused("serialized", "", g.bytes, g.size, "the table of meshes at its end is damaged");
 	g = f;
 	g.bytes[g.size - 12] ^= 1; /* the second offset */
-	refuses("serialized", "<integer name='shape_index' value='1'/>", g.bytes, g.size,
-		"the table of meshes at its end is damaged");
+	expect_refused("serialized", "<integer name='shape_index' value='1'/>", g.bytes, g.size,
+		       "the table of meshes at its end is damaged");
 	g = f;
 	g.bytes[40] ^= 0x10;
-	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
+	expect_refused("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
 }
 
 /* The corners of mesh i have x = i or 9. */
@@ -362,7 +362,7 @@ static void assert_obj_mesh(const char *content, double x, uint32_t triangles)
 	built_shape_fini(&b);
 }
 
-static void test_obj_meshes(void **state)
+static void test_meshes_of_an_obj_are_selected_by_index(void **state)
 {
 	(void)state;
 	static const uint32_t triangles[] = {3, 2, 1, 4};
@@ -375,19 +375,19 @@ static void test_obj_meshes(void **state)
 	assert_obj_mesh("<integer name='shape_index' value='-1'/>", -1, 10);
 	assert_obj_mesh("<string name='material' value='a'/>", -1, 6);
 	assert_obj_mesh("<integer name='shape_index' value='2'/><string name='material' value='a'/>", 2, 1);
-	refuses("obj", "<integer name='shape_index' value='4'/>", obj_meshes, sizeof obj_meshes - 1,
-		"m: shape_index=4, but the file has 4 meshes, counted from 0");
-	refuses("obj", "<integer name='shape_index' value='3'/><string name='material' value='a'/>", obj_meshes,
-		sizeof obj_meshes - 1, "m: mesh 3 has no faces of the material `a`");
+	expect_refused("obj", "<integer name='shape_index' value='4'/>", obj_meshes, sizeof obj_meshes - 1,
+		       "m: shape_index=4, but the file has 4 meshes, counted from 0");
+	expect_refused("obj", "<integer name='shape_index' value='3'/><string name='material' value='a'/>", obj_meshes,
+		       sizeof obj_meshes - 1, "m: mesh 3 has no faces of the material `a`");
 	static const char one[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-	refuses("obj", "<integer name='shape_index' value='1'/>", one, sizeof one - 1,
-		"m: shape_index=1, but the file has 1 mesh, counted from 0");
-	refuses("obj", "<integer name='shape_index' value='0'/>", one, 24,
-		"m: shape_index=0, but the file has 0 meshes");
+	expect_refused("obj", "<integer name='shape_index' value='1'/>", one, sizeof one - 1,
+		       "m: shape_index=1, but the file has 1 mesh, counted from 0");
+	expect_refused("obj", "<integer name='shape_index' value='0'/>", one, 24,
+		       "m: shape_index=0, but the file has 0 meshes");
 }
 
 /* Returns whether a file gives a mesh, whose indices must be in range, rather than an error. */
-static bool gives_a_mesh(const char *type, const struct mesh_file *f)
+static bool is_read_as_valid_mesh(const char *type, const struct mesh_file *f)
 {
 	struct built_shape b = build(type, "", f->bytes, f->size);
 	bool good = b.result == 0;
@@ -399,7 +399,7 @@ static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 }
 
 /* Each number of version 5 that can be wrong in a stream with a valid checksum. */
-static void test_bad_serialized_5(void **state)
+static void test_invalid_numbers_of_version_5_are_refused(void **state)
 {
 	(void)state;
 	enum { RECORDS = 47, FACES = RECORDS + 32 * SOLID_VERTICES, ATTRIBUTES = FACES + 16 * SOLID_TRIANGLES + 48 };
@@ -436,7 +436,7 @@ static void test_bad_serialized_5(void **state)
 		for (int k = 0; k < 4; k++)
 			g.bytes[bad[i].at + (size_t)k] = (unsigned char)(bad[i].value >> 8 * k);
 		mesh_file_from_stream_5(&f, &g);
-		refuses("serialized", "", f.bytes, f.size, bad[i].text);
+		expect_refused("serialized", "", f.bytes, f.size, bad[i].text);
 	}
 	/* Any prefix of the uncompressed data, and any of its bytes changed. */
 	struct dice d = dice_for_test("damaged streams");
@@ -447,12 +447,12 @@ static void test_bad_serialized_5(void **state)
 		else
 			g.bytes[dice_below(&d, (uint32_t)g.size)] = (unsigned char)dice_below(&d, 256);
 		mesh_file_from_stream_5(&f, &g);
-		assert_true(!gives_a_mesh("serialized", &f) || i >= good.size);
+		assert_true(!is_read_as_valid_mesh("serialized", &f) || i >= good.size);
 	}
 }
 
 /* Any prefix, and any file with some bytes changed, gives a mesh or an error; sanitizers detect anything else. */
-static void test_damage(void **state)
+static void test_damaged_files_are_read_or_refused(void **state)
 {
 	(void)state;
 	static struct mesh_file f, g;
@@ -473,13 +473,13 @@ static void test_damage(void **state)
 			g = f;
 			for (uint32_t n = 1 + (uint32_t)dice_below(&d, 3); n > 0; n--)
 				g.bytes[dice_below(&d, (uint32_t)g.size)] = (unsigned char)dice_below(&d, 256);
-			meshes += gives_a_mesh(type, &g);
+			meshes += is_read_as_valid_mesh(type, &g);
 		}
 		assert_true(meshes > 0 || kind >= PLY_KINDS);
 	}
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
@@ -498,19 +498,19 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ply),
-		cmocka_unit_test(test_ply_polygons),
-		cmocka_unit_test(test_ply_lines),
-		cmocka_unit_test(test_concave_faces),
-		cmocka_unit_test(test_serialized),
-		cmocka_unit_test(test_serialized_attributes),
-		cmocka_unit_test(test_obj_meshes),
-		cmocka_unit_test(test_bad_ply),
-		cmocka_unit_test(test_normals_that_are_none),
-		cmocka_unit_test(test_bad_serialized),
-		cmocka_unit_test(test_bad_serialized_5),
-		cmocka_unit_test(test_damage),
-		cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_ply_is_read_in_every_format),
+		cmocka_unit_test(test_ply_polygons_become_triangles),
+		cmocka_unit_test(test_ply_lines_are_dropped),
+		cmocka_unit_test(test_concave_faces_are_triangulated),
+		cmocka_unit_test(test_serialized_is_read_in_every_version),
+		cmocka_unit_test(test_serialized_attributes_are_read),
+		cmocka_unit_test(test_meshes_of_an_obj_are_selected_by_index),
+		cmocka_unit_test(test_invalid_ply_is_refused),
+		cmocka_unit_test(test_nan_normals_count_as_missing),
+		cmocka_unit_test(test_invalid_serialized_is_refused),
+		cmocka_unit_test(test_invalid_numbers_of_version_5_are_refused),
+		cmocka_unit_test(test_damaged_files_are_read_or_refused),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,54 +17,55 @@
 #include <cmocka.h>
 
 struct outline {
-	uint32_t n;
+	uint32_t corner_count;
 	double x[POLYGON_CORNERS_MAX], y[POLYGON_CORNERS_MAX];
 };
 
 static bool is_inside(const struct outline *o, double x, double y)
 {
 	bool inside = false;
-	for (uint32_t i = 0, j = o->n - 1; i < o->n; j = i++)
+	for (uint32_t i = 0, j = o->corner_count - 1; i < o->corner_count; j = i++)
 		if ((o->y[i] > y) != (o->y[j] > y) &&
 		    x < (o->x[j] - o->x[i]) * (y - o->y[i]) / (o->y[j] - o->y[i]) + o->x[i])
 			inside = !inside;
 	return inside;
 }
 
-static double side(const struct outline *o, uint32_t a, uint32_t b, double x, double y)
+static double side_of_line(const struct outline *o, uint32_t a, uint32_t b, double x, double y)
 {
 	return (o->x[b] - o->x[a]) * (y - o->y[a]) - (o->y[b] - o->y[a]) * (x - o->x[a]);
 }
 
 /* Checks the polygon in a plane across n, away from the origin. Each triangle has the orientation of the polygon, 1 or
  * -1. */
-static void check(const char *what, const struct outline *o, vec3 n, int sense)
+static void check_triangulation(const char *what, const struct outline *o, vec3 n, int orientation)
 {
 	static struct polygon p;
 	static uint32_t t[POLYGON_CORNERS_MAX][3];
 	struct frame f = frame_around(vec3_normalize(n));
 	struct dice d = dice_for_test(what);
-	p.corner_count = o->n;
-	for (uint32_t i = 0; i < o->n; i++)
+	p.corner_count = o->corner_count;
+	for (uint32_t i = 0; i < o->corner_count; i++)
 		p.corner[i] = frame_to_world(&f, (vec3){o->x[i] + 10, o->y[i] - 20, 5});
 	memset(t, 0xff, sizeof t);
 	polygon_triangulate(&p, t);
 	uint32_t used[POLYGON_CORNERS_MAX] = {0};
-	for (uint32_t i = 0; i < o->n - 2; i++)
+	for (uint32_t i = 0; i < o->corner_count - 2; i++)
 		for (int k = 0; k < 3; k++) {
-			assert_true(t[i][k] < o->n);
+			assert_true(t[i][k] < o->corner_count);
 			used[t[i][k]]++;
 		}
-	for (uint32_t i = 0; i < o->n; i++)
+	for (uint32_t i = 0; i < o->corner_count; i++)
 		assert_true(used[i] > 0);
-	assert_true(t[o->n - 2][0] == UINT32_MAX);
+	assert_true(t[o->corner_count - 2][0] == UINT32_MAX);
 	unsigned hits = 0;
 	for (int k = 0; k < 2000; k++) {
 		double x = 2.4 * dice_uniform(&d) - 1.2, y = 2.4 * dice_uniform(&d) - 1.2;
 		unsigned count = 0;
-		for (uint32_t i = 0; i < o->n - 2; i++) {
-			double a = sense * side(o, t[i][0], t[i][1], x, y), b = sense * side(o, t[i][1], t[i][2], x, y),
-			       c = sense * side(o, t[i][2], t[i][0], x, y);
+		for (uint32_t i = 0; i < o->corner_count - 2; i++) {
+			double a = orientation * side_of_line(o, t[i][0], t[i][1], x, y),
+			       b = orientation * side_of_line(o, t[i][1], t[i][2], x, y),
+			       c = orientation * side_of_line(o, t[i][2], t[i][0], x, y);
 			count += a > 0 && b > 0 && c > 0;
 		}
 		if (count != (is_inside(o, x, y) ? 1 : 0))
@@ -74,73 +75,73 @@ static void check(const char *what, const struct outline *o, vec3 n, int sense)
 	assert_true(hits > 20);
 }
 
-static void check_both(const char *what, struct outline *o)
+static void check_both_orientations(const char *what, struct outline *o)
 {
 	static const vec3 normals[] = {{0, 0, 1},      {0, 0, -1},    {1, 0.2, 0.1},
 				       {-1, 0.3, 0.5}, {0.2, 1, 0.6}, {0.3, -1, 0.6}};
-	struct outline back = {.n = o->n};
-	for (uint32_t i = 0; i < o->n; i++) {
-		back.x[i] = o->x[o->n - 1 - i];
-		back.y[i] = o->y[o->n - 1 - i];
+	struct outline back = {.corner_count = o->corner_count};
+	for (uint32_t i = 0; i < o->corner_count; i++) {
+		back.x[i] = o->x[o->corner_count - 1 - i];
+		back.y[i] = o->y[o->corner_count - 1 - i];
 	}
 	for (size_t i = 0; i < sizeof normals / sizeof normals[0]; i++) {
-		check(what, o, normals[i], 1);
-		check(what, &back, normals[i], -1);
+		check_triangulation(what, o, normals[i], 1);
+		check_triangulation(what, &back, normals[i], -1);
 	}
 }
 
 /* Corners around a centre, with random radii: few of these polygons are convex. */
-static void test_random(void **state)
+static void test_random_polygons_are_triangulated(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("polygon");
 	for (uint32_t n = 4; n < 60; n += n < 12 ? 1 : 7) {
-		struct outline o = {.n = n};
+		struct outline o = {.corner_count = n};
 		for (uint32_t i = 0; i < n; i++) {
 			double r = 0.1 + dice_uniform(&d), phi = 2 * M_PI * i / n;
 			o.x[i] = r * cos(phi);
 			o.y[i] = r * sin(phi);
 		}
-		check_both("random", &o);
+		check_both_orientations("random", &o);
 	}
 }
 
 /* A band along a spiral: no corner sees all others, and most corners are no ears. */
-static void test_spiral(void **state)
+static void test_spiral_is_triangulated(void **state)
 {
 	(void)state;
 	for (uint32_t n = 40; n <= POLYGON_CORNERS_MAX; n = n < 500 ? 4 * n : n + 384) {
-		struct outline o = {.n = n};
+		struct outline o = {.corner_count = n};
 		for (uint32_t i = 0; i < n; i++) {
 			uint32_t k = i < n / 2 ? i : n - 1 - i;
 			double phi = 6 * M_PI * k / (n / 2.0), r = (i < n / 2 ? 0.2 : 0.15) + 0.04 * phi;
 			o.x[i] = r * cos(phi);
 			o.y[i] = r * sin(phi);
 		}
-		check_both("spiral", &o);
+		check_both_orientations("spiral", &o);
 	}
 }
 
 /* A square with a square hole, to and from which the outline runs along one line; and corners on straight lines. */
-static void test_hole(void **state)
+static void test_outline_with_a_hole_is_triangulated(void **state)
 {
 	(void)state;
-	struct outline o = {.n = 12,
+	struct outline o = {.corner_count = 12,
 			    .x = {-1, 0, 1, 1, -1, -1, -0.5, 0.5, 0.5, -0.5, -0.5, -1},
 			    .y = {-1, -1, -1, 1, 1, 0.5, 0.5, 0.5, -0.5, -0.5, 0.5, 0.5}};
 	for (int k = 0; k < 2; k++) {
-		struct outline turned = {.n = o.n};
-		for (uint32_t i = 0; i < o.n; i++) {
-			turned.x[i] = o.x[(i + 7 * (uint32_t)k) % o.n];
-			turned.y[i] = o.y[(i + 7 * (uint32_t)k) % o.n];
+		struct outline turned = {.corner_count = o.corner_count};
+		for (uint32_t i = 0; i < o.corner_count; i++) {
+			turned.x[i] = o.x[(i + 7 * (uint32_t)k) % o.corner_count];
+			turned.y[i] = o.y[(i + 7 * (uint32_t)k) % o.corner_count];
 		}
 		/* Counter-clockwise outside, clockwise around the hole. */
-		check("hole", &turned, (vec3){0.3, 0.2, 1}, 1);
+		check_triangulation("hole", &turned, (vec3){0.3, 0.2, 1}, 1);
 	}
 }
 
 /* Convex polygons, and those that a fan covers, keep the fan; so do those without area. */
-static void test_fan(void **state)
+static void test_convex_polygons_keep_the_fan(void **state)
 {
 	(void)state;
 	static const struct polygon fans[] = {{4, {{0, 0, 0}, {1, 0, 0.1}, {1, 1, 0}, {0, 1, 0.1}}},
@@ -156,7 +157,7 @@ static void test_fan(void **state)
 }
 
 /* Outlines of all sizes that cross themselves at random give n - 2 triangles with valid corners. */
-static void test_crossed(void **state)
+static void test_crossed_outlines_give_valid_corners(void **state)
 {
 	(void)state;
 	static struct polygon p;
@@ -175,8 +176,11 @@ static void test_crossed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_random), cmocka_unit_test(test_spiral),  cmocka_unit_test(test_hole),
-		cmocka_unit_test(test_fan),    cmocka_unit_test(test_crossed),
+		cmocka_unit_test(test_random_polygons_are_triangulated),
+		cmocka_unit_test(test_spiral_is_triangulated),
+		cmocka_unit_test(test_outline_with_a_hole_is_triangulated),
+		cmocka_unit_test(test_convex_polygons_keep_the_fan),
+		cmocka_unit_test(test_crossed_outlines_give_valid_corners),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

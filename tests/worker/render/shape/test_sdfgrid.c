@@ -34,13 +34,13 @@ static struct built_shape build_grid(const char *content, const struct vol *v)
 	return built_shape_make(files, scene_tables());
 }
 
-static double mix(double t, double a, double b)
+static double interpolate(double t, double a, double b)
 {
 	return a + t * (b - a);
 }
 
 /* Returns the field at a point of the unit cube, by interpolating along one axis after the other. */
-static double value_at(const struct vol *v, const double p[3])
+static double interpolated_value(const struct vol *v, const double p[3])
 {
 	uint32_t at[3];
 	double t[3], along[2][2];
@@ -52,9 +52,10 @@ static double value_at(const struct vol *v, const double p[3])
 	for (uint32_t y = 0; y < 2; y++)
 		for (uint32_t z = 0; z < 2; z++) {
 			const float *a = &v->value[((size_t)(at[2] + z) * v->side[1] + at[1] + y) * v->side[0] + at[0]];
-			along[y][z] = mix(t[0], (double)a[0], (double)a[1]);
+			along[y][z] = interpolate(t[0], (double)a[0], (double)a[1]);
 		}
-	return mix(t[2], mix(t[1], along[0][0], along[1][0]), mix(t[1], along[0][1], along[1][1]));
+	return interpolate(t[2], interpolate(t[1], along[0][0], along[1][0]),
+			   interpolate(t[1], along[0][1], along[1][1]));
 }
 
 static int compare_edges(const void *a, const void *b)
@@ -85,21 +86,21 @@ static void check_edges(const struct mesh *m, bool closed)
 	free(edges);
 }
 
-static double ball(double x, double y, double z, uint32_t channel)
+static double ball_field(double x, double y, double z, uint32_t channel)
 {
 	(void)channel;
 	x -= 0.51, y -= 0.48, z -= 0.5;
 	return sqrt(x * x + y * y + z * z) - 0.37;
 }
 
-static double ring(double x, double y, double z, uint32_t channel)
+static double ring_field(double x, double y, double z, uint32_t channel)
 {
 	(void)channel;
 	x -= 0.51, y -= 0.48, z -= 0.5;
 	return hypot(hypot(x, y) - 0.29, z) - 0.131;
 }
 
-static vec3 gradient_of(vol_field *f, vec3 p)
+static vec3 field_gradient(vol_field *f, vec3 p)
 {
 	const double h = 1e-6;
 	return vec3_unit_or_zero((vec3){f(p.x + h, p.y, p.z, 0) - f(p.x - h, p.y, p.z, 0),
@@ -107,7 +108,7 @@ static vec3 gradient_of(vol_field *f, vec3 p)
 					f(p.x, p.y, p.z + h, 0) - f(p.x, p.y, p.z - h, 0)});
 }
 
-static void check_body(const struct vol *v, vol_field *f, double volume, double most_degrees)
+static void check_body(const struct vol *v, vol_field *f, double volume, double max_degrees)
 {
 	struct built_shape b = build_grid("", v), flat = build_grid("<string name='normals' value='analytic'/>", v);
 	if (b.result || flat.result)
@@ -119,16 +120,16 @@ static void check_body(const struct vol *v, vol_field *f, double volume, double 
 		vec3 a = built_shape_corner(&flat.geometry.mesh, t, 0),
 		     n = vec3_cross(vec3_sub(built_shape_corner(&flat.geometry.mesh, t, 1), a),
 				    vec3_sub(built_shape_corner(&flat.geometry.mesh, t, 2), a));
-		assert_true(vec3_dot(n, gradient_of(f, a)) > 0);
+		assert_true(vec3_dot(n, field_gradient(f, a)) > 0);
 	}
 	if (!(fabs(sum / volume - 1) < 0.03))
 		fail_msg("a volume of %g instead of %g", sum, volume);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		double value = value_at(v, m->position[i]),
-		       angle = vec3_angle(vec3_load(m->normal[i]), gradient_of(f, vec3_load(m->position[i])));
+		double value = interpolated_value(v, m->position[i]),
+		       angle = vec3_angle(vec3_load(m->normal[i]), field_gradient(f, vec3_load(m->position[i])));
 		if (!(fabs(value) < 1e-9))
 			fail_msg("vertex %u: the field is %g", i, value);
-		if (!(angle * 180 / pi < most_degrees))
+		if (!(angle * 180 / pi < max_degrees))
 			fail_msg("vertex %u: its normal is off by %g degrees", i, angle * 180 / pi);
 	}
 	assert_null(flat.geometry.mesh.normal);
@@ -137,30 +138,30 @@ static void check_body(const struct vol *v, vol_field *f, double volume, double 
 	built_shape_fini(&flat);
 }
 
-static void test_bodies(void **state)
+static void test_bodies_are_closed_and_on_the_surface(void **state)
 {
 	(void)state;
 	static struct vol v;
-	fill(&v, 24, 24, 24, ball);
-	check_body(&v, ball, 4 * pi / 3 * 0.37 * 0.37 * 0.37, 1.5);
-	fill(&v, 24, 17, 13, ball);
-	check_body(&v, ball, 4 * pi / 3 * 0.37 * 0.37 * 0.37, 3);
-	fill(&v, 23, 24, 24, ring);
-	check_body(&v, ring, 2 * pi * pi * 0.29 * 0.131 * 0.131, 5);
+	fill(&v, 24, 24, 24, ball_field);
+	check_body(&v, ball_field, 4 * pi / 3 * 0.37 * 0.37 * 0.37, 1.5);
+	fill(&v, 24, 17, 13, ball_field);
+	check_body(&v, ball_field, 4 * pi / 3 * 0.37 * 0.37 * 0.37, 3);
+	fill(&v, 23, 24, 24, ring_field);
+	check_body(&v, ring_field, 2 * pi * pi * 0.29 * 0.131 * 0.131, 5);
 }
 
-static double slope(double x, double y, double z, uint32_t channel)
+static double slope_field(double x, double y, double z, uint32_t channel)
 {
 	(void)channel;
 	return 2 * x + y - z - 0.613;
 }
 
 /* Interpolation is exact for a plane, which ends where it leaves the cube. */
-static void test_plane(void **state)
+static void test_plane_is_exact_and_ends_at_the_cube(void **state)
 {
 	(void)state;
 	static struct vol v;
-	fill(&v, 2, 5, 9, slope);
+	fill(&v, 2, 5, 9, slope_field);
 	struct built_shape b = build_grid("", &v);
 	assert_int_equal(b.result, 0);
 	const struct mesh *m = &b.geometry.mesh;
@@ -176,14 +177,14 @@ static void test_plane(void **state)
 
 /* Any field gives a closed mesh if it is positive at the faces of the cube, with vertices on the surface. Flat, because
  * normals, which are meaningless for noise, would reverse triangles. */
-static void test_noise(void **state)
+static void test_noise_gives_a_closed_mesh(void **state)
 {
 	(void)state;
 	static struct vol v;
 	struct dice d = dice_for_test("noise in grids");
 	for (int round = 0; round < 40; round++) {
 		fill(&v, 3 + (uint32_t)dice_below(&d, 6), 3 + (uint32_t)dice_below(&d, 6),
-		     3 + (uint32_t)dice_below(&d, 6), ball);
+		     3 + (uint32_t)dice_below(&d, 6), ball_field);
 		size_t at = 0;
 		for (uint32_t k = 0; k < v.side[2]; k++)
 			for (uint32_t j = 0; j < v.side[1]; j++)
@@ -200,13 +201,13 @@ static void test_noise(void **state)
 		} else {
 			check_edges(&b.geometry.mesh, true);
 			for (uint32_t i = 0; i < b.geometry.mesh.vertex_count; i++)
-				assert_true(fabs(value_at(&v, b.geometry.mesh.position[i])) < 1e-6);
+				assert_true(fabs(interpolated_value(&v, b.geometry.mesh.position[i])) < 1e-6);
 		}
 		built_shape_fini(&b);
 	}
 }
 
-static void refuses(const struct vol *v, const char *text)
+static void expect_refused(const struct vol *v, const char *text)
 {
 	struct built_shape b = build_grid("", v);
 	if (b.result >= 0 || !strstr(b.error.text, text))
@@ -214,7 +215,7 @@ static void refuses(const struct vol *v, const char *text)
 	built_shape_fini(&b);
 }
 
-static void test_bad_files(void **state)
+static void test_invalid_grids_are_refused(void **state)
 {
 	(void)state;
 	static struct vol good, v;
@@ -234,22 +235,22 @@ static void test_bad_files(void **state)
 		{VOL_HEADER_BYTES, 0x7fc00000, "m: value 0 is not finite"},
 		{VOL_HEADER_BYTES + 4, 0x7f800000, "m: value 1 is not finite"},
 	};
-	fill(&good, 4, 4, 4, ball);
+	fill(&good, 4, 4, 4, ball_field);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		v = good;
 		vol_put32(&v, bad[i].at, bad[i].value);
-		refuses(&v, bad[i].text);
+		expect_refused(&v, bad[i].text);
 	}
 	for (size_t size = 0; size < good.size; size++) {
 		v = good;
 		v.size = size;
-		refuses(&v, size < VOL_HEADER_BYTES ? "this is not a grid" : "too short for 64 values");
+		expect_refused(&v, size < VOL_HEADER_BYTES ? "this is not a grid" : "too short for 64 values");
 	}
 	v = good;
 	for (size_t i = 0; i < 64; i++)
 		v.value[i] = 1;
 	vol_write(&v);
-	refuses(&v, "m: its values do not change their sign: there is no surface");
+	expect_refused(&v, "m: its values do not change their sign: there is no surface");
 	/* Zeros and numbers of any size give a mesh, or an error. */
 	static const float numbers[] = {0, -0.0f, 1, -1, 3e38f, -3e38f, 1e-45f, -1e-45f, 1e-20f, -1e-20f};
 	struct dice d = dice_for_test("extreme grids");
@@ -266,11 +267,11 @@ static void test_bad_files(void **state)
 	}
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	static struct vol v;
-	fill(&v, 6, 6, 6, ball);
+	fill(&v, 6, 6, 6, ball_field);
 	struct built_shape b = build_grid("", &v);
 	const struct memory_file files[] = {{"m", v.bytes, v.size}, {0}};
 	built_shape_check_out_of_memory(&b.scene, files, 6);
@@ -280,8 +281,11 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_bodies),	  cmocka_unit_test(test_plane),		  cmocka_unit_test(test_noise),
-		cmocka_unit_test(test_bad_files), cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_bodies_are_closed_and_on_the_surface),
+		cmocka_unit_test(test_plane_is_exact_and_ends_at_the_cube),
+		cmocka_unit_test(test_noise_gives_a_closed_mesh),
+		cmocka_unit_test(test_invalid_grids_are_refused),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

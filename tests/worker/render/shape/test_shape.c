@@ -22,7 +22,7 @@ struct built {
 	struct scene scene;
 	struct arena arena;
 	struct shape_geometry g;
-	uint64_t dropped;
+	uint64_t dropped_count;
 	struct error error;
 	int result;
 };
@@ -40,11 +40,11 @@ static struct built build(const char *type, const char *content, const char *obj
 	b.result = scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error);
 	if (b.result)
 		return b;
-	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
+	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped_count, &b.error);
 	return b;
 }
 
-static void release(struct built *b)
+static void release_built(struct built *b)
 {
 	arena_fini(&b->arena);
 	scene_fini(&b->scene);
@@ -92,7 +92,7 @@ static void assert_facing(const struct mesh *m, double sign)
 	}
 }
 
-static void test_rectangle(void **state)
+static void test_rectangle_is_built(void **state)
 {
 	(void)state;
 	struct built b = build_ok("rectangle", "", NULL);
@@ -105,14 +105,14 @@ static void test_rectangle(void **state)
 	}
 	assert_vec3(triangle_normal(m, 0), 0, 0, 1);
 	assert_vec3(triangle_normal(m, 1), 0, 0, 1);
-	release(&b);
+	release_built(&b);
 	b = build_ok("rectangle", "<boolean name='flip_normals' value='true'/>", NULL);
 	assert_vec3(to_vec3(b.g.mesh.normal[0]), 0, 0, -1);
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
-	release(&b);
+	release_built(&b);
 }
 
-static void test_cube(void **state)
+static void test_cube_faces_outwards_or_inwards(void **state)
 {
 	(void)state;
 	static const struct {
@@ -130,12 +130,12 @@ static void test_cube(void **state)
 		struct built b = build_ok("cube", cases[i].content, NULL);
 		assert_int_equal(b.g.mesh.triangle_count, 12);
 		assert_facing(&b.g.mesh, cases[i].sign);
-		release(&b);
+		release_built(&b);
 	}
 }
 
 /* Mitsuba's parametrisation of three of the faces. */
-static void test_cube_uv(void **state)
+static void test_cube_has_the_uv_of_mitsuba(void **state)
 {
 	(void)state;
 	struct built b = build_ok("cube", "", NULL);
@@ -149,10 +149,10 @@ static void test_cube_uv(void **state)
 		if (n[1] == 1)
 			assert_true(uv[0] == (1 - p[0]) / 2 && uv[1] == (1 - p[2]) / 2);
 	}
-	release(&b);
+	release_built(&b);
 }
 
-static void test_sphere(void **state)
+static void test_sphere_is_built(void **state)
 {
 	(void)state;
 	struct built b = build_ok("sphere",
@@ -163,20 +163,20 @@ static void test_sphere(void **state)
 	assert_int_equal(b.g.kind, SHAPE_SPHERE);
 	assert_vec3(b.g.sphere.center, 6, 2, 6);
 	assert_true(fabs(b.g.sphere.radius - 1) < 1e-15);
-	assert_false(b.g.sphere.flip_normals);
+	assert_false(b.g.sphere.flips_normals);
 	assert_vec3(mat4_vector(&b.g.sphere.to_world, (vec3){1, 0, 0}), 0, 1, 0);
-	release(&b);
+	release_built(&b);
 	b = build("sphere", "<transform name='to_world'><scale z='0'/></transform>", NULL);
 	assert_int_equal(b.result, -EINVAL);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"sphere\">: to_world flattens the shape"));
-	release(&b);
+	release_built(&b);
 	b = build("sphere",
 		  "<float name='radius' value='1e50'/><transform name='to_world'><scale x='1e50'/></transform>", NULL);
 	assert_int_equal(b.result, -ERANGE);
-	release(&b);
+	release_built(&b);
 }
 
-static double area(const struct mesh *m)
+static double mesh_area(const struct mesh *m)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -188,7 +188,7 @@ static double area(const struct mesh *m)
 }
 
 /* The points and normals of a sphere that is scaled unevenly, mirrored and sheared are those of x^T A x = 1. */
-static void test_ellipsoid(void **state)
+static void test_ellipsoid_satisfies_its_equation(void **state)
 {
 	(void)state;
 	struct built b = build_ok("sphere",
@@ -207,24 +207,24 @@ static void test_ellipsoid(void **state)
 		assert_true(vec3_length(vec3_sub(n, to_vec3(m->normal[i]))) < 1e-6);
 	}
 	assert_facing(m, 1);
-	release(&b);
+	release_built(&b);
 	b = build_ok("sphere",
 		     "<boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='2'/></transform>",
 		     NULL);
 	assert_facing(&b.g.mesh, -1);
 	/* The area of a prolate spheroid: 2 pi (1 + c / e asin e), c = 2, e^2 = 3/4. */
 	double e = sqrt(0.75);
-	assert_true(fabs(area(&b.g.mesh) / (2 * M_PI * (1 + 2 / e * asin(e))) - 1) < 1e-3);
-	release(&b);
+	assert_true(fabs(mesh_area(&b.g.mesh) / (2 * M_PI * (1 + 2 / e * asin(e))) - 1) < 1e-3);
+	release_built(&b);
 }
 
-static void test_disk(void **state)
+static void test_disk_is_built(void **state)
 {
 	(void)state;
 	struct built b =
 		build_ok("disk", "<transform name='to_world'><scale value='3'/><translate z='1'/></transform>", NULL);
 	const struct mesh *m = &b.g.mesh;
-	assert_true(fabs(area(m) / (9 * M_PI) - 1) < 1e-12);
+	assert_true(fabs(mesh_area(m) / (9 * M_PI) - 1) < 1e-12);
 	for (uint32_t i = 0; i < m->triangle_count; i++)
 		assert_vec3(triangle_normal(m, i), 0, 0, 1);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
@@ -233,10 +233,10 @@ static void test_disk(void **state)
 		assert_true(p.z == 1 && fabs(r - u) < 1e-4 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1);
 		assert_true(u == 0 || fabs(m->uv[i][1] - turn - floor(m->uv[i][1] - turn + 0.5)) < 1e-12);
 	}
-	release(&b);
+	release_built(&b);
 }
 
-static void test_cylinder(void **state)
+static void test_cylinder_is_built(void **state)
 {
 	(void)state;
 	struct built b = build_ok("cylinder",
@@ -244,7 +244,7 @@ static void test_cylinder(void **state)
 				  "<float name='radius' value='0.5'/>",
 				  NULL);
 	const struct mesh *m = &b.g.mesh;
-	assert_true(fabs(area(m) / (2 * M_PI * 0.5 * 4) - 1) < 1e-4);
+	assert_true(fabs(mesh_area(m) / (2 * M_PI * 0.5 * 4) - 1) < 1e-4);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		vec3 p = to_vec3(m->position[i]), out = vec3_normalize((vec3){p.x - 1, 0, p.z});
 		assert_true(fabs(hypot(p.x - 1, p.z) - 0.5) < 1e-4);
@@ -253,16 +253,16 @@ static void test_cylinder(void **state)
 	}
 	for (uint32_t i = 0; i < m->triangle_count; i++)
 		assert_true(vec3_dot(triangle_normal(m, i), to_vec3(m->normal[m->index[i][0]])) > 0.99);
-	release(&b);
+	release_built(&b);
 	b = build("cylinder", "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='0' z='0'/>", NULL);
 	assert_int_equal(b.result, -EINVAL);
 	assert_non_null(strstr(b.error.text, "a cylinder from (1, 0, 0) to (1, 0, 0)"));
-	release(&b);
+	release_built(&b);
 }
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
-static void test_obj_polygons(void **state)
+static void test_obj_polygons_become_triangles(void **state)
 {
 	(void)state;
 	struct built b = build_ok("obj", "", "# a comment\no x\n" SQUARE "g a\nusemtl b\ns 1\nf 1 2 3 4\n");
@@ -272,27 +272,27 @@ static void test_obj_polygons(void **state)
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
 	assert_vec3(triangle_normal(&b.g.mesh, 1), 0, 0, 1);
 	assert_vec3(to_vec3(b.g.mesh.normal[2]), 0, 0, 1);
-	release(&b);
+	release_built(&b);
 	/* Negative indices, joined lines, blanks, carriage returns, colours after positions. */
 	b = build_ok("obj", "", "v 0 0 0 1 1 1\r\nv 1 0 \\\r\n 0\r\n  v\t1 1 0\r\nf -3 \\\n -2 -1 # end");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
 	assert_vec3(to_vec3(b.g.mesh.position[b.g.mesh.index[0][1]]), 1, 0, 0);
-	release(&b);
+	release_built(&b);
 }
 
-static void refuses(const char *content, const char *obj, const char *text)
+static void expect_refused(const char *content, const char *obj, const char *text)
 {
 	struct built b = build("obj", content, obj);
 	if (b.result >= 0 || !strstr(b.error.text, text))
 		fail_msg("%s\n gave %d: %s\n not: %s", obj, b.result, b.error.text, text);
-	release(&b);
+	release_built(&b);
 }
 
 #define PARTS                                                                                                       \
 	SQUARE "vt 0 0.25\nf 1 2 3\nusemtl red paint \nusemtl blue\nf 1/1 2/1 3/1\nusemtl red paint\r\nf 3 4 1 2\n" \
 	       "usemtl blue\nv 9 8 0\nf 1/1 3/1 5/1\nusemtl none\n"
 
-static void test_obj_material(void **state)
+static void test_obj_material_selects_faces(void **state)
 {
 	(void)state;
 	struct built b = build_ok("obj", "<string name='material' value='blue'/>", PARTS);
@@ -305,22 +305,22 @@ static void test_obj_material(void **state)
 	}
 	assert_int_equal(b.g.mesh.vertex_count, 4); /* vertices that the faces share are shared in the mesh */
 	assert_false(b.g.has_materials);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<string name='material' value='red paint'/>", PARTS);
 	assert_true(b.g.mesh.triangle_count == 2 && b.g.mesh.vertex_count == 4 && !b.g.mesh.uv);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<string name='material' value=''/>", PARTS);
 	assert_true(b.g.mesh.triangle_count == 1 && b.g.mesh.vertex_count == 3);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "", PARTS);
 	assert_true(b.g.mesh.triangle_count == 5 && b.g.has_materials);
-	release(&b);
-	refuses("<string name='material' value='none'/>", PARTS, "m.obj: has no faces of the material `none`");
-	refuses("<string name='material' value='red'/>", PARTS, "has no faces of the material `red`");
+	release_built(&b);
+	expect_refused("<string name='material' value='none'/>", PARTS, "m.obj: has no faces of the material `none`");
+	expect_refused("<string name='material' value='red'/>", PARTS, "has no faces of the material `red`");
 }
 
 /* The file is read once for all its materials, and again if another file has been requested in between. */
-static void test_obj_is_kept(void **state)
+static void test_obj_is_read_once_for_all_materials(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -367,7 +367,7 @@ static void test_obj_is_kept(void **state)
 	scene_fini(&s);
 }
 
-static void test_obj_attributes(void **state)
+static void test_obj_normals_and_uv_are_read(void **state)
 {
 	(void)state;
 	const char *obj =
@@ -382,13 +382,13 @@ static void test_obj_attributes(void **state)
 	assert_int_not_equal(t[0], s[0]);
 	assert_vec3(to_vec3(m->normal[t[0]]), 0, 0, 1);
 	assert_vec3(to_vec3(m->normal[s[0]]), 0, 0.6, 0.8);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<boolean name='flip_tex_coords' value='false'/>", obj);
 	assert_true(b.g.mesh.uv[b.g.mesh.index[0][0]][1] == 0.25);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<boolean name='face_normals' value='true'/>", obj);
 	assert_null(b.g.mesh.normal);
-	release(&b);
+	release_built(&b);
 }
 
 /* clang-format off */
@@ -397,7 +397,7 @@ static void test_obj_attributes(void **state)
 	"f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n"
 /* clang-format on */
 
-static void test_smooth_normals(void **state)
+static void test_smooth_normals_are_computed(void **state)
 {
 	(void)state;
 	struct built b = build_ok("obj", "", OCTAHEDRON);
@@ -405,13 +405,13 @@ static void test_smooth_normals(void **state)
 	for (uint32_t i = 0; i < 6; i++) /* by symmetry, the normal of a corner is its position */
 		assert_vec3(to_vec3(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1],
 			    b.g.mesh.position[i][2]);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<transform name='to_world'><scale x='-1' y='2' z='3'/></transform>", OCTAHEDRON);
 	assert_facing(&b.g.mesh, 1);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<boolean name='flip_normals' value='true'/>", OCTAHEDRON);
 	assert_facing(&b.g.mesh, -1);
-	release(&b);
+	release_built(&b);
 }
 
 /* Two right angles on one side, one on the other: weights are angles, not areas or counts. */
@@ -422,7 +422,7 @@ static void test_normals_are_weighted_by_angle(void **state)
 		build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nv 0.5 0.5 0\nf 1 2 5\nf 1 5 3\nf 1 3 4\n");
 	vec3 n = to_vec3(b.g.mesh.normal[b.g.mesh.index[0][0]]);
 	assert_vec3(n, sqrt(0.5), 0, sqrt(0.5));
-	release(&b);
+	release_built(&b);
 }
 
 static void test_normals_decide_the_outside(void **state)
@@ -430,12 +430,12 @@ static void test_normals_decide_the_outside(void **state)
 	(void)state;
 	struct built b = build_ok("obj", "", SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
-	release(&b);
+	release_built(&b);
 	b = build_ok("obj", "<transform name='to_world'><scale z='-1'/></transform>",
 		     SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
 	assert_vec3(to_vec3(b.g.mesh.normal[0]), 0, 0, 1);
-	release(&b);
+	release_built(&b);
 }
 
 static void test_flat_triangles_are_dropped(void **state)
@@ -443,49 +443,50 @@ static void test_flat_triangles_are_dropped(void **state)
 	(void)state;
 	struct built b = build_ok("obj", "", SQUARE "f 1 2 3\nf 1 1 2\nf 1 2 2\nv 2 0 0\nf 1 2 5\n");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
-	assert_int_equal(b.dropped, 3);
-	release(&b);
+	assert_int_equal(b.dropped_count, 3);
+	release_built(&b);
 	/* Points and lines written as faces. */
 	b = build_ok("obj", "", SQUARE "f 1\nf 1 2 3\nf 1 2\n");
 	assert_int_equal(b.g.mesh.triangle_count, 1);
-	assert_int_equal(b.dropped, 2);
-	release(&b);
+	assert_int_equal(b.dropped_count, 2);
+	release_built(&b);
 }
 
-static void test_bad_objs(void **state)
+static void test_invalid_objs_are_refused(void **state)
 {
 	(void)state;
-	refuses("", "", "m.obj: has no vertices and no faces");
-	refuses("", "v 0 0 nan\n", "s.xml:2: <shape type=\"obj\">: m.obj:1: `v` needs 3 finite numbers");
-	refuses("", "v 0 0 inf\n", "finite numbers");
-	refuses("", "v 0 0 1e99\n", "finite numbers");
-	refuses("", "v 0 0\nv 1 1 1\n", "m.obj:1: `v` needs");
-	refuses("", "v 0 0 0x\n", "m.obj:1: `v` needs");
-	refuses("", SQUARE "vn 0 0 x\n", "m.obj:5: `vn` needs");
-	refuses("", "v 0 0 NaN\n", "m.obj:1: `v` needs");
-	refuses("", SQUARE "vt\n", "`vt` needs 1");
-	refuses("", SQUARE "vt 0 2e12\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n", "a texture coordinate lies beyond 1e+12");
-	refuses("", SQUARE "\nf 1 2 5\n", "m.obj:6: vertex 5 is out of range; there are 4");
-	refuses("", SQUARE "f 0 1 2\n", "vertex 0 is out of range");
-	refuses("", SQUARE "f -5 1 2\n", "vertex -5 is out of range");
-	refuses("", SQUARE "f 1 2 99999999999999999999\n", "m.obj:5: a face's corners");
-	refuses("", SQUARE "f 1/1 2/1 3/1\n", "texture coordinate 1 is out of range; there are 0");
-	refuses("", SQUARE "f 1//1 2//1 3//1\n", "normal 1 is out of range");
-	refuses("", SQUARE "f\n", "m.obj:5: a face without corners");
-	refuses("", SQUARE "f 1/ 2/ 3/\n", "a face's corners are");
-	refuses("", SQUARE "f 1/x 2 3\n", "a face's corners are");
-	refuses("", SQUARE "f 1.5 2 3\n", "a face's corners are");
-	refuses("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n",
-		"to_world flattens the shape");
-	refuses("<transform name='to_world'><scale value='1e60'/></transform>",
-		"v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n", "a vertex lies beyond");
+	expect_refused("", "", "m.obj: has no vertices and no faces");
+	expect_refused("", "v 0 0 nan\n", "s.xml:2: <shape type=\"obj\">: m.obj:1: `v` needs 3 finite numbers");
+	expect_refused("", "v 0 0 inf\n", "finite numbers");
+	expect_refused("", "v 0 0 1e99\n", "finite numbers");
+	expect_refused("", "v 0 0\nv 1 1 1\n", "m.obj:1: `v` needs");
+	expect_refused("", "v 0 0 0x\n", "m.obj:1: `v` needs");
+	expect_refused("", SQUARE "vn 0 0 x\n", "m.obj:5: `vn` needs");
+	expect_refused("", "v 0 0 NaN\n", "m.obj:1: `v` needs");
+	expect_refused("", SQUARE "vt\n", "`vt` needs 1");
+	expect_refused("", SQUARE "vt 0 2e12\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n",
+		       "a texture coordinate lies beyond 1e+12");
+	expect_refused("", SQUARE "\nf 1 2 5\n", "m.obj:6: vertex 5 is out of range; there are 4");
+	expect_refused("", SQUARE "f 0 1 2\n", "vertex 0 is out of range");
+	expect_refused("", SQUARE "f -5 1 2\n", "vertex -5 is out of range");
+	expect_refused("", SQUARE "f 1 2 99999999999999999999\n", "m.obj:5: a face's corners");
+	expect_refused("", SQUARE "f 1/1 2/1 3/1\n", "texture coordinate 1 is out of range; there are 0");
+	expect_refused("", SQUARE "f 1//1 2//1 3//1\n", "normal 1 is out of range");
+	expect_refused("", SQUARE "f\n", "m.obj:5: a face without corners");
+	expect_refused("", SQUARE "f 1/ 2/ 3/\n", "a face's corners are");
+	expect_refused("", SQUARE "f 1/x 2 3\n", "a face's corners are");
+	expect_refused("", SQUARE "f 1.5 2 3\n", "a face's corners are");
+	expect_refused("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n",
+		       "to_world flattens the shape");
+	expect_refused("<transform name='to_world'><scale value='1e60'/></transform>",
+		       "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n", "a vertex lies beyond");
 	struct built b = build("obj", "<string name='filename' value='none.obj'/>", NULL);
 	assert_int_equal(b.result, -ENOENT);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"obj\">: none.obj: no such file"));
-	release(&b);
+	release_built(&b);
 }
 
-static void test_memory_runs_out(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	struct built b = build_ok("obj", "", OCTAHEDRON);
@@ -497,36 +498,36 @@ static void test_memory_runs_out(void **state)
 		struct arena arena = {0};
 		struct shape_geometry g;
 		mem_fail_after(n);
-		r = shape_build(b.scene.objects[0], &assets, &arena, &g, &b.dropped, &b.error);
+		r = shape_build(b.scene.objects[0], &assets, &arena, &g, &b.dropped_count, &b.error);
 		mem_fail_after(-1);
 		assert_true(r == 0 || r == -ENOMEM);
 		arena_fini(&arena);
 	}
 	assert_int_equal(r, 0);
 	assert_true(n > 4);
-	release(&b);
+	release_built(&b);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_rectangle),
-		cmocka_unit_test(test_cube),
-		cmocka_unit_test(test_cube_uv),
-		cmocka_unit_test(test_sphere),
-		cmocka_unit_test(test_ellipsoid),
-		cmocka_unit_test(test_disk),
-		cmocka_unit_test(test_cylinder),
-		cmocka_unit_test(test_obj_polygons),
-		cmocka_unit_test(test_obj_material),
-		cmocka_unit_test(test_obj_is_kept),
-		cmocka_unit_test(test_obj_attributes),
-		cmocka_unit_test(test_smooth_normals),
+		cmocka_unit_test(test_rectangle_is_built),
+		cmocka_unit_test(test_cube_faces_outwards_or_inwards),
+		cmocka_unit_test(test_cube_has_the_uv_of_mitsuba),
+		cmocka_unit_test(test_sphere_is_built),
+		cmocka_unit_test(test_ellipsoid_satisfies_its_equation),
+		cmocka_unit_test(test_disk_is_built),
+		cmocka_unit_test(test_cylinder_is_built),
+		cmocka_unit_test(test_obj_polygons_become_triangles),
+		cmocka_unit_test(test_obj_material_selects_faces),
+		cmocka_unit_test(test_obj_is_read_once_for_all_materials),
+		cmocka_unit_test(test_obj_normals_and_uv_are_read),
+		cmocka_unit_test(test_smooth_normals_are_computed),
 		cmocka_unit_test(test_normals_are_weighted_by_angle),
 		cmocka_unit_test(test_normals_decide_the_outside),
 		cmocka_unit_test(test_flat_triangles_are_dropped),
-		cmocka_unit_test(test_bad_objs),
-		cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_invalid_objs_are_refused),
+		cmocka_unit_test(test_failed_allocations_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -41,7 +41,7 @@ static struct built_shape build_ok(const char *content)
 }
 
 /* All corners of all triangles have the same positions and normals; the numbering of vertices may differ. */
-static void expect_same(struct built_shape *a, struct built_shape *b)
+static void expect_same_corners(struct built_shape *a, struct built_shape *b)
 {
 	const struct mesh *x = &a->geometry.mesh, *y = &b->geometry.mesh;
 	assert_int_equal(x->triangle_count, y->triangle_count);
@@ -61,13 +61,13 @@ static void expect_same(struct built_shape *a, struct built_shape *b)
 
 /* A prism with `sides` sides around z, from z = 0 to 1, with lids. ROUND: the sides have the normals of a cylinder;
  * FLAT: each side has its own; NONE: the file has no normals, and corners share positions. */
-enum normals { NONE, FLAT, ROUND };
-static void put_prism(int sides, enum normals normals)
+enum normal_kind { NONE, FLAT, ROUND };
+static void put_prism(int sides, enum normal_kind normals)
 {
 	used = 0;
 	for (int i = 0; i < 2 * sides; i++)
 		put("v %.17g %.17g %d\n", cos(M_PI * (i / 2) * 2 / sides), sin(M_PI * (i / 2) * 2 / sides), i % 2);
-	/* normals: 2 i at corner i, 2 i + 1 between corners; then down, up */
+	/* normal_kind: 2 i at corner i, 2 i + 1 between corners; then down, up */
 	for (int i = 0; i < 2 * sides; i++)
 		put("vn %.17g %.17g 0\n", cos(M_PI * i / sides), sin(M_PI * i / sides));
 	put("vn 0 0 -1\nvn 0 0 1\n");
@@ -97,7 +97,7 @@ static void put_prism(int sides, enum normals normals)
 
 /* Normals are weighted by angles. The two triangles of a quad meet at two of its corners, so each side contributes 90
  * degrees in all there, and the normal between two sides is their mean. */
-static void test_prisms(void **state)
+static void test_prisms_are_smoothed_by_angle(void **state)
 {
 	(void)state;
 	for (int sides = 5; sides <= 40; sides += 7) {
@@ -110,37 +110,37 @@ static void test_prisms(void **state)
 		smooth = build_ok(below);
 		put_prism(sides, FLAT);
 		as_written = build_ok("");
-		expect_same(&smooth, &as_written);
+		expect_same_corners(&smooth, &as_written);
 		put_prism(sides, NONE);
 		smooth = build_ok(above);
 		put_prism(sides, ROUND);
 		as_written = build_ok("");
-		expect_same(&smooth, &as_written);
+		expect_same_corners(&smooth, &as_written);
 		/* Normals in the file are ignored. */
 		put_prism(sides, FLAT);
 		smooth = build_ok(above);
 		put_prism(sides, ROUND);
 		as_written = build_ok("");
-		expect_same(&smooth, &as_written);
+		expect_same_corners(&smooth, &as_written);
 	}
 }
 
 /* Smooth across all edges, which gives the normals of a file whose corners share all vertices; and across none. */
-static void test_ends(void **state)
+static void test_extreme_angles_smooth_all_or_no_edges(void **state)
 {
 	(void)state;
 	put_prism(7, NONE);
 	struct built_shape all = build_ok(ANGLE(180)), shared = build_ok("");
-	expect_same(&all, &shared);
+	expect_same_corners(&all, &shared);
 	struct built_shape none = build_ok(ANGLE(0));
 	put_prism(7, FLAT);
 	struct built_shape flat = build_ok("");
-	expect_same(&none, &flat);
+	expect_same_corners(&none, &flat);
 }
 
 /* Three faces around an edge, each at 40 degrees to the one before: the first is grouped with the second, and the third
  * remains. */
-static void test_first_come(void **state)
+static void test_faces_are_grouped_in_order(void **state)
 {
 	(void)state;
 	used = 0;
@@ -166,7 +166,7 @@ static void test_first_come(void **state)
 }
 
 /* Edges with different texture coordinates are not smooth, as in Mitsuba. */
-static void test_seams(void **state)
+static void test_texture_seams_are_not_smoothed(void **state)
 {
 	(void)state;
 	used = 0;
@@ -181,7 +181,7 @@ static void test_seams(void **state)
 }
 
 /* Nor are edges with different colours; each corner and each triangle keeps its attributes. */
-static void test_attributes(void **state)
+static void test_edges_of_different_colours_are_not_smoothed(void **state)
 {
 	(void)state;
 	static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
@@ -224,7 +224,7 @@ static void expect_refused(const char *content, const char *sentence)
 	built_shape_fini(&b);
 }
 
-static void test_bad_input(void **state)
+static void test_invalid_smoothing_is_refused(void **state)
 {
 	(void)state;
 	put_prism(5, NONE);
@@ -246,8 +246,12 @@ static void test_bad_input(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_prisms), cmocka_unit_test(test_ends),	  cmocka_unit_test(test_first_come),
-		cmocka_unit_test(test_seams),  cmocka_unit_test(test_attributes), cmocka_unit_test(test_bad_input),
+		cmocka_unit_test(test_prisms_are_smoothed_by_angle),
+		cmocka_unit_test(test_extreme_angles_smooth_all_or_no_edges),
+		cmocka_unit_test(test_faces_are_grouped_in_order),
+		cmocka_unit_test(test_texture_seams_are_not_smoothed),
+		cmocka_unit_test(test_edges_of_different_colours_are_not_smoothed),
+		cmocka_unit_test(test_invalid_smoothing_is_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

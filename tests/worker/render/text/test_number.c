@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-static void test_accepted(void **state)
+static void test_valid_numbers_are_parsed(void **state)
 {
 	(void)state;
 	static const struct {
@@ -40,7 +40,7 @@ static void test_accepted(void **state)
 	}
 }
 
-static void test_refused(void **state)
+static void test_invalid_numbers_are_refused(void **state)
 {
 	(void)state;
 	static const char *const bad[] = {"",	 " ",	"nan", "inf", "-inf", "0x10", "1,5", "1e",  "1e400",
@@ -57,7 +57,7 @@ static void test_refused(void **state)
 	assert_int_equal(n, -12);
 }
 
-static void test_rounding_agrees_with_the_library(void **state)
+static void test_rounding_agrees_with_strtod(void **state)
 {
 	(void)state;
 	for (uint64_t i = 0; i < 20000; i++) {
@@ -72,7 +72,7 @@ static void test_rounding_agrees_with_the_library(void **state)
 	}
 }
 
-static void test_lists(void **state)
+static void test_lists_of_numbers_are_parsed(void **state)
 {
 	(void)state;
 	double v[3];
@@ -98,34 +98,32 @@ static void test_lists(void **state)
 	assert_int_equal(number_parse_weights("1;x", v, 3), -1);
 }
 
-static void check_snake(const char *from, const char *to)
+static void check_snake_case(const char *from, const char *to)
 {
 	char out[128];
 	snake_case_from_camel(from, out);
 	assert_string_equal(out, to);
 }
 
-static void test_snake(void **state)
+static void test_names_become_snake_case(void **state)
 {
 	(void)state;
-	check_snake("toWorld", "to_world");
-	check_snake("intIOR", "int_ior");
-	check_snake("maxDepth", "max_depth");
-	check_snake("extEta", "ext_eta");
-	check_snake("uvscale", "uvscale");
-	check_snake("flipTexCoords", "flip_tex_coords");
-	check_snake("int_ior", "int_ior");
-	check_snake("", "");
+	check_snake_case("toWorld", "to_world");
+	check_snake_case("intIOR", "int_ior");
+	check_snake_case("maxDepth", "max_depth");
+	check_snake_case("extEta", "ext_eta");
+	check_snake_case("uvscale", "uvscale");
+	check_snake_case("flipTexCoords", "flip_tex_coords");
+	check_snake_case("int_ior", "int_ior");
+	check_snake_case("", "");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_accepted),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_rounding_agrees_with_the_library),
-		cmocka_unit_test(test_lists),
-		cmocka_unit_test(test_snake),
+		cmocka_unit_test(test_valid_numbers_are_parsed),    cmocka_unit_test(test_invalid_numbers_are_refused),
+		cmocka_unit_test(test_rounding_agrees_with_strtod), cmocka_unit_test(test_lists_of_numbers_are_parsed),
+		cmocka_unit_test(test_names_become_snake_case),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

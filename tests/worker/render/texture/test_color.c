@@ -15,20 +15,20 @@
 
 #include <cmocka.h>
 
-typedef spectrum (*spectrum_at)(const void *user, const struct wavelengths *w);
+typedef spectrum (*spectrum_function)(const void *user, const struct wavelengths *w);
 
-static spectrum at_color(const void *user, const struct wavelengths *w)
+static spectrum color_spectrum(const void *user, const struct wavelengths *w)
 {
 	return color_eval(user, w);
 }
 
-static spectrum at_table(const void *user, const struct wavelengths *w)
+static spectrum table_spectrum(const void *user, const struct wavelengths *w)
 {
 	return color_eval_rgb_reflectance(user, w);
 }
 
 /* Computes the linear Rec. 709 of a spectrum, under D65 or without an illuminant, by a sum in steps of 1 nm. */
-static void rgb_of(spectrum_at f, const void *user, bool under_d65, double rgb[3])
+static void integrate_rgb(spectrum_function f, const void *user, bool under_d65, double rgb[3])
 {
 	double xyz[3] = {0};
 	for (int i = 0; i < CIE_COUNT; i += SPECTRUM_LANES) {
@@ -58,16 +58,16 @@ static double fit_error(const double rgb[3], bool table)
 	struct color color;
 	assert_int_equal(color_from_rgb(rgb, COLOR_REFLECTANCE, &color), 0);
 	if (table)
-		rgb_of(at_table, rgb, true, back);
+		integrate_rgb(table_spectrum, rgb, true, back);
 	else
-		rgb_of(at_color, &color, true, back);
+		integrate_rgb(color_spectrum, &color, true, back);
 	for (int k = 0; k < 3; k++)
 		worst = fmax(worst, fabs(back[k] - rgb[k]));
 	return worst;
 }
 
 /* The ratios of components in this grid lie between the nodes of the table. */
-static void test_round_trip(void **state)
+static void test_rgb_survives_the_round_trip(void **state)
 {
 	(void)state;
 	double worst[2] = {0}, sum[2] = {0};
@@ -87,7 +87,7 @@ static void test_round_trip(void **state)
 	assert_true(worst[1] < 0.005);
 }
 
-static void test_dark_and_saturated_colours(void **state)
+static void test_dark_and_saturated_colours_keep_their_rgb(void **state)
 {
 	(void)state;
 	const double colours[][3] = {{1e-9, 0, 0},
@@ -137,7 +137,7 @@ static void test_emitters_give_their_rgb(void **state)
 		struct color c;
 		double rgb[3], scale = fmax(colours[i][0], fmax(colours[i][1], colours[i][2]));
 		assert_int_equal(color_from_rgb(colours[i], COLOR_ILLUMINANT, &c), 0);
-		rgb_of(at_color, &c, false, rgb);
+		integrate_rgb(color_spectrum, &c, false, rgb);
 		for (int k = 0; k < 3; k++)
 			assert_true(fabs(rgb[k] - colours[i][k]) < 1e-3 * scale);
 	}
@@ -148,7 +148,7 @@ static void test_emitters_give_their_rgb(void **state)
 	/* The Rec. 709 values of a constant spectrum without an illuminant, which is reddish. */
 	struct color flat = color_constant(1);
 	double rgb[3];
-	rgb_of(at_color, &flat, false, rgb);
+	integrate_rgb(color_spectrum, &flat, false, rgb);
 	assert_true(fabs(rgb[0] - 1.205) < 1e-3 && fabs(rgb[1] - 0.948) < 1e-3 && fabs(rgb[2] - 0.909) < 1e-3);
 }
 
@@ -157,7 +157,7 @@ struct bounces {
 	int count;
 };
 
-static spectrum at_bounces(const void *user, const struct wavelengths *w)
+static spectrum reflected_spectrum(const void *user, const struct wavelengths *w)
 {
 	const struct bounces *b = user;
 	spectrum s = spectrum_constant(1);
@@ -167,19 +167,19 @@ static spectrum at_bounces(const void *user, const struct wavelengths *w)
 }
 
 /* Estimates RGB like paths do, from the four lanes of sampled wavelengths. */
-static void drawn_rgb(const struct bounces *b, double rgb[3])
+static void estimate_rgb(const struct bounces *b, double rgb[3])
 {
-	enum { DRAWN = 1 << 14 };
+	enum { SAMPLE_COUNT = 1 << 14 };
 	double xyz[3] = {0};
-	for (int i = 0; i < DRAWN; i++) {
-		const struct wavelengths w = wavelengths_sample((i + 0.5) / DRAWN);
+	for (int i = 0; i < SAMPLE_COUNT; i++) {
+		const struct wavelengths w = wavelengths_sample((i + 0.5) / SAMPLE_COUNT);
 		double one[3];
-		spectrum s = at_bounces(b, &w);
+		spectrum s = reflected_spectrum(b, &w);
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			s.v[k] *= color_d65(w.nm[k]);
 		spectrum_to_xyz(s, &w, one);
 		for (int k = 0; k < 3; k++)
-			xyz[k] += one[k] / DRAWN;
+			xyz[k] += one[k] / SAMPLE_COUNT;
 	}
 	const double rec709[3][3] = {{3.2404542, -1.5371385, -0.4985314},
 				     {-0.9692660, 1.8760108, 0.0415560},
@@ -206,8 +206,8 @@ static void test_bounces_multiply_spectra(void **state)
 			struct bounces b = {.count = n};
 			double sum[3], drawn[3];
 			assert_int_equal(color_from_rgb(colours[i], COLOR_REFLECTANCE, &b.color), 0);
-			rgb_of(at_bounces, &b, true, sum);
-			drawn_rgb(&b, drawn);
+			integrate_rgb(reflected_spectrum, &b, true, sum);
+			estimate_rgb(&b, drawn);
 			for (int k = 0; k < 3; k++)
 				assert_true(fabs(drawn[k] - sum[k]) < 1e-3 * sum[main_channel]);
 			ratio[n - 1] = sum[main_channel] / pow(own, n);
@@ -220,31 +220,31 @@ static void test_bounces_multiply_spectra(void **state)
 		double flat[3], under[3];
 		struct color even = color_constant(1);
 		assert_int_equal(color_from_rgb(colours[i], COLOR_REFLECTANCE, &once.color), 0);
-		rgb_of(at_color, &even, false, flat);
-		rgb_of(at_bounces, &once, false, under);
+		integrate_rgb(color_spectrum, &even, false, flat);
+		integrate_rgb(reflected_spectrum, &once, false, under);
 		double reddish = under[main_channel] / (flat[main_channel] * own);
 		print_message("  under a constant spectrum %.4f times\n", reddish);
 		assert_true(fabs(reddish - 1) < 0.05);
 	}
 }
 
-static spectrum at_unbounded(const void *rgb, const struct wavelengths *w)
+static spectrum unbounded_spectrum(const void *rgb, const struct wavelengths *w)
 {
 	return color_eval_rgb_unbounded(rgb, w);
 }
 
-static void test_unbounded_keeps_its_rgb(void **state)
+static void test_unbounded_colours_keep_their_rgb(void **state)
 {
 	(void)state;
 	const double k[3] = {3.91295, 2.45285, 2.14219};
 	struct color c;
 	double rgb[3];
 	assert_int_equal(color_from_rgb(k, COLOR_UNBOUNDED, &c), 0);
-	rgb_of(at_color, &c, true, rgb);
+	integrate_rgb(color_spectrum, &c, true, rgb);
 	for (int i = 0; i < 3; i++)
 		assert_true(fabs(rgb[i] - k[i]) < 1e-4 * k[0]);
 	/* likewise in textures */
-	rgb_of(at_unbounded, k, true, rgb);
+	integrate_rgb(unbounded_spectrum, k, true, rgb);
 	for (int i = 0; i < 3; i++)
 		assert_true(fabs(rgb[i] - k[i]) < COLOR_UNBOUNDED_SCALE * 0.005 * k[0]); /* error of the table */
 	const struct wavelengths w = wavelengths_sample(0.1);
@@ -253,7 +253,7 @@ static void test_unbounded_keeps_its_rgb(void **state)
 	assert_true(color_eval_rgb_unbounded(black, &w).v[0] == 0);
 }
 
-static void test_bounds_hold(void **state)
+static void test_reflectances_stay_within_their_bounds(void **state)
 {
 	(void)state;
 	const double colours[][3] = {{0.9, 0.1, 0.3}, {0.1, 0.2, 0.05}, {0.3, 0.3, 0.9}};
@@ -272,7 +272,7 @@ static void test_bounds_hold(void **state)
 }
 
 /* If wavelengths repeat, each lane has the value of its wavelength alone. */
-static void test_few_wavelengths(void **state)
+static void test_repeated_wavelengths_have_equal_values(void **state)
 {
 	(void)state;
 	const double rgb[3] = {0.9, 0.1, 0.3};
@@ -289,18 +289,18 @@ static void test_few_wavelengths(void **state)
 			}
 }
 
-static struct value table_of(const double *nm, const double *x, uint32_t n)
+static struct value make_table(const double *nm, const double *x, uint32_t n)
 {
 	return (struct value){.type = VALUE_SPECTRUM, .as.spectrum = {.count = n, .nm = nm, .value = x}};
 }
 
-static void test_tables(void **state)
+static void test_tables_are_interpolated(void **state)
 {
 	(void)state;
 	struct arena arena = {0};
 	struct error e;
 	const double nm[] = {400, 410, 500, 700}, x[] = {0.1, 0.3, 0.2, 0.8};
-	struct value v = table_of(nm, x, 4);
+	struct value v = make_table(nm, x, 4);
 	struct color c;
 	/* Beyond a table the value is 0, as in Mitsuba, except for unbounded quantities. */
 	for (int role = COLOR_REFLECTANCE; role <= COLOR_UNBOUNDED; role++) {
@@ -312,17 +312,17 @@ static void test_tables(void **state)
 		assert_true(s.v[0] == (ends ? 0.1 : 0) && s.v[3] == (ends ? 0.8 : 0));
 		assert_true(color_max(&c) == 0.8);
 		const double infrared[] = {830.5, 1000}, ultraviolet[] = {200, 359.5};
-		v = table_of(infrared, x, 2);
+		v = make_table(infrared, x, 2);
 		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
 		assert_true(color_max(&c) == (ends ? 0.3 : 0));
-		v = table_of(ultraviolet, x, 2);
+		v = make_table(ultraviolet, x, 2);
 		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
 		assert_true(color_max(&c) == (ends ? 0.3 : 0));
-		v = table_of(nm, x, 4);
+		v = make_table(nm, x, 4);
 	}
 	/* Values of Mitsuba 3's tests of `irregular`, from 450 nm in steps of 50 nm. */
 	const double three[] = {500, 600, 650}, value[] = {1, 2, 0.5}, known[] = {0, 1, 1.5, 2, 0.5, 0};
-	v = table_of(three, value, 3);
+	v = make_table(three, value, 3);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
 	for (int i = 0; i < 6; i++) {
 		double at = 450 + 50 * i;
@@ -330,7 +330,7 @@ static void test_tables(void **state)
 	}
 
 	const double even[] = {0.25};
-	v = table_of(NULL, even, 1);
+	v = make_table(NULL, even, 1);
 	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &arena, &c, &e), 0);
 	assert_int_equal(c.kind, COLOR_KIND_CONSTANT);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
@@ -339,7 +339,7 @@ static void test_tables(void **state)
 }
 
 /* A linear search through the table. */
-static double by_search(const double *nm, const double *x, uint32_t n, double at)
+static double search_table(const double *nm, const double *x, uint32_t n, double at)
 {
 	if (at <= nm[0])
 		return x[0];
@@ -350,7 +350,7 @@ static double by_search(const double *nm, const double *x, uint32_t n, double at
 }
 
 /* Equal spectra have one table, however many materials have them. */
-static void test_equal_tables_are_one(void **state)
+static void test_equal_tables_are_shared(void **state)
 {
 	(void)state;
 	enum { POINTS = 60000, COLOURS = 1000 };
@@ -378,7 +378,7 @@ static void test_equal_tables_are_one(void **state)
 }
 
 /* Equidistant tables, one with intervals of all sizes, and one with samples that nearly coincide. */
-static void test_two_tables_at_once(void **state)
+static void test_tables_with_uneven_intervals_are_searched(void **state)
 {
 	(void)state;
 	const double even[] = {350, 450, 550, 650, 750, 850}, uneven[] = {390, 391, 500, 500.5, 612, 820},
@@ -389,7 +389,7 @@ static void test_two_tables_at_once(void **state)
 	for (int k = 0; k < 3; k++)
 		for (unsigned few = 0; few <= 2; few++)
 			for (double u = 0; u < 1; u += 1.0 / 512) {
-				struct value va = table_of(nm[k], x, 6), vb = table_of(nm[k], y, 6);
+				struct value va = make_table(nm[k], x, 6), vb = make_table(nm[k], y, 6);
 				struct color a, b;
 				assert_int_equal(color_from_value(&va, COLOR_UNBOUNDED, &arena, &a, &e), 0);
 				assert_int_equal(color_from_value(&vb, COLOR_UNBOUNDED, &arena, &b, &e), 0);
@@ -399,8 +399,8 @@ static void test_two_tables_at_once(void **state)
 				spectrum out[2], sa = color_eval(&a, &w), sb = color_eval(&b, &w);
 				color_eval_pair(&a, &b, &w, out);
 				for (int i = 0; i < SPECTRUM_LANES; i++) {
-					assert_true(fabs(sa.v[i] - 0.5 * by_search(nm[k], x, 6, w.nm[i])) < 1e-12);
-					assert_true(fabs(sb.v[i] - by_search(nm[k], y, 6, w.nm[i])) < 1e-11);
+					assert_true(fabs(sa.v[i] - 0.5 * search_table(nm[k], x, 6, w.nm[i])) < 1e-12);
+					assert_true(fabs(sb.v[i] - search_table(nm[k], y, 6, w.nm[i])) < 1e-11);
 				}
 				assert_memory_equal(&out[0], &sa, sizeof sa);
 				assert_memory_equal(&out[1], &sb, sizeof sb);
@@ -422,10 +422,10 @@ static void test_bad_values_are_refused(void **state)
 		{.type = VALUE_FLOAT, .as.number = 1.5},
 		{.type = VALUE_INT, .as.integer = -1},
 		{.type = VALUE_STRING, .as.string = "red"},
-		table_of(backwards, nm, 2),
-		table_of(nm, negative, 2),
-		table_of(nm, bright, 2),
-		table_of(NULL, NULL, 0),
+		make_table(backwards, nm, 2),
+		make_table(nm, negative, 2),
+		make_table(nm, bright, 2),
+		make_table(NULL, NULL, 0),
 	};
 	for (size_t i = 0; i < sizeof reflectances / sizeof *reflectances; i++)
 		assert_int_equal(color_from_value(&reflectances[i], COLOR_REFLECTANCE, &arena, &c, &e), -EINVAL);
@@ -437,17 +437,17 @@ static void test_bad_values_are_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_round_trip),
-		cmocka_unit_test(test_dark_and_saturated_colours),
+		cmocka_unit_test(test_rgb_survives_the_round_trip),
+		cmocka_unit_test(test_dark_and_saturated_colours_keep_their_rgb),
 		cmocka_unit_test(test_grey_is_constant),
 		cmocka_unit_test(test_emitters_give_their_rgb),
 		cmocka_unit_test(test_bounces_multiply_spectra),
-		cmocka_unit_test(test_unbounded_keeps_its_rgb),
-		cmocka_unit_test(test_bounds_hold),
-		cmocka_unit_test(test_few_wavelengths),
-		cmocka_unit_test(test_tables),
-		cmocka_unit_test(test_two_tables_at_once),
-		cmocka_unit_test(test_equal_tables_are_one),
+		cmocka_unit_test(test_unbounded_colours_keep_their_rgb),
+		cmocka_unit_test(test_reflectances_stay_within_their_bounds),
+		cmocka_unit_test(test_repeated_wavelengths_have_equal_values),
+		cmocka_unit_test(test_tables_are_interpolated),
+		cmocka_unit_test(test_tables_with_uneven_intervals_are_searched),
+		cmocka_unit_test(test_equal_tables_are_shared),
 		cmocka_unit_test(test_bad_values_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

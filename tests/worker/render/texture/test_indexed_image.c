@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 /* Makes an image with the given count of different numbers, each at least once, in pseudo-random order. */
-static struct image image_with(uint32_t numbers, uint32_t width, uint32_t height, uint32_t channels)
+static struct image make_image(uint32_t numbers, uint32_t width, uint32_t height, uint32_t channels)
 {
 	size_t count = (size_t)width * height * channels;
 	struct image i = {width, height, channels, malloc(count * sizeof *i.pixels)};
@@ -22,7 +22,7 @@ static struct image image_with(uint32_t numbers, uint32_t width, uint32_t height
 }
 
 /* Returns the bytes of the arena that the copy takes. */
-static size_t check(const struct image *from, uint32_t index_bytes)
+static size_t check_copy(const struct image *from, uint32_t index_bytes)
 {
 	struct arena a = {0};
 	struct indexed_image i;
@@ -39,7 +39,7 @@ static size_t check(const struct image *from, uint32_t index_bytes)
 	return used;
 }
 
-static void test_every_count(void **state)
+static void test_index_size_follows_the_count_of_numbers(void **state)
 {
 	(void)state;
 	static const struct {
@@ -50,9 +50,9 @@ static void test_every_count(void **state)
 		{65537, 300, 300, 1, 0}, {200000, 300, 300, 3, 0},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct image from = image_with(cases[i].numbers, cases[i].width, cases[i].height, cases[i].channels);
+		struct image from = make_image(cases[i].numbers, cases[i].width, cases[i].height, cases[i].channels);
 		size_t count = (size_t)from.width * from.height * from.channels;
-		size_t used = check(&from, cases[i].bytes);
+		size_t used = check_copy(&from, cases[i].bytes);
 		size_t expected = cases[i].bytes ? cases[i].bytes * count + 4 * cases[i].numbers : 4 * count;
 		assert_true(used <= expected + 128); /* both are rounded up to cache lines */
 		free(from.pixels);
@@ -60,14 +60,14 @@ static void test_every_count(void **state)
 }
 
 /* Zeros of both signs, and the smallest and largest floats, are distinct numbers. */
-static void test_odd_numbers(void **state)
+static void test_unusual_floats_are_distinct(void **state)
 {
 	(void)state;
 	float x[] = {0.0f, -0.0f, 0x1p-149f, -0x1p-149f, 0x1.fffffep127f, -0x1.fffffep127f, 1, 1, -0.0f};
-	check(&(struct image){3, 1, 3, x}, 1);
+	check_copy(&(struct image){3, 1, 3, x}, 1);
 }
 
-static uint32_t inverse(uint32_t odd)
+static uint32_t modular_inverse(uint32_t odd)
 {
 	uint32_t x = odd;
 	for (int i = 0; i < 5; i++) /* Newton's iteration modulo 2^32 doubles the number of correct bits */
@@ -78,7 +78,7 @@ static uint32_t inverse(uint32_t odd)
 /* Fills x with finite floats that all hash to the same slot. */
 static void fill_with_collisions(float *x, uint32_t count)
 {
-	uint32_t unmix = inverse(0x9e3779b1u), found = 0;
+	uint32_t unmix = modular_inverse(0x9e3779b1u), found = 0;
 	for (uint32_t low = 0; found < count; low++) {
 		uint32_t bits = low * unmix;
 		assert_true(low < 1u << 15);
@@ -88,7 +88,7 @@ static void fill_with_collisions(float *x, uint32_t count)
 }
 
 /* A file of colliding numbers does not take quadratic time: it is stored without indices. */
-static void test_collisions(void **state)
+static void test_colliding_numbers_take_linear_time(void **state)
 {
 	(void)state;
 	enum { NUMBERS = 30000, SIDE = 256 };
@@ -97,13 +97,13 @@ static void test_collisions(void **state)
 	fill_with_collisions(from.pixels, NUMBERS);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[k % NUMBERS];
-	check(&from, 0);
+	check_copy(&from, 0);
 	free(from.pixels);
 }
 
 /* Nor is the whole table searched for each pixel of a file with a few colliding numbers, followed by the one that is
  * found last only. A few pixels with that number do not matter. */
-static void test_far_number(void **state)
+static void test_distant_slots_are_not_searched_for_each_pixel(void **state)
 {
 	(void)state;
 	enum { NUMBERS = 200, SIDE = 256, FEW = 256 };
@@ -112,15 +112,15 @@ static void test_far_number(void **state)
 	fill_with_collisions(from.pixels, NUMBERS);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[k < (size_t)SIDE * SIDE - FEW ? 0 : NUMBERS - 1];
-	check(&from, 1);
+	check_copy(&from, 1);
 	for (size_t k = NUMBERS; k < (size_t)SIDE * SIDE; k++)
 		from.pixels[k] = from.pixels[NUMBERS - 1];
-	check(&from, 0);
+	check_copy(&from, 0);
 	free(from.pixels);
 }
 
 /* The limit applies to all images of a scene together: the arena contains those read before. */
-static void test_scene_limit(void **state)
+static void test_limit_covers_all_images_of_a_scene(void **state)
 {
 	(void)state;
 	float x[] = {1, 2, 3, 4};
@@ -137,9 +137,11 @@ static void test_scene_limit(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_every_count), cmocka_unit_test(test_odd_numbers),
-		cmocka_unit_test(test_collisions),  cmocka_unit_test(test_far_number),
-		cmocka_unit_test(test_scene_limit),
+		cmocka_unit_test(test_index_size_follows_the_count_of_numbers),
+		cmocka_unit_test(test_unusual_floats_are_distinct),
+		cmocka_unit_test(test_colliding_numbers_take_linear_time),
+		cmocka_unit_test(test_distant_slots_are_not_searched_for_each_pixel),
+		cmocka_unit_test(test_limit_covers_all_images_of_a_scene),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,25 +11,26 @@
 
 #include <cmocka.h>
 
-static const struct raster_options reflectance = {0, 1, false, IMAGE_ALL}, light = {0, 1e30, false, IMAGE_ALL},
-				   height = {-1e30, 1e30, true, IMAGE_ALL};
+static const struct raster_options reflectance_range = {0, 1, false, IMAGE_ALL},
+				   light_range = {0, 1e30, false, IMAGE_ALL},
+				   height_range = {-1e30, 1e30, true, IMAGE_ALL};
 
 struct counted {
-	struct asset_source inner;
-	int opened;
+	struct asset_source inner_source;
+	int open_count;
 };
 
 static int open_counted(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct counted *c = user;
-	c->opened++;
-	return c->inner.open(c->inner.user, name, out, e);
+	c->open_count++;
+	return c->inner_source.open(c->inner_source.user, name, out, e);
 }
 
 static void close_counted(void *user, struct asset *a)
 {
 	struct counted *c = user;
-	c->inner.close(c->inner.user, a);
+	c->inner_source.close(c->inner_source.user, a);
 }
 
 /* The maximum is the same, whether another texture has computed it before or not. */
@@ -41,8 +42,8 @@ static void check_maximum(const struct raster *r)
 	assert_true(raster_max(r) == m && raster_max(r) == m);
 }
 
-static struct indexed_image image_of(const struct asset_source *s, const char *text, const struct raster_options *range,
-				     struct arena *a)
+static struct indexed_image read_image(const struct asset_source *s, const char *text,
+				       const struct raster_options *range, struct arena *a)
 {
 	struct raster r = {.is_nearest = false};
 	struct error e;
@@ -54,7 +55,7 @@ static struct indexed_image image_of(const struct asset_source *s, const char *t
 	return r.image;
 }
 
-static void test_shared(void **state)
+static void test_equal_images_are_shared(void **state)
 {
 	(void)state;
 	struct pictures p = {.count = 0};
@@ -63,28 +64,28 @@ static void test_shared(void **state)
 	/* p0 lies within [0, 1], p1 does not. */
 	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 0.75, 0.75, 0.5, 0.5});
 	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 4, 0.75, 0.5, 0.5});
-	struct counted c = {.inner = pictures_source(&p)};
+	struct counted c = {.inner_source = pictures_source(&p)};
 	const struct asset_source s = {
 		.user = &c, .open = open_counted, .close = close_counted, .picture_cache = &cache};
-	const uint8_t *first = image_of(&s, "filename=p0", &reflectance, &a).index8;
-	assert_ptr_equal(image_of(&s, "filename=p0 wrap_mode=clamp", &reflectance, &a).index8, first);
-	assert_ptr_equal(image_of(&s, "filename=p0", &light, &a).index8, first);
-	assert_int_equal(c.opened, 1);
-	assert_ptr_not_equal(image_of(&s, "filename=p0 channel=r", &reflectance, &a).index8, first);
-	assert_ptr_not_equal(image_of(&s, "filename=p0 threshold=0.5", &reflectance, &a).index8, first);
-	assert_ptr_not_equal(image_of(&s, "filename=p0", &height, &a).index8, first); /* not decoded as sRGB */
-	assert_ptr_not_equal(image_of(&s, "filename=p0 gamma=1", &reflectance, &a).index8,
-			     image_of(&s, "filename=p0 gamma=2", &reflectance, &a).index8);
-	assert_int_equal(c.opened, 5); /* gamma=1 reads the same numbers as a height */
-	const struct indexed_image bright = image_of(&s, "filename=p1", &light, &a),
-				   cut = image_of(&s, "filename=p1", &reflectance, &a);
+	const uint8_t *first = read_image(&s, "filename=p0", &reflectance_range, &a).index8;
+	assert_ptr_equal(read_image(&s, "filename=p0 wrap_mode=clamp", &reflectance_range, &a).index8, first);
+	assert_ptr_equal(read_image(&s, "filename=p0", &light_range, &a).index8, first);
+	assert_int_equal(c.open_count, 1);
+	assert_ptr_not_equal(read_image(&s, "filename=p0 channel=r", &reflectance_range, &a).index8, first);
+	assert_ptr_not_equal(read_image(&s, "filename=p0 threshold=0.5", &reflectance_range, &a).index8, first);
+	assert_ptr_not_equal(read_image(&s, "filename=p0", &height_range, &a).index8, first); /* not decoded as sRGB */
+	assert_ptr_not_equal(read_image(&s, "filename=p0 gamma=1", &reflectance_range, &a).index8,
+			     read_image(&s, "filename=p0 gamma=2", &reflectance_range, &a).index8);
+	assert_int_equal(c.open_count, 5); /* gamma=1 reads the same numbers as a height */
+	const struct indexed_image bright = read_image(&s, "filename=p1", &light_range, &a),
+				   cut = read_image(&s, "filename=p1", &reflectance_range, &a);
 	assert_true(indexed_image_value(&bright, 2) == 4 && indexed_image_value(&cut, 2) == 1);
-	assert_ptr_equal(image_of(&s, "filename=p1", &reflectance, &a).index8, cut.index8);
-	assert_ptr_equal(image_of(&s, "filename=p1", &light, &a).index8, bright.index8);
-	assert_int_equal(c.opened, 7);
+	assert_ptr_equal(read_image(&s, "filename=p1", &reflectance_range, &a).index8, cut.index8);
+	assert_ptr_equal(read_image(&s, "filename=p1", &light_range, &a).index8, bright.index8);
+	assert_int_equal(c.open_count, 7);
 	/* Memory with another lifetime is not shared. */
-	assert_ptr_not_equal(image_of(&s, "filename=p0", &reflectance, &other).index8, first);
-	assert_ptr_equal(image_of(&s, "filename=p0", &reflectance, &a).index8, first);
+	assert_ptr_not_equal(read_image(&s, "filename=p0", &reflectance_range, &other).index8, first);
+	assert_ptr_equal(read_image(&s, "filename=p0", &reflectance_range, &a).index8, first);
 	arena_fini(&other);
 	arena_fini(&a);
 	pictures_fini(&p);
@@ -92,6 +93,6 @@ static void test_shared(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_shared)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_equal_images_are_shared)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

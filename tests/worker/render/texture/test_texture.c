@@ -54,7 +54,8 @@ static int teardown(void **state)
 	return 0;
 }
 
-static int try_texture(struct fixture *f, const char *text, enum color_role role, struct texture *t, struct error *e)
+static int try_texture_text(struct fixture *f, const char *text, enum color_role role, struct texture *t,
+			    struct error *e)
 {
 	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
 	node_add_ref(&f->arena, owner, "reflectance", node_make(&f->arena, PLUGIN_TEXTURE, text));
@@ -65,12 +66,12 @@ static struct texture make_texture(struct fixture *f, const char *text, enum col
 {
 	struct texture t;
 	struct error e;
-	if (try_texture(f, text, role, &t, &e))
+	if (try_texture_text(f, text, role, &t, &e))
 		fail_msg("%s: %s", text, e.text);
 	return t;
 }
 
-static spectrum look_up(const struct texture *t, double u, double v, const struct wavelengths *w)
+static spectrum evaluate_texture(const struct texture *t, double u, double v, const struct wavelengths *w)
 {
 	const struct texture_point at = {.u = u, .v = v};
 	return texture_eval(t, &at, w);
@@ -78,12 +79,12 @@ static spectrum look_up(const struct texture *t, double u, double v, const struc
 
 static void assert_value(const struct texture *t, double u, double v, double expected)
 {
-	double x = look_up(t, u, v, &grey).v[0];
+	double x = evaluate_texture(t, u, v, &grey).v[0];
 	if (fabs(x - expected) > 1e-12)
 		fail_msg("(%g, %g): %.15g is not %g", u, v, x, expected);
 }
 
-static void test_orientation_and_pixel_centres(void **state)
+static void test_pixels_have_their_orientation_and_centres(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0", COLOR_REFLECTANCE);
 	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
@@ -100,10 +101,10 @@ static void test_orientation_and_pixel_centres(void **state)
 	assert_value(&t, 0, 0.25, 0.25);
 	assert_value(&t, 0.5 / 3, 0, 0.375);
 	assert_value(&t, 7 + 1.5 / 3, -4.75, 0.25);
-	assert_value(&t, 1e300, 0.25, look_up(&t, 0, 0.25, &grey).v[0]);
+	assert_value(&t, 1e300, 0.25, evaluate_texture(&t, 0, 0.25, &grey).v[0]);
 }
 
-static void test_wrapping(void **state)
+static void test_coordinates_wrap(void **state)
 {
 	struct texture clamp = make_texture(*state, "bitmap filename=p0 wrap_mode=clamp", COLOR_REFLECTANCE);
 	assert_value(&clamp, -3, 0.25, 0);
@@ -120,7 +121,7 @@ static void test_wrapping(void **state)
 
 /* Outside the image everything is black, or white; between the centres of the outermost pixels and of the border it is
  * interpolated. */
-static void test_borders(void **state)
+static void test_borders_are_black_or_white(void **state)
 {
 	struct texture black = make_texture(*state, "bitmap filename=p0 wrap_mode=black", COLOR_REFLECTANCE),
 		       white = make_texture(*state, "bitmap filename=p0 wrap_mode=one", COLOR_REFLECTANCE),
@@ -150,7 +151,7 @@ static void test_borders(void **state)
 	assert_true(texture_max(&lamp) == 1);
 }
 
-static void test_nearest(void **state)
+static void test_nearest_does_not_interpolate(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0 filter_type=nearest", COLOR_REFLECTANCE);
 	assert_value(&t, 0.01, 0.01, 0);
@@ -159,7 +160,7 @@ static void test_nearest(void **state)
 	assert_value(&t, -0x1p-60, 0.25, 0.5);
 }
 
-static void test_uv_maps(void **state)
+static void test_to_uv_transforms_coordinates(void **state)
 {
 	struct fixture *f = *state;
 	struct texture t = make_texture(f, "bitmap filename=p0 uvscale=2 voffset=0.5", COLOR_REFLECTANCE);
@@ -176,12 +177,12 @@ static void test_uv_maps(void **state)
 	assert_value(&t, 0, 1.5 / 3, 0.25);
 }
 
-static void test_colours(void **state)
+static void test_colours_of_images_are_kept(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
 	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 	const double red[3] = {0.5, 0.125, 0.0625};
-	spectrum s = look_up(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
+	spectrum s = evaluate_texture(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(s.v[i] == expected.v[i]);
 		assert_true(s.v[i] <= texture_max(&t));
@@ -192,13 +193,13 @@ static void test_colours(void **state)
 	assert_value(&t, 0.5, 0.5, 1);
 	t = make_texture(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
 	assert_int_equal(texture_color_kind(&t), COLOR_KIND_D65);
-	s = look_up(&t, 0.5, 0.5, &colour);
+	s = evaluate_texture(&t, 0.5, 0.5, &colour);
 	assert_true(fabs(s.v[1] - 4 * color_d65(550)) < 1e-12);
 	assert_value(&t, 0.5, 0.5, 4);
 	assert_true(texture_max(&t) >= spectrum_max(s));
 }
 
-static void test_checkerboard(void **state)
+static void test_checkerboard_alternates_colours(void **state)
 {
 	struct texture t = make_texture(*state, "checkerboard", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25, 0.25, 0.4);
@@ -214,7 +215,7 @@ static void test_checkerboard(void **state)
 	assert_int_equal(texture_color_kind(&t), COLOR_KIND_OTHER);
 }
 
-static void test_gridtexture(void **state)
+static void test_gridtexture_has_lines(void **state)
 {
 	struct texture t = make_texture(*state, "gridtexture", COLOR_REFLECTANCE);
 	assert_value(&t, 0.5, 0.5, 0.2);
@@ -231,7 +232,7 @@ static void test_gridtexture(void **state)
 	assert_value(&t, 0.375, 0.35, 1);
 }
 
-static void test_plain_values_and_fallback(void **state)
+static void test_missing_values_use_the_fallback(void **state)
 {
 	struct fixture *f = *state;
 	struct scene_node *n = node_make(&f->arena, PLUGIN_BSDF, "owner reflectance=0.25");
@@ -259,31 +260,39 @@ static void test_refusals_say_why(void **state)
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		struct texture t;
 		struct error e = {{0}};
-		if (try_texture(*state, bad[i].text, COLOR_REFLECTANCE, &t, &e) >= 0 || !strstr(e.text, bad[i].word))
+		if (try_texture_text(*state, bad[i].text, COLOR_REFLECTANCE, &t, &e) >= 0 ||
+		    !strstr(e.text, bad[i].word))
 			fail_msg("%s: \"%s\" does not say \"%s\"", bad[i].text, e.text, bad[i].word);
 	}
 }
 
 /* Where any number is allowed, such as for the indices of metals, the values of an image are those of a reflectance. */
-static void test_unbounded(void **state)
+static void test_unbounded_images_have_the_values_of_reflectances(void **state)
 {
 	struct texture bounded = make_texture(*state, "bitmap filename=p0", COLOR_REFLECTANCE),
 		       unbounded = make_texture(*state, "bitmap filename=p0", COLOR_UNBOUNDED);
 	for (int i = 0; i < 16; i++) {
 		double u = (i % 4 + 0.5) / 4, v = (i / 4 + 0.5) / 4;
-		spectrum a = look_up(&bounded, u, v, &colour), b = look_up(&unbounded, u, v, &colour);
+		spectrum a = evaluate_texture(&bounded, u, v, &colour), b = evaluate_texture(&unbounded, u, v, &colour);
 		assert_memory_equal(&a, &b, sizeof a);
 	}
 }
 
 /* Compares derivatives with differences, which are exact up to rounding where the texture is a polynomial, that is
  * between pixel centres. */
-static void assert_jet(const struct texture *t, double u, double v, double h)
+static void assert_derivatives(const struct texture *t, double u, double v, double h)
 {
-	struct texture_jet j, n[4];
-	texture_jet(t, u, v, &j);
+	struct texture_derivatives j, n[4];
+	texture_eval_derivatives(t, u, v, &j);
 	for (int k = 0; k < 4; k++)
-		texture_jet(t, u + (k == 0 ? h : k == 1 ? -h : 0), v + (k == 2 ? h : k == 3 ? -h : 0), &n[k]);
+		texture_eval_derivatives(t,
+					 u + (k == 0   ? h
+					      : k == 1 ? -h
+						       : 0),
+					 v + (k == 2   ? h
+					      : k == 3 ? -h
+						       : 0),
+					 &n[k]);
 	for (int c = 0; c < 3; c++) {
 		const double given[5] = {j.du[c], j.dv[c], j.duu[c], j.duv[c], j.dvv[c]};
 		const double found[5] = {(n[0].x[c] - n[1].x[c]) / (2 * h), (n[2].x[c] - n[3].x[c]) / (2 * h),
@@ -295,7 +304,7 @@ static void assert_jet(const struct texture *t, double u, double v, double h)
 	}
 }
 
-static void test_derivatives(void **state)
+static void test_derivatives_match_differences(void **state)
 {
 	struct fixture *f = *state;
 	const char *const texts[] = {"bitmap filename=p0 raw=true",
@@ -309,18 +318,18 @@ static void test_derivatives(void **state)
 		struct texture t = make_texture(f, texts[k], COLOR_RELIEF);
 		/* Not near lines through pixel centres or between squares. */
 		for (int i = 0; i < 60; i++)
-			assert_jet(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
+			assert_derivatives(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
 	}
 	struct texture t = make_texture(f, "bitmap filename=p0 raw=true wrap_mode=mirror", COLOR_RELIEF);
-	struct texture_jet j;
-	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	struct texture_derivatives j;
+	texture_eval_derivatives(&t, 1.0 / 3, 0.25, &j);
 	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] - 0.75) < 1e-12 && fabs(j.dv[0] - 1.5) < 1e-12);
-	texture_jet(&t, 2 - 1.0 / 3, 0.25, &j);
+	texture_eval_derivatives(&t, 2 - 1.0 / 3, 0.25, &j);
 	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] + 0.75) < 1e-12);
 }
 
 /* A reflectance made darker, or brighter up to white, and heights of either sign. */
-static void test_scale(void **state)
+static void test_scale_multiplies_values(void **state)
 {
 	struct fixture *f = *state;
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=2");
@@ -341,14 +350,14 @@ static void test_scale(void **state)
 	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->build, &e) < 0 && strstr(e.text, "negative colours"));
 	assert_int_equal(texture_create(&t, n, COLOR_HEIGHT, &f->build, &e), 0);
 	assert_true(fabs(texture_height(&t, 1.5 / 3, 0.25) + 0.5) < 1e-12);
-	struct texture_jet j;
+	struct texture_derivatives j;
 	assert_int_equal(texture_create(&t, n, COLOR_RELIEF, &f->build, &e), 0);
-	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	texture_eval_derivatives(&t, 1.0 / 3, 0.25, &j);
 	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
 }
 
 /* The height of a colour is its luminance, as for coloured images. */
-static void test_coloured_height(void **state)
+static void test_height_of_a_colour_is_its_luminance(void **state)
 {
 	struct fixture *f = *state;
 	struct texture t = make_texture(f, "checkerboard color0=rgb(1,0.5,0.25) color1=-3", COLOR_HEIGHT);
@@ -358,7 +367,7 @@ static void test_coloured_height(void **state)
 
 /* For a coloured image that stands for a number, Mitsuba 3 takes the luminance and 0.6 the mean, at all wavelengths;
  * Mitsuba 3's checkerboards of numbers begin with color1. */
-static void test_numbers(void **state)
+static void test_coloured_images_as_numbers_follow_the_dialect(void **state)
 {
 	struct fixture *f = *state;
 	static const struct {
@@ -382,9 +391,9 @@ static void test_numbers(void **state)
 	struct texture red = make_texture(f, "bitmap filename=p1 filter_type=nearest", COLOR_REFLECTANCE);
 	f->build.is_number = true;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		f->build.dialect_3 = cases[i].dialect_3;
+		f->build.is_dialect_3 = cases[i].dialect_3;
 		struct texture t = make_texture(f, cases[i].text, COLOR_REFLECTANCE);
-		spectrum x = look_up(&t, cases[i].u, 0.25, &colour);
+		spectrum x = evaluate_texture(&t, cases[i].u, 0.25, &colour);
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			if (fabs(x.v[k] - cases[i].expected) > 1e-7) /* rounding of floats */
 				fail_msg("row %zu: %.9g is not %.9g", i, x.v[k], cases[i].expected);
@@ -392,7 +401,7 @@ static void test_numbers(void **state)
 	f->build = build;
 	f->source.picture_cache = NULL;
 	/* The colour is not affected by the other use of the same file. */
-	spectrum x = look_up(&red, 0.25, 0.25, &colour);
+	spectrum x = evaluate_texture(&red, 0.25, 0.25, &colour);
 	assert_true(x.v[2] > 2 * x.v[1]);
 }
 
@@ -408,7 +417,7 @@ static struct texture tinted_texture(struct fixture *f, const char *scale, const
 }
 
 /* A colour times a colour is their product at each wavelength; the part of a colour above 1 becomes a factor. */
-static void test_tint(void **state)
+static void test_colour_times_colour_is_their_product(void **state)
 {
 	struct fixture *f = *state;
 	const double red[3] = {0.5, 0.125, 0.0625}, tint[3] = {0.25, 1, 0.5};
@@ -418,7 +427,7 @@ static void test_tint(void **state)
 		 light = color_eval_rgb_illuminant(red, &colour);
 	struct texture t = tinted_texture(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p1", COLOR_REFLECTANCE),
 		       lamp = tinted_texture(f, "scale scale=rgb(1,4,2)", "bitmap filename=p1", COLOR_ILLUMINANT);
-	spectrum x = look_up(&t, 0.25, 0.5, &colour), y = look_up(&lamp, 0.25, 0.5, &colour);
+	spectrum x = evaluate_texture(&t, 0.25, 0.5, &colour), y = evaluate_texture(&lamp, 0.25, 0.5, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(fabs(x.v[i] - a.v[i] * b.v[i]) < 1e-12);
 		assert_true(fabs(y.v[i] - 4 * light.v[i] * b.v[i]) < 1e-12 * y.v[i]);
@@ -437,7 +446,7 @@ static void test_tint(void **state)
 }
 
 /* A texture times a texture is their product at each point. */
-static void test_product(void **state)
+static void test_texture_times_texture_is_their_product(void **state)
 {
 	struct fixture *f = *state;
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale");
@@ -451,8 +460,8 @@ static void test_product(void **state)
 		       p1 = make_texture(f, "bitmap filename=p1", COLOR_REFLECTANCE);
 	for (int k = 0; k < 20; k++) {
 		double u = k % 5 / 5.0, v = k / 5 / 4.0;
-		spectrum x = look_up(&t, u, v, &colour), a = look_up(&p0, u, v, &colour),
-			 b = look_up(&p1, u, v, &colour);
+		spectrum x = evaluate_texture(&t, u, v, &colour), a = evaluate_texture(&p0, u, v, &colour),
+			 b = evaluate_texture(&p1, u, v, &colour);
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			assert_true(x.v[i] == a.v[i] * b.v[i] && x.v[i] <= texture_max(&t));
 	}
@@ -460,7 +469,7 @@ static void test_product(void **state)
 		    strstr(e.text, "a number here, not a texture"));
 }
 
-static void test_channel_and_threshold(void **state)
+static void test_channel_and_threshold_are_applied(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
 	assert_int_equal(texture_color_kind(&t), COLOR_KIND_CONSTANT);
@@ -474,7 +483,7 @@ static void test_channel_and_threshold(void **state)
 }
 
 /* The stored numbers are raised to the power gamma before the threshold; images with another gamma are not shared. */
-static void test_gamma(void **state)
+static void test_gamma_is_applied_before_the_threshold(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0 gamma=2.2", COLOR_REFLECTANCE);
 	assert_value(&t, 1.5 / 3, 0.25, (double)(float)pow(0.25, 2.2));
@@ -489,25 +498,25 @@ static void test_gamma(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_orientation_and_pixel_centres),
-		cmocka_unit_test(test_wrapping),
-		cmocka_unit_test(test_borders),
-		cmocka_unit_test(test_nearest),
-		cmocka_unit_test(test_uv_maps),
-		cmocka_unit_test(test_derivatives),
-		cmocka_unit_test(test_scale),
-		cmocka_unit_test(test_coloured_height),
-		cmocka_unit_test(test_numbers),
-		cmocka_unit_test(test_tint),
-		cmocka_unit_test(test_product),
-		cmocka_unit_test(test_channel_and_threshold),
-		cmocka_unit_test(test_gamma),
-		cmocka_unit_test(test_colours),
-		cmocka_unit_test(test_checkerboard),
-		cmocka_unit_test(test_gridtexture),
-		cmocka_unit_test(test_plain_values_and_fallback),
+		cmocka_unit_test(test_pixels_have_their_orientation_and_centres),
+		cmocka_unit_test(test_coordinates_wrap),
+		cmocka_unit_test(test_borders_are_black_or_white),
+		cmocka_unit_test(test_nearest_does_not_interpolate),
+		cmocka_unit_test(test_to_uv_transforms_coordinates),
+		cmocka_unit_test(test_derivatives_match_differences),
+		cmocka_unit_test(test_scale_multiplies_values),
+		cmocka_unit_test(test_height_of_a_colour_is_its_luminance),
+		cmocka_unit_test(test_coloured_images_as_numbers_follow_the_dialect),
+		cmocka_unit_test(test_colour_times_colour_is_their_product),
+		cmocka_unit_test(test_texture_times_texture_is_their_product),
+		cmocka_unit_test(test_channel_and_threshold_are_applied),
+		cmocka_unit_test(test_gamma_is_applied_before_the_threshold),
+		cmocka_unit_test(test_colours_of_images_are_kept),
+		cmocka_unit_test(test_checkerboard_alternates_colours),
+		cmocka_unit_test(test_gridtexture_has_lines),
+		cmocka_unit_test(test_missing_values_use_the_fallback),
 		cmocka_unit_test(test_refusals_say_why),
-		cmocka_unit_test(test_unbounded),
+		cmocka_unit_test(test_unbounded_images_have_the_values_of_reflectances),
 	};
 	return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -19,13 +19,13 @@
 
 enum { SIDE_MAX = 20, VALUES_MAX = 3 * SIDE_MAX * SIDE_MAX * SIDE_MAX, BRICKS_MAX = 27 };
 
-struct trial {
+struct grid_trial {
 	struct grid g;
 	float value[VALUES_MAX];
-	unsigned char full[BRICKS_MAX];
+	unsigned char brick_is_full[BRICKS_MAX];
 };
 
-static mat4 some_place(struct dice *d)
+static mat4 random_transform(struct dice *d)
 {
 	vec3 scale = {dice_between(d, 0.3, 3), dice_between(d, 0.3, 3), -dice_between(d, 0.3, 3)};
 	vec3 shift = {dice_between(d, -2, 2), dice_between(d, -2, 2), dice_between(d, -2, 2)};
@@ -33,12 +33,12 @@ static mat4 some_place(struct dice *d)
 	return mat4_mul(mat4_translate(shift), turned);
 }
 
-/* sparse: all values but those of one or two points are 0. */
-static void fill(struct trial *t, struct dice *d, bool sparse)
+/* is_sparse: all values but those of one or two points are 0. */
+static void fill_values(struct grid_trial *t, struct dice *d, bool is_sparse)
 {
 	size_t count = (size_t)(t->g.channels * t->g.size[0] * t->g.size[1] * t->g.size[2]);
 	for (size_t i = 0; i < count; i++)
-		t->value[i] = !sparse && dice_below(d, 4) ? (float)dice_uniform(d) : 0;
+		t->value[i] = !is_sparse && dice_below(d, 4) ? (float)dice_uniform(d) : 0;
 	/* Also at the borders, which matter on the opposite side if the grid repeats. */
 	for (int n = 0; n < 2; n++) {
 		size_t at = 0;
@@ -69,14 +69,14 @@ static void set_box(struct grid *g)
 }
 
 /* Like those of volume.c: the box ends half a cell beyond the points, or at the points if values outside are 0. */
-static void make_trial(struct trial *t, struct dice *d, bool upright)
+static void make_trial(struct grid_trial *t, struct dice *d, bool upright)
 {
 	struct grid *g = &t->g;
 	*g = (struct grid){.channels = dice_below(d, 2) ? 3 : 1,
 			   .is_nearest = dice_below(d, 4) == 0,
 			   .wrap = (enum grid_wrap)dice_below(d, 4),
 			   .value = t->value,
-			   .to_cells = upright ? mat4_identity() : some_place(d)};
+			   .to_cells = upright ? mat4_identity() : random_transform(d)};
 	int most = dice_below(d, 4) ? 6 : SIDE_MAX;
 	for (int i = 0; i < 3; i++) {
 		bool at_points = g->wrap == GRID_ZERO && !g->is_nearest;
@@ -87,19 +87,19 @@ static void make_trial(struct trial *t, struct dice *d, bool upright)
 	g->is_world_aligned = g->wrap == GRID_CLAMP && !upright && dice_below(d, 4);
 	if (g->is_world_aligned)
 		set_box(g);
-	fill(t, d, dice_below(d, 2));
-	memset(t->full, 0, sizeof t->full);
+	fill_values(t, d, dice_below(d, 2));
+	memset(t->brick_is_full, 0, sizeof t->brick_is_full);
 	assert_true(grid_brick_count(g) <= BRICKS_MAX);
-	grid_find_occupied_bricks(g, t->full);
-	g->occupied_bricks = t->full;
+	grid_find_occupied_bricks(g, t->brick_is_full);
+	g->occupied_bricks = t->brick_is_full;
 }
 
 /* ---- tests ---- */
 
-static void test_values(void **state)
+static void test_values_are_interpolated(void **state)
 {
 	(void)state;
-	static struct trial t;
+	static struct grid_trial t;
 	struct dice d = dice_for_test("values of grids");
 	unsigned inside = 0;
 	for (int round = 0; round < 4000; round++) {
@@ -128,16 +128,16 @@ static void test_values(void **state)
 	assert_true(inside > 200);
 }
 
-/* A ray from anywhere to a point in the box; whole: with multiples of 1/2, so that rays meet edges and corners and run
- * within faces. */
-static struct grid_ray some_ray(const struct grid *g, struct dice *d, bool whole)
+/* A ray from anywhere to a point in the box; has_whole_steps: with multiples of 1/2, so that rays meet edges and
+ * corners and run within faces. */
+static struct grid_ray random_ray(const struct grid *g, struct dice *d, bool has_whole_steps)
 {
 	double from[3], to[3];
 	for (int i = 0; i < 3; i++) {
 		from[i] = dice_between(d, -3, SIDE_MAX + 3);
 		to[i] = dice_between(d, g->is_world_aligned ? -1 : g->cell_min[i],
 				     g->is_world_aligned ? g->size[i] : g->cell_max[i]);
-		if (whole) {
+		if (has_whole_steps) {
 			to[i] = floor(2 * to[i]) / 2;
 			from[i] = to[i] + (int)dice_below(d, 3) - 1;
 		}
@@ -156,7 +156,7 @@ static struct grid_ray some_ray(const struct grid *g, struct dice *d, bool whole
 }
 
 /* A ray that runs within a face where the value jumps may see either side. */
-static bool runs_along_a_jump(const struct grid *g, const struct grid_ray *r)
+static bool runs_along_discontinuity(const struct grid *g, const struct grid_ray *r)
 {
 	double a[3], b[3];
 	slow_grid_position(g, r, 0, a);
@@ -191,19 +191,19 @@ static void check_reach(const struct grid *g, const struct grid_ray *r, const do
 		fail_msg("%.17g reached, not %.17g", found, least);
 }
 
-static void test_rays(void **state)
+static void test_integrals_along_rays_are_exact(void **state)
 {
 	(void)state;
-	static struct trial t;
+	static struct grid_trial t;
 	struct dice d = dice_for_test("rays through grids");
 	unsigned met = 0;
 	for (int round = 0; round < 3000; round++) {
 		bool whole = round % 2 == 0;
 		make_trial(&t, &d, whole);
 		for (int i = 0; i < 4; i++) {
-			struct grid_ray r = some_ray(&t.g, &d, whole);
+			struct grid_ray r = random_ray(&t.g, &d, whole);
 			double sum[3];
-			if (runs_along_a_jump(&t.g, &r))
+			if (runs_along_discontinuity(&t.g, &r))
 				continue;
 			grid_integrate(&t.g, &r, sum);
 			for (int k = 0; k < 3; k++) {
@@ -221,10 +221,10 @@ static void test_rays(void **state)
 
 /* Rays from far away, with almost no slope, and with none: results are those of an equivalent ray, never NaN, and never
  * take endless time. */
-static void test_hard_rays(void **state)
+static void test_extreme_rays_give_finite_results(void **state)
 {
 	(void)state;
-	static struct trial t;
+	static struct grid_trial t;
 	struct dice d = dice_for_test("hard rays through grids");
 	const double slopes[] = {0, -0.0, 1e-320, -1e-320, 1e-200, -1e-200, 1e-30, -1e-17};
 	for (int round = 0; round < 2000; round++) {
@@ -263,9 +263,9 @@ static void test_hard_rays(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_values),
-		cmocka_unit_test(test_rays),
-		cmocka_unit_test(test_hard_rays),
+		cmocka_unit_test(test_values_are_interpolated),
+		cmocka_unit_test(test_integrals_along_rays_are_exact),
+		cmocka_unit_test(test_extreme_rays_give_finite_results),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

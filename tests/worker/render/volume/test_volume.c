@@ -20,7 +20,7 @@
 
 #include <cmocka.h>
 
-static struct vol grid, second;
+static struct vol grid, second_grid;
 static const vec3 along_z = {0, 0, 1};
 
 static double linear_field(double x, double y, double z, uint32_t channel)
@@ -28,8 +28,8 @@ static double linear_field(double x, double y, double z, uint32_t channel)
 	return 0.3 + 0.1 * x + 0.2 * y * z + 0.05 * channel * x;
 }
 
-/* A sphere of a medium, in a scene of the given version; g.vol is `grid` and h.vol `second`. */
-static const struct memory_file *scene_of(const char *version, const char *type, const char *inner)
+/* A sphere of a medium, in a scene of the given version; g.vol is `grid` and h.vol `second_grid`. */
+static const struct memory_file *make_scene_files(const char *version, const char *type, const char *inner)
 {
 	static char xml[2048];
 	static struct memory_file files[4];
@@ -40,13 +40,13 @@ static const struct memory_file *scene_of(const char *version, const char *type,
 		 version, type, inner);
 	files[0] = (struct memory_file){"s.xml", xml, strlen(xml)};
 	files[1] = (struct memory_file){"g.vol", grid.bytes, grid.size};
-	files[2] = (struct memory_file){"h.vol", second.bytes, second.size};
+	files[2] = (struct memory_file){"h.vol", second_grid.bytes, second_grid.size};
 	return files;
 }
 
 static struct world *world_with(const char *version, const char *inner)
 {
-	return world_from_files(8, 8, scene_of(version, "heterogeneous", inner));
+	return world_from_files(8, 8, make_scene_files(version, "heterogeneous", inner));
 }
 
 #define GRID(name, params) \
@@ -55,7 +55,7 @@ static struct world *world_with(const char *version, const char *inner)
 
 /* ---- places ---- */
 
-static double mix3(const double f[3], const int i[3])
+static double interpolate_corners(const double f[3], const int i[3])
 {
 	double sum = 0;
 	for (int k = 0; k < 8; k++) {
@@ -73,7 +73,7 @@ static double mix3(const double f[3], const int i[3])
 
 /* u: from 0 to 1 in the box. Mitsuba 3 has values at the centres of cells, 0.6 has the outermost ones on the faces of
  * the box. */
-static double wanted_at(const double u[3], bool dialect_3, bool nearest)
+static double expected_value(const double u[3], bool dialect_3, bool nearest)
 {
 	double f[3];
 	int i[3];
@@ -84,16 +84,16 @@ static double wanted_at(const double u[3], bool dialect_3, bool nearest)
 		i[a] = (int)floor(x);
 		f[a] = x - i[a];
 	}
-	return mix3(f, i);
+	return interpolate_corners(f, i);
 }
 
-struct place {
+struct grid_placement {
 	const char *version, *params;
 	double low[3], high[3]; /* the box in the scene */
 	bool nearest;
 };
 
-static void check_place(const struct place *t)
+static void check_placement(const struct grid_placement *t)
 {
 	char inner[1024];
 	snprintf(inner, sizeof inner,
@@ -113,7 +113,7 @@ static void check_place(const struct place *t)
 		vec3 p = {t->low[0] + u[0] * (t->high[0] - t->low[0]), t->low[1] + u[1] * (t->high[1] - t->low[1]),
 			  t->low[2] + u[2] * (t->high[2] - t->low[2])};
 		p = vec3_scale(w->scale, vec3_sub(p, w->center));
-		double wanted = inside ? 2 * wanted_at(u, *t->version == '3', t->nearest) : 0,
+		double wanted = inside ? 2 * expected_value(u, *t->version == '3', t->nearest) : 0,
 		       found = medium_extinction(&w->media[0], p, along_z, &wl).v[0] * w->scale;
 		if (fabs(found - wanted) > 1e-9)
 			fail_msg("%s %s: %g, not %g", t->version, t->params, found, wanted);
@@ -122,12 +122,12 @@ static void check_place(const struct place *t)
 	world_free(w);
 }
 
-static void test_places(void **state)
+static void test_grids_are_placed_by_dialect(void **state)
 {
 	(void)state;
 #define TWICE "<transform name='to_world'><scale value='2'/><translate x='-1' z='.5'/></transform>"
 #define OLD_TWICE "<transform name='toWorld'><scale value='2'/><translate x='-1' z='.5'/></transform>"
-	static const struct place places[] = {
+	static const struct grid_placement places[] = {
 		{"3.0.0", "", {0, 0, 0}, {1, 1, 1}, false},
 		{"3.0.0", TWICE, {-1, 0, 0.5}, {1, 2, 2.5}, false},
 		{"3.0.0", "<boolean name='use_grid_bbox' value='true'/>", {-1, -2, 0}, {3, 1, 0.5}, false},
@@ -144,11 +144,11 @@ static void test_places(void **state)
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	vol_set_box(&grid, (const float[3]){-1, -2, 0}, (const float[3]){3, 1, 0.5f});
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++)
-		check_place(&places[i]);
+		check_placement(&places[i]);
 }
 
 /* In 3.x the bounding box of the rotated cube has the values at the border outside the cube; in 0.6 they are 0. */
-static void test_turned(void **state)
+static void test_rotated_grids_follow_the_dialect(void **state)
 {
 	(void)state;
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
@@ -174,7 +174,7 @@ static void test_turned(void **state)
 				near[a] = fmin(fmax(u[a], 0), 1);
 			}
 			beside += in_box && !in_cube;
-			double wanted = (old ? in_cube : in_box) ? wanted_at(near, !old, false) : 0;
+			double wanted = (old ? in_cube : in_box) ? expected_value(near, !old, false) : 0;
 			vec3 here = vec3_scale(w->scale, vec3_sub(p, w->center));
 			double found = medium_extinction(&w->media[0], here, along_z, &wl).v[0] * w->scale;
 			if (fabs(found - wanted) > 1e-9)
@@ -190,12 +190,12 @@ static void test_turned(void **state)
 }
 
 /* The values of an albedo outside its grid. */
-static void test_outside(void **state)
+static void test_values_outside_the_grid_follow_the_dialect(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *version, *params;
-		double u, wanted; /* position along x, and value, for a grid of 0.25 and 0.75 */
+		double u, expected; /* position along x, and value, for a grid of 0.25 and 0.75 */
 	} cases[] = {
 		{"3.0.0", "", 3.1, 0.75},
 		{"3.0.0", "", -9, 0.25},
@@ -216,11 +216,11 @@ static void test_outside(void **state)
 		snprintf(inner, sizeof inner, GRID("albedo", "%s") "<float name='%s' value='3'/>", cases[i].params,
 			 *cases[i].version == '0' ? "density" : "sigma_t");
 		const char *type = *cases[i].version == '0' ? "heterogeneous" : "homogeneous";
-		struct world *w = world_from_files(8, 8, scene_of(cases[i].version, type, inner));
+		struct world *w = world_from_files(8, 8, make_scene_files(cases[i].version, type, inner));
 		vec3 p = vec3_scale(w->scale, vec3_sub((vec3){cases[i].u, 0.5, 0.5}, w->center));
 		double found = medium_scattering(&w->media[0], p, along_z, &wl).v[0] * w->scale / 3;
-		if (fabs(found - cases[i].wanted) > 1e-9)
-			fail_msg("case %zu: %g, not %g", i, found, cases[i].wanted);
+		if (fabs(found - cases[i].expected) > 1e-9)
+			fail_msg("case %zu: %g, not %g", i, found, cases[i].expected);
 		assert_true(fabs(medium_extinction(&w->media[0], p, along_z, &wl).v[0] * w->scale - 3) < 1e-9);
 		world_free(w);
 	}
@@ -230,7 +230,7 @@ static void test_outside(void **state)
 
 /* Grey is constant over wavelengths; with colour=rgb the channels are R, G and B; otherwise a primary has most of its
  * own colour and little of the others. */
-static void test_colours(void **state)
+static void test_colour_channels_become_spectra(void **state)
 {
 	(void)state;
 	enum { WAVELENGTHS = 4000 };
@@ -273,7 +273,7 @@ static void test_colours(void **state)
 /* ---- what is stated otherwise ---- */
 
 /* A density without a grid is limited to a cube in 3.x. */
-static void test_cube(void **state)
+static void test_constant_density_is_limited_to_a_cube(void **state)
 {
 	(void)state;
 	static const struct {
@@ -315,7 +315,8 @@ static void check_same(const char *version, const char *a, const char *b)
 	struct world *w[2];
 	const struct wavelengths rgb = {.is_rgb = true};
 	for (int i = 0; i < 2; i++)
-		w[i] = world_from_files(8, 8, scene_of(version, i ? "homogeneous" : "heterogeneous", i ? b : a));
+		w[i] = world_from_files(8, 8,
+					make_scene_files(version, i ? "homogeneous" : "heterogeneous", i ? b : a));
 	for (int i = 0; i < 3; i++) {
 		const struct medium *m[2] = {&w[0]->media[0], &w[1]->media[0]};
 		vec3 p = vec3_scale(w[0]->scale, vec3_sub((vec3){0.1, 0.2, 0.3}, w[0]->center));
@@ -328,7 +329,7 @@ static void check_same(const char *version, const char *a, const char *b)
 	world_free(w[1]);
 }
 
-static void test_constants(void **state)
+static void test_constant_grids_equal_constants(void **state)
 {
 	(void)state;
 	check_same("3.0.0", "", "");
@@ -345,7 +346,7 @@ static void test_constants(void **state)
 }
 
 /* Bytes stand for 0 to 1. */
-static void test_bytes(void **state)
+static void test_bytes_stand_for_zero_to_one(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
@@ -364,12 +365,12 @@ static void test_bytes(void **state)
 }
 
 /* Two volumes of one file at different positions share their values; those of another file do not. */
-static void test_shared(void **state)
+static void test_volumes_of_one_file_share_values(void **state)
 {
 	(void)state;
 	static const char other[] =
 		"<volume type='gridvolume' name='albedo'><string name='filename' value='h.vol'/></volume>";
-	vol_make(&second, (const uint32_t[3]){2, 2, 2}, 1, linear_field);
+	vol_make(&second_grid, (const uint32_t[3]){2, 2, 2}, 1, linear_field);
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
 	struct world *w = world_with("3.0.0", GRID("sigma_t", "") GRID("albedo", TWICE));
 	assert_ptr_equal(w->media[0].first.grid->value, w->media[0].second.grid->value);
@@ -386,16 +387,16 @@ static void test_shared(void **state)
 
 /* ---- errors ---- */
 
-static void refused(const char *version, const char *inner, const char *sentence)
+static void expect_refused(const char *version, const char *inner, const char *sentence)
 {
-	world_check_files_refused(scene_of(version, "heterogeneous", inner), sentence);
+	world_check_files_refused(make_scene_files(version, "heterogeneous", inner), sentence);
 }
 
-static void test_refused(void **state)
+static void test_invalid_volumes_are_refused(void **state)
 {
 	(void)state;
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, linear_field);
-	world_check_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
+	world_check_files_refused(make_scene_files("3.0.0", "homogeneous", GRID("sigma_t", "")),
 				  "sigma_t must not vary in space in a homogeneous medium");
 	/* A rotation by 90 degrees as exporters write it. */
 	struct world *upright =
@@ -404,39 +405,43 @@ static void test_refused(void **state)
 						    "-1 0 6e-17 0 0 0 0 1'/></transform>"));
 	assert_false(upright->media[0].first.grid->is_world_aligned);
 	world_free(upright);
-	refused("3.0.0",
-		GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
-				"angle='10'/></transform>"),
-		"a rotated density cannot repeat itself (wrap_mode)");
+	expect_refused("3.0.0",
+		       GRID("sigma_t",
+			    "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
+			    "angle='10'/></transform>"),
+		       "a rotated density cannot repeat itself (wrap_mode)");
 	grid.value[7] = 1.5f;
 	vol_write(&grid);
-	refused("3.0.0", GRID("albedo", ""), "g.vol: its values go from 0.3 to 1.5; [0, 1] is supported here");
+	expect_refused("3.0.0", GRID("albedo", ""), "g.vol: its values go from 0.3 to 1.5; [0, 1] is supported here");
 	world_free(world_with("3.0.0", GRID("sigma_t", "")));
 	grid.value[7] = -0.5f;
 	vol_write(&grid);
-	refused("3.0.0", GRID("sigma_t", ""), "g.vol: its values go from -0.5 to ");
-	refused("3.0.0", "<volume type='gridvolume' name='sigma_t'/>", "needs a filename");
-	refused("0.6.0", "<volume type='constvolume' name='density'/>" EVEN, "needs a value");
-	refused("3.0.0", "<texture type='bitmap' name='sigma_t'/>", "`sigma_t` may be a volume, but not a texture");
-	refused("3.0.0", "<volume type='hgridvolume' name='sigma_t'/>",
+	expect_refused("3.0.0", GRID("sigma_t", ""), "g.vol: its values go from -0.5 to ");
+	expect_refused("3.0.0", "<volume type='gridvolume' name='sigma_t'/>", "needs a filename");
+	expect_refused("0.6.0", "<volume type='constvolume' name='density'/>" EVEN, "needs a value");
+	expect_refused("3.0.0", "<texture type='bitmap' name='sigma_t'/>",
+		       "`sigma_t` may be a volume, but not a texture");
+	expect_refused(
+		"3.0.0", "<volume type='hgridvolume' name='sigma_t'/>",
 		"this volume of Mitsuba's is not supported; --lenient leaves it out (supported: constvolume, gridvolume)");
-	refused("3.0.0", GRID("sigma_x", ""), "`sigma_x`");
-	refused("3.0.0", "<volume type='constvolume' name='albedo'><float name='value' value='1.5'/></volume>", "1.5");
+	expect_refused("3.0.0", GRID("sigma_x", ""), "`sigma_x`");
+	expect_refused("3.0.0", "<volume type='constvolume' name='albedo'><float name='value' value='1.5'/></volume>",
+		       "1.5");
 	vol_make(&grid, (const uint32_t[3]){4, 1, 5}, 1, linear_field);
-	refused("0.6.0", GRID("density", "") EVEN, "its box, or its grid, is flat along y");
+	expect_refused("0.6.0", GRID("density", "") EVEN, "its box, or its grid, is flat along y");
 	vol_set_box(&grid, (const float[3]){0, 0, 1}, (const float[3]){1, 1, 1});
-	refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along z");
+	expect_refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along z");
 	feclearexcept(FE_INVALID);
 	vol_set_box(&grid, (const float[3]){0, NAN, -INFINITY}, (const float[3]){1, NAN, -INFINITY});
-	refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along y");
+	expect_refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along y");
 	assert_false(fetestexcept(FE_INVALID)); /* renderers trap it */
-	refused("3.0.0", GRID("sigma_t", "<transform name='to_world'><scale x='0'/></transform>"),
-		"to_world flattens the volume");
-	refused("0.6.0", "<volume type='constvolume' name='density'><float name='value' value='1'/></volume>",
-		"needs a density and an albedo");
+	expect_refused("3.0.0", GRID("sigma_t", "<transform name='to_world'><scale x='0'/></transform>"),
+		       "to_world flattens the volume");
+	expect_refused("0.6.0", "<volume type='constvolume' name='density'><float name='value' value='1'/></volume>",
+		       "needs a density and an albedo");
 	vol_put32(&grid, 20, 6);
-	refused("3.0.0", GRID("sigma_t", ""),
-		"6 channels; supported are version 3, types 1 (floats) and 3 (bytes), 1 channel or 3");
+	expect_refused("3.0.0", GRID("sigma_t", ""),
+		       "6 channels; supported are version 3, types 1 (floats) and 3 (bytes), 1 channel or 3");
 }
 
 static bool is_noted(const struct scene *s, const char *text)
@@ -447,13 +452,13 @@ static bool is_noted(const struct scene *s, const char *text)
 	return false;
 }
 
-static void test_lenient(void **state)
+static void test_media_with_unsupported_volumes_are_left_out(void **state)
 {
 	(void)state;
 	struct error e = {""};
 	struct scene s;
-	struct asset_source assets =
-		memory_assets(scene_of("3.0.0", "heterogeneous", "<volume type='hgridvolume' name='sigma_t'/>" EVEN));
+	struct asset_source assets = memory_assets(
+		make_scene_files("3.0.0", "heterogeneous", "<volume type='hgridvolume' name='sigma_t'/>" EVEN));
 	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
 	assert_true(is_noted(&s, "the plug-in `hgridvolume` is not supported and left out (lenient)"));
 	assert_true(
@@ -464,14 +469,14 @@ static void test_lenient(void **state)
 
 /* ---- effects ---- */
 
-static void test_effects(void **state)
+static void test_switched_off_effects_change_the_extinction(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
 	vol_make(&grid, (const uint32_t[3]){1, 1, 1}, 1, linear_field); /* 0.3 */
 	static const struct {
 		const char *effects;
-		double share; /* remaining share of sigma_t */
+		double remaining_share; /* remaining share of sigma_t */
 	} cases[] = {{NULL, 1}, {"-scattering", 0.8}, {"-absorption", 0.2}, {"-absorption,-scattering", 0}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		worlds_effects = cases[i].effects;
@@ -480,13 +485,14 @@ static void test_effects(void **state)
 		const struct medium_lanes lanes = medium_lanes_along(&w->media[0], along_z, &wl);
 		const struct grid_ray r = {p, {0, 0, 1}, 0, 0.1 * w->scale};
 		double sigma = medium_extinction(&w->media[0], p, along_z, &wl).v[1];
-		assert_true(fabs(sigma * w->scale - cases[i].share * 0.3) < 1e-7);
+		assert_true(fabs(sigma * w->scale - cases[i].remaining_share * 0.3) < 1e-7);
 		assert_true(fabs(medium_optical_depth(&lanes, &r).v[1] - sigma * r.t1) < 1e-12);
 		world_free(w);
 	}
 	for (int i = 1; i <= 2; i++) {
 		worlds_effects = cases[i].effects;
-		refused("3.0.0", GRID("albedo", ""),
+		expect_refused(
+			"3.0.0", GRID("albedo", ""),
 			"absorption and scattering can only be switched off together in this scene: it has a medium "
 			"whose albedo varies from place to place");
 	}
@@ -494,13 +500,13 @@ static void test_effects(void **state)
 	worlds_effects = NULL;
 	grid.value[0] = 1;
 	vol_write(&grid);
-	struct world *white = world_from_files(8, 8, scene_of("3.0.0", "homogeneous", GRID("albedo", "")));
+	struct world *white = world_from_files(8, 8, make_scene_files("3.0.0", "homogeneous", GRID("albedo", "")));
 	assert_true(fabs(medium_extinction(&white->media[0], (vec3){0, 0, 0}, along_z, &wl).v[0] * white->scale - 1) <
 		    1e-12);
 	world_free(white);
 	worlds_effects = cases[3].effects;
 	struct world *w = world_with("3.0.0", GRID("albedo", ""));
-	assert_false(w->media[0].absorbs || w->media[0].scatters);
+	assert_false(w->media[0].is_absorbing || w->media[0].is_scattering);
 	world_free(w);
 	worlds_effects = NULL;
 }
@@ -508,10 +514,17 @@ static void test_effects(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_turned),	cmocka_unit_test(test_places),	cmocka_unit_test(test_outside),
-		cmocka_unit_test(test_colours), cmocka_unit_test(test_cube),	cmocka_unit_test(test_constants),
-		cmocka_unit_test(test_bytes),	cmocka_unit_test(test_shared),	cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_lenient), cmocka_unit_test(test_effects),
+		cmocka_unit_test(test_rotated_grids_follow_the_dialect),
+		cmocka_unit_test(test_grids_are_placed_by_dialect),
+		cmocka_unit_test(test_values_outside_the_grid_follow_the_dialect),
+		cmocka_unit_test(test_colour_channels_become_spectra),
+		cmocka_unit_test(test_constant_density_is_limited_to_a_cube),
+		cmocka_unit_test(test_constant_grids_equal_constants),
+		cmocka_unit_test(test_bytes_stand_for_zero_to_one),
+		cmocka_unit_test(test_volumes_of_one_file_share_values),
+		cmocka_unit_test(test_invalid_volumes_are_refused),
+		cmocka_unit_test(test_media_with_unsupported_volumes_are_left_out),
+		cmocka_unit_test(test_switched_off_effects_change_the_extinction),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,7 +24,7 @@ static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
 static struct vol grid;
 
 /* A linear function of position, which the grid represents exactly between the centres of its outermost cells. */
-static double field(double x, double y, double z, uint32_t channel)
+static double linear_field(double x, double y, double z, uint32_t channel)
 {
 	return 0.2 + 0.3 * x + (channel == 1 ? 0 : 0.2 * y) + (channel == 2 ? -0.15 : 0.1) * z;
 }
@@ -41,7 +41,7 @@ static double field(double x, double y, double z, uint32_t channel)
 static struct world *world_with(uint32_t channels, const char *inner)
 {
 	static char xml[4096];
-	vol_make(&grid, (const uint32_t[3]){8, 8, 8}, channels, field);
+	vol_make(&grid, (const uint32_t[3]){8, 8, 8}, channels, linear_field);
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", inner);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"g.vol", grid.bytes, grid.size}, {0}};
 	return world_from_files(8, 8, files);
@@ -49,10 +49,10 @@ static struct world *world_with(uint32_t channels, const char *inner)
 
 /* Returns the value at a point of the world: the box of the grid runs from -2 to 2, and its first and last points are
  * half a cell inside. */
-static double wanted_at(const struct world *w, vec3 p, uint32_t channel)
+static double expected_value(const struct world *w, vec3 p, uint32_t channel)
 {
 	vec3 q = vec3_madd(w->center, 1 / w->scale, p);
-	return field((q.x + 1.75) / 3.5, (q.y + 1.75) / 3.5, (q.z + 1.75) / 3.5, channel);
+	return linear_field((q.x + 1.75) / 3.5, (q.y + 1.75) / 3.5, (q.z + 1.75) / 3.5, channel);
 }
 
 static void assert_reflectance(const struct world *w, const struct surface_point *x, uint32_t channels)
@@ -62,7 +62,7 @@ static void assert_reflectance(const struct world *w, const struct surface_point
 	spectrum found = spectrum_scale(M_PI, b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}));
 	double rgb[3];
 	for (uint32_t k = 0; k < 3; k++)
-		rgb[k] = wanted_at(w, x->p, channels > 1 ? k : 0);
+		rgb[k] = expected_value(w, x->p, channels > 1 ? k : 0);
 	spectrum wanted = channels > 1 ? color_eval_rgb_reflectance(rgb, &colour) : spectrum_constant(rgb[0]);
 	for (int l = 0; l < SPECTRUM_LANES; l++)
 		if (fabs(found.v[l] - wanted.v[l]) > 1e-5)
@@ -70,7 +70,7 @@ static void assert_reflectance(const struct world *w, const struct surface_point
 }
 
 /* Triangles; and two instances of one mesh with one material. */
-static void test_places(void **state)
+static void test_reflectances_follow_the_grid(void **state)
 {
 	(void)state;
 	for (uint32_t channels = 1; channels <= 3; channels += 2) {
@@ -113,7 +113,7 @@ static void check_lamp(const char *shape, uint32_t channels)
 		double pdf, rgb[3];
 		assert_true(em->ops->sample_point(em, u, &drawn, &pdf));
 		for (uint32_t k = 0; k < 3; k++)
-			rgb[k] = wanted_at(w, drawn.p, channels > 1 ? k : 0);
+			rgb[k] = expected_value(w, drawn.p, channels > 1 ? k : 0);
 		assert_true(surface_nearest(&w->shapes[0], (struct prim_ref){0, drawn.texture_point.prim, 0}, drawn.p,
 					    &met));
 		struct emitter_point as_met = world_emitter_point(&met);
@@ -129,7 +129,7 @@ static void check_lamp(const char *shape, uint32_t channels)
 	world_free(w);
 }
 
-static void test_lamps(void **state)
+static void test_lamps_follow_the_grid(void **state)
 {
 	(void)state;
 	check_lamp("sphere", 1);
@@ -138,7 +138,7 @@ static void test_lamps(void **state)
 }
 
 /* The smallest roughness is found by probing points all over the grid. */
-static void test_roughness(void **state)
+static void test_smallest_roughness_is_found(void **state)
 {
 	(void)state;
 	struct world *w = world_with(
@@ -149,7 +149,7 @@ static void test_roughness(void **state)
 	world_free(w);
 }
 
-static void test_even(void **state)
+static void test_constant_volumes_equal_constants(void **state)
 {
 	(void)state;
 #define EVEN(inner)                                                                                                   \
@@ -157,7 +157,7 @@ static void test_even(void **state)
 	    "</bsdf></shape>"
 	static const struct {
 		const char *inner;
-		double wanted;
+		double expected;
 	} cases[] = {
 		{EVEN(""), 0.75},
 		{EVEN("<float name='volume' value='0.25'/>"), 0.25},
@@ -168,12 +168,12 @@ static void test_even(void **state)
 		const struct bsdf *b = &w->bsdfs[0];
 		const struct bsdf_point p = {.wavelengths = &colour};
 		double found = M_PI * b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}).v[0];
-		assert_true(fabs(found - cases[i].wanted) < 1e-12);
+		assert_true(fabs(found - cases[i].expected) < 1e-12);
 		world_free(w);
 	}
 }
 
-static void test_refused(void **state)
+static void test_invalid_volume_textures_are_refused(void **state)
 {
 	(void)state;
 #define TEXTURE(property) "<texture type='volume' name='" property "'/>"
@@ -190,8 +190,11 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_places), cmocka_unit_test(test_lamps),   cmocka_unit_test(test_roughness),
-		cmocka_unit_test(test_even),   cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_reflectances_follow_the_grid),
+		cmocka_unit_test(test_lamps_follow_the_grid),
+		cmocka_unit_test(test_smallest_roughness_is_found),
+		cmocka_unit_test(test_constant_volumes_equal_constants),
+		cmocka_unit_test(test_invalid_volume_textures_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

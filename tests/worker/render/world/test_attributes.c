@@ -40,7 +40,7 @@ static void node_colour(int i, int j, double rgb[3])
 	rgb[2] = (7 - i + (j % 2 ? 4 : 1)) / 16.0;
 }
 
-static int heat_of(int triangle)
+static int triangle_heat(int triangle)
 {
 	return triangle * 3 % HEATS;
 }
@@ -52,7 +52,7 @@ static size_t write_grid(char *text, int heat, bool linear)
 	char *at = text, *end = text + TEXT_MAX;
 	int count = 0;
 	for (int t = 0; t < TRIANGLES; t++)
-		count += heat < 0 || heat_of(t) == heat;
+		count += heat < 0 || triangle_heat(t) == heat;
 #define PUT(...) at += snprintf(at, (size_t)(end - at), __VA_ARGS__)
 	PUT("ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
 	    "property float u\nproperty float v\nproperty float r\nproperty float g\nproperty float b\n"
@@ -69,17 +69,18 @@ static size_t write_grid(char *text, int heat, bool linear)
 	}
 	for (int t = 0; t < TRIANGLES; t++) {
 		int p = t / 2 / (SIDE - 1) * SIDE + t / 2 % (SIDE - 1), odd = t % 2;
-		if (heat < 0 || heat_of(t) == heat)
-			PUT("3 %d %d %d %.9g\n", p + odd, p + SIDE, p + 1 + odd * SIDE, heat_of(t) / (double)HEATS);
+		if (heat < 0 || triangle_heat(t) == heat)
+			PUT("3 %d %d %d %.9g\n", p + odd, p + SIDE, p + 1 + odd * SIDE,
+			    triangle_heat(t) / (double)HEATS);
 	}
 #undef PUT
 	return (size_t)(at - text);
 }
 
-static char grid[TEXT_MAX], linear_grid[TEXT_MAX], of_heat[HEATS][TEXT_MAX];
+static char grid[TEXT_MAX], linear_grid[TEXT_MAX], heat_files[HEATS][TEXT_MAX];
 static struct pictures pictures;
 
-static struct world *world_of(const char *body)
+static struct world *make_world(const char *body)
 {
 	static char xml[TEXT_MAX];
 	static char names[HEATS][4];
@@ -97,14 +98,14 @@ static struct world *world_of(const char *body)
 	files[f++] = (struct memory_file){"p0", pictures.file[0].bytes, pictures.file[0].size};
 	for (int h = 0; h < HEATS; h++) {
 		snprintf(names[h], sizeof names[h], "h%d", h);
-		files[f++] = (struct memory_file){names[h], of_heat[h], write_grid(of_heat[h], h, false)};
+		files[f++] = (struct memory_file){names[h], heat_files[h], write_grid(heat_files[h], h, false)};
 	}
 	files[f] = (struct memory_file){NULL, NULL, 0};
 	return world_from_files(16, 16, files);
 }
 
 /* Returns the reflectance of a diffuse surface at each wavelength. */
-static spectrum albedo(const struct world *w, const struct surface_point *x)
+static spectrum diffuse_reflectance(const struct world *w, const struct surface_point *x)
 {
 	const struct bsdf *b = &w->bsdfs[w->shape_bindings[x->prim.shape].bsdf];
 	struct bsdf_point p = world_bsdf_point(x, &colour, TRANSPORT_RADIANCE);
@@ -120,7 +121,7 @@ static void assert_close(spectrum a, spectrum b, double tolerance)
 
 /* The linear colour of write_grid() as a function of the position; lengths of the world are those of the scene but
  * for a power of two. */
-static void linear_colour(const struct world *w, vec3 p, double rgb[3])
+static void expected_linear_colour(const struct world *w, vec3 p, double rgb[3])
 {
 	vec3 q = vec3_madd(w->center, 1 / w->scale, p);
 	rgb[0] = (q.x + 1) / 2;
@@ -138,17 +139,17 @@ static void assert_linear(const struct world *w, uint32_t shape, bool mirrored)
 		vec3 p = x.p;
 		if (mirrored)
 			p.x = -p.x;
-		linear_colour(w, p, rgb);
-		assert_close(albedo(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
+		expected_linear_colour(w, p, rgb);
+		assert_close(diffuse_reflectance(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
 	}
 }
 
 /* Flipped normals, winding and splitting turn and move vertices; the attributes must move with them. */
-static void test_linear(void **state)
+static void test_attributes_follow_their_vertices(void **state)
 {
 	(void)state;
 #define LINEAR DIFFUSE(FIELD("reflectance", "vertex_color"))
-	struct world *w = world_of(
+	struct world *w = make_world(
 		SKY PLY("linear.ply", LINEAR) PLY("linear.ply", LINEAR "<boolean name='flip_normals' value='true'/>")
 			PLY("linear.ply", LINEAR "<transform name='to_world'><scale x='-1'/></transform>") PLY(
 				"linear.ply", LINEAR
@@ -168,12 +169,13 @@ static void test_linear(void **state)
 
 /* Instances share a mesh with its attributes, and share a BSDF where they share triangles; mirrored instances have
  * triangles, and with them attributes, in reversed order. */
-static void test_instances(void **state)
+static void test_instances_have_the_attributes_of_their_mesh(void **state)
 {
 	(void)state;
 #define INSTANCE(inner) "<shape type='instance'><ref id='g'/><transform name='to_world'>" inner "</transform></shape>"
-	struct world *w = world_of(SKY "<shape type='shapegroup' id='g'>" PLY("linear.ply", LINEAR) "</shape>" INSTANCE(
-		"<translate z='-0.1'/>") INSTANCE("<scale x='-1'/>") INSTANCE("<translate z='0.1'/>"));
+	struct world *w =
+		make_world(SKY "<shape type='shapegroup' id='g'>" PLY("linear.ply", LINEAR) "</shape>" INSTANCE(
+			"<translate z='-0.1'/>") INSTANCE("<scale x='-1'/>") INSTANCE("<translate z='0.1'/>"));
 	assert_int_equal(w->sharing_shape_count, 3);
 	for (uint32_t i = 0; i < 3; i++)
 		assert_linear(w, i, i == 1);
@@ -183,7 +185,7 @@ static void test_instances(void **state)
 }
 
 /* Compares the colours of shapes 0 and 1 at the same points. */
-static void assert_alike(const struct world *w)
+static void assert_same_colours(const struct world *w)
 {
 	for (uint32_t t = 0; t < TRIANGLES; t++)
 		for (int k = 0; k < 8; k++) {
@@ -191,37 +193,37 @@ static void assert_alike(const struct world *w)
 			double b1 = k / 10.0, b2 = (7 - k) / 9.0 * (t % 5) / 4;
 			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, t, 0}, b1, b2, &a);
 			surface_on_triangle(&w->shapes[1], (struct prim_ref){1, t, 0}, b1, b2, &b);
-			assert_close(albedo(w, &a), albedo(w, &b), 1e-5);
+			assert_close(diffuse_reflectance(w, &a), diffuse_reflectance(w, &b), 1e-5);
 		}
 }
 
 /* A picture whose pixels have the colours of the vertices. */
-static void test_picture(void **state)
+static void test_attributes_match_a_picture(void **state)
 {
 	(void)state;
-	struct world *w = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "vertex_color")))
-					   PLY("grid.ply", DIFFUSE("<texture type='bitmap' name='reflectance'>"
-								   "<string name='filename' value='p0'/></texture>")));
-	assert_alike(w);
+	struct world *w = make_world(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "vertex_color"))) PLY(
+		"grid.ply", DIFFUSE("<texture type='bitmap' name='reflectance'>"
+				    "<string name='filename' value='p0'/></texture>")));
+	assert_same_colours(w);
 	world_free(w);
 }
 
 /* An image looked up by other coordinates: pairs of numbers at the vertices that are an affine map of (u,v), against
  * this map. */
-static void test_coordinates(void **state)
+static void test_images_may_use_other_coordinates(void **state)
 {
 	(void)state;
 #define BITMAP(inner) \
 	DIFFUSE("<texture type='bitmap' name='reflectance'><string name='filename' value='p0'/>" inner "</texture>")
-	struct world *w = world_of(SKY PLY("grid.ply", BITMAP("<string name='coordinates' value='vertex_pair'/>"))
-					   PLY("grid.ply", BITMAP("<transform name='to_uv'><matrix value='0 1 0 0 "
-								  "0.5 0 0 -1 0 0 1 0 0 0 0 1'/></transform>")));
-	assert_alike(w);
+	struct world *w = make_world(SKY PLY("grid.ply", BITMAP("<string name='coordinates' value='vertex_pair'/>"))
+					     PLY("grid.ply", BITMAP("<transform name='to_uv'><matrix value='0 1 0 0 "
+								    "0.5 0 0 -1 0 0 1 0 0 0 0 1'/></transform>")));
+	assert_same_colours(w);
 	world_free(w);
 }
 
 /* One mesh per heat with the colour of this heat, against one mesh with all heats: the images are equal bit by bit. */
-static void test_faces(void **state)
+static void test_face_attributes_match_separate_meshes(void **state)
 {
 	(void)state;
 	char text[TEXT_MAX], *at = text + snprintf(text, sizeof text, "%s", SKY);
@@ -233,8 +235,8 @@ static void test_faces(void **state)
 	/* With the choice of emitters by position, the probabilities would differ: the walks behind it end where a
 	 * whole material is black. */
 	worlds_accuracy = "emitter-choice=power";
-	struct world *many = world_of(text),
-		     *one = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "face_heat"))));
+	struct world *many = make_world(text),
+		     *one = make_world(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "face_heat"))));
 	worlds_accuracy = NULL;
 	assert_true(one->bsdfs[0].color_kind == COLOR_KIND_CONSTANT && !one->effects.colour);
 	const struct render_picture_options how = {.integrator = "path", .test = "faces", .spp = 4, .max_depth = 3};
@@ -257,11 +259,11 @@ static void test_faces(void **state)
 }
 
 /* Points sampled on a light, and points that rays meet. */
-static void test_light(void **state)
+static void test_lights_follow_attributes(void **state)
 {
 	(void)state;
 	struct world *w =
-		world_of(PLY("linear.ply", "<emitter type='area'>" FIELD("radiance", "vertex_color") "</emitter>"));
+		make_world(PLY("linear.ply", "<emitter type='area'>" FIELD("radiance", "vertex_color") "</emitter>"));
 	const struct emitter *em = &w->emitters[0];
 	assert_true(em->is_textured && em->color_kind == COLOR_KIND_OTHER && em->power > 0);
 	for (int i = 0; i < 200; i++) {
@@ -273,7 +275,7 @@ static void test_light(void **state)
 		assert_true(surface_nearest(&w->shapes[0], (struct prim_ref){0, drawn.texture_point.prim, 0}, drawn.p,
 					    &met));
 		struct emitter_point as_met = world_emitter_point(&met);
-		linear_colour(w, drawn.p, rgb);
+		expected_linear_colour(w, drawn.p, rgb);
 		spectrum expected = color_eval_rgb_illuminant(rgb, &colour);
 		assert_close(em->ops->radiance(em, &drawn, drawn.n, &colour), expected, 1e-5);
 		assert_close(em->ops->radiance(em, &as_met, drawn.n, &colour), expected, 1e-5);
@@ -284,12 +286,12 @@ static void test_light(void **state)
 }
 
 /* One material for meshes with different numbers; the smallest roughness is found wherever it lies. */
-static void test_roughness(void **state)
+static void test_smallest_roughness_is_found(void **state)
 {
 	(void)state;
 #define METAL "<bsdf type='roughconductor' id='m'>" FIELD("alpha", "face_heat") "</bsdf>"
 	struct world *w =
-		world_of(SKY METAL PLY("h3", "<ref id='m'/>") PLY("h1", "<ref id='m'/>") PLY("h4", "<ref id='m'/>"));
+		make_world(SKY METAL PLY("h3", "<ref id='m'/>") PLY("h1", "<ref id='m'/>") PLY("h4", "<ref id='m'/>"));
 	const double heat[3] = {0.6, 0.2, 0.8};
 	for (uint32_t i = 0; i < 3; i++) {
 		const struct bsdf *b = &w->bsdfs[w->shape_bindings[i].bsdf];
@@ -298,7 +300,7 @@ static void test_roughness(void **state)
 	}
 	world_free(w);
 	/* The roughness of a colour is the mean of its components; one node has the smallest. */
-	w = world_of(SKY PLY("linear.ply", "<bsdf type='roughconductor'>" FIELD("alpha", "vertex_color") "</bsdf>"));
+	w = make_world(SKY PLY("linear.ply", "<bsdf type='roughconductor'>" FIELD("alpha", "vertex_color") "</bsdf>"));
 	double least = INFINITY;
 	for (int k = 0; k < SIDE * SIDE; k++) {
 		double x = (k % SIDE + 0.5) / SIDE, y = 1 - (k / SIDE + 0.5) / SIDE;
@@ -311,7 +313,7 @@ static void test_roughness(void **state)
 }
 
 /* Colours in the place of a number are the means of their components, the same for all wavelengths. */
-static void test_colours_as_numbers(void **state)
+static void test_colours_as_numbers_are_their_means(void **state)
 {
 	(void)state;
 	/* in the first triangle, at the barycentrics below */
@@ -322,7 +324,7 @@ static void test_colours_as_numbers(void **state)
 		 SKY PLY("linear.ply", "<bsdf type='principled'>%s</bsdf>")
 			 PLY("linear.ply", "<bsdf type='principled'><float name='roughness' value='%.17g'/></bsdf>"),
 		 FIELD("roughness", "vertex_color"), mean);
-	struct world *w = world_of(text);
+	struct world *w = make_world(text);
 	const struct bsdf *got = &w->bsdfs[w->shape_bindings[0].bsdf], *want = &w->bsdfs[w->shape_bindings[1].bsdf];
 	assert_true(got->is_textured && !want->is_textured && got->color_kind == want->color_kind);
 	struct surface_point at;
@@ -334,29 +336,29 @@ static void test_colours_as_numbers(void **state)
 }
 
 /* Parameters whose attribute may exceed 1: the index of a metal, an exponent, an absorption. */
-static void test_beyond_one(void **state)
+static void test_unbounded_parameters_may_exceed_one(void **state)
 {
 	(void)state;
-#define TEN(property)                                                                                \
+#define TENFOLD(property)                                                                            \
 	"<texture type='mesh_attribute' name='" property "'><string name='name' value='face_heat'/>" \
 	"<float name='scale' value='10'/></texture>"
 #define NUMBER(property, value) "<float name='" property "' value='" value "'/>"
 	static const char *const of[][2] = {
-		{"<bsdf type='conductor'>" TEN("eta") NUMBER("k", "3") "</bsdf>",
+		{"<bsdf type='conductor'>" TENFOLD("eta") NUMBER("k", "3") "</bsdf>",
 		 "<bsdf type='conductor'>" NUMBER("eta", "6") NUMBER("k", "3") "</bsdf>"},
-		{"<bsdf type='roughconductor'>" TEN("k") NUMBER("eta", "0.2") "</bsdf>",
+		{"<bsdf type='roughconductor'>" TENFOLD("k") NUMBER("eta", "0.2") "</bsdf>",
 		 "<bsdf type='roughconductor'>" NUMBER("k", "6") NUMBER("eta", "0.2") "</bsdf>"},
-		{"<bsdf type='phong'>" TEN("exponent") "</bsdf>",
+		{"<bsdf type='phong'>" TENFOLD("exponent") "</bsdf>",
 		 "<bsdf type='phong'>" NUMBER("exponent", "6") "</bsdf>"},
-		{"<bsdf type='principledthin'>" NUMBER("spec_trans", "0.5") TEN("eta") "</bsdf>",
+		{"<bsdf type='principledthin'>" NUMBER("spec_trans", "0.5") TENFOLD("eta") "</bsdf>",
 		 "<bsdf type='principledthin'>" NUMBER("spec_trans", "0.5") NUMBER("eta", "6") "</bsdf>"},
-		{"<bsdf type='coating'>" TEN("sigma_a") "<bsdf type='diffuse'/></bsdf>",
+		{"<bsdf type='coating'>" TENFOLD("sigma_a") "<bsdf type='diffuse'/></bsdf>",
 		 "<bsdf type='coating'>" NUMBER("sigma_a", "6") "<bsdf type='diffuse'/></bsdf>"},
 	};
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		char text[4096];
 		snprintf(text, sizeof text, SKY PLY("h3", "%s") PLY("h3", "%s"), of[i][0], of[i][1]);
-		struct world *w = world_of(text);
+		struct world *w = make_world(text);
 		const struct bsdf *got = &w->bsdfs[w->shape_bindings[0].bsdf],
 				  *want = &w->bsdfs[w->shape_bindings[1].bsdf];
 		assert_true(got->color_kind == want->color_kind && got->is_textured);
@@ -382,7 +384,7 @@ static void test_beyond_one(void **state)
 		world_free(w);
 	}
 	/* Attributes of these parameters are colours like those of other parameters. */
-	struct world *w = world_of(
+	struct world *w = make_world(
 		SKY PLY("linear.ply",
 			"<bsdf type='coating'>" FIELD("sigma_a", "vertex_color") "<bsdf type='diffuse'/></bsdf>"));
 	assert_true(w->bsdfs[0].color_kind == COLOR_KIND_OTHER);
@@ -390,12 +392,12 @@ static void test_beyond_one(void **state)
 }
 
 /* Files of version 0.6 interpret floats at vertices as sRGB, unless the shape says otherwise. */
-static void test_vertexcolors(void **state)
+static void test_vertexcolors_are_srgb_in_0_6(void **state)
 {
 	(void)state;
 #define COLOURS "<bsdf type='diffuse'><texture type='vertexcolors' name='reflectance'/></bsdf>"
-	struct world *w =
-		world_of(SKY PLY("grid.ply", COLOURS) PLY("grid.ply", COLOURS "<boolean name='srgb' value='false'/>"));
+	struct world *w = make_world(SKY PLY("grid.ply", COLOURS)
+					     PLY("grid.ply", COLOURS "<boolean name='srgb' value='false'/>"));
 	for (uint32_t i = 0; i < 2; i++) {
 		struct surface_point x;
 		double rgb[3];
@@ -403,12 +405,12 @@ static void test_vertexcolors(void **state)
 		node_colour(0, 0, rgb);
 		for (int k = 0; k < 3 && i == 0; k++)
 			rgb[k] = pow((rgb[k] + 0.055) / 1.055, 2.4) * (rgb[k] > 0.04045);
-		assert_close(albedo(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
+		assert_close(diffuse_reflectance(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
 	}
 	world_free(w);
 }
 
-static void test_shared(void **state)
+static void test_equal_attributes_are_shared(void **state)
 {
 	(void)state;
 	float a[6] = {0, 0.5, 1, 0.25, 0, 0}, b[6], c[6] = {0, 0.5, 1, 0.25, 0, 0.125};
@@ -436,7 +438,7 @@ static const char large_ply[] =
 	"property float r\nproperty float g\nproperty float b\nelement face 1\nproperty list uchar int vertex_indices\n"
 	"end_header\n0 0 0 1.5e9 1.5e9 1 2\n1 0 0 3 3 4 5\n0 1 0 3 3 4 5\n3 0 1 2\n";
 
-static void refuses(const char *body, const char *sentence)
+static void expect_refused(const char *body, const char *sentence)
 {
 	static char xml[TEXT_MAX];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW SKY "%s</scene>", body);
@@ -452,47 +454,52 @@ static void refuses(const char *body, const char *sentence)
 	struct error e = {""};
 	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
 	if (!rc) {
-		rc = render_check(&s, &assets, &o, &m, &e);
+		rc = world_check(&s, &assets, &o, &m, &e);
 		scene_fini(&s);
 	}
 	if (rc >= 0 || !strstr(e.text, sentence))
 		fail_msg("%s\n gave: %s\n not: %s", body, e.text, sentence);
 }
 
-static void test_refused(void **state)
+static void test_invalid_attributes_are_refused(void **state)
 {
 	(void)state;
-#define OF(attribute) DIFFUSE(FIELD("reflectance", attribute))
-	refuses(PLY("grid.ply", OF("vertex_colour")),
+#define DIFFUSE_OF(attribute) DIFFUSE(FIELD("reflectance", attribute))
+	expect_refused(
+		PLY("grid.ply", DIFFUSE_OF("vertex_colour")),
 		"the mesh of grid.ply (s.xml:1) has no attribute `vertex_colour`, only vertex_color, vertex_pair, "
 		"vertex_wild, face_heat; did you mean `vertex_color`?");
-	refuses("<shape type='rectangle'>" OF("vertex_color") "</shape>",
-		"the rectangle in s.xml:1 has no attribute `vertex_color`, nor any other");
-	refuses("<shape type='sphere'>" OF("face_heat") "</shape>",
-		"the sphere in s.xml:1 has no attribute `face_heat`");
-	refuses("<shape type='cube'>" COLOURS "</shape>", "the cube in s.xml:1 has no attribute `vertex_color`");
-	refuses(PLY("grid.ply", OF("color")), "needs a name that begins with `vertex_` or `face_`");
-	refuses(PLY("grid.ply", OF("vertex_pair")), "`vertex_pair` of the mesh of grid.ply (s.xml:1) has two channels");
-	refuses(PLY("grid.ply", OF("vertex_wild")), "has a value that is not finite, or beyond 1e12");
-	refuses(PLY("grid.ply", BITMAP("<string name='coordinates' value='face_heat'/>")),
-		"`face_heat` of the mesh of grid.ply (s.xml:1) is not two numbers at each vertex");
-	refuses(PLY("grid.ply",
+	expect_refused("<shape type='rectangle'>" DIFFUSE_OF("vertex_color") "</shape>",
+		       "the rectangle in s.xml:1 has no attribute `vertex_color`, nor any other");
+	expect_refused("<shape type='sphere'>" DIFFUSE_OF("face_heat") "</shape>",
+		       "the sphere in s.xml:1 has no attribute `face_heat`");
+	expect_refused("<shape type='cube'>" COLOURS "</shape>", "the cube in s.xml:1 has no attribute `vertex_color`");
+	expect_refused(PLY("grid.ply", DIFFUSE_OF("color")), "needs a name that begins with `vertex_` or `face_`");
+	expect_refused(PLY("grid.ply", DIFFUSE_OF("vertex_pair")),
+		       "`vertex_pair` of the mesh of grid.ply (s.xml:1) has two channels");
+	expect_refused(PLY("grid.ply", DIFFUSE_OF("vertex_wild")), "has a value that is not finite, or beyond 1e12");
+	expect_refused(PLY("grid.ply", BITMAP("<string name='coordinates' value='face_heat'/>")),
+		       "`face_heat` of the mesh of grid.ply (s.xml:1) is not two numbers at each vertex");
+	expect_refused(
+		PLY("grid.ply",
 		    "<bsdf type='normalmap'><bsdf type='diffuse'/><texture type='bitmap'><string name='filename' "
 		    "value='p0'/><string name='coordinates' value='vertex_pair'/></texture></bsdf>"),
 		"a map of heights or normals cannot have `coordinates`");
-	refuses("<emitter type='projector'><texture type='bitmap' name='irradiance'><string name='filename' value='p0'/>"
+	expect_refused(
+		"<emitter type='projector'><texture type='bitmap' name='irradiance'><string name='filename' value='p0'/>"
 		"<string name='coordinates' value='vertex_pair'/></texture></emitter>",
 		"attributes are only available on a mesh");
-	refuses(PLY("grid.ply", "<bsdf type='bumpmap'><bsdf type='diffuse'/>" FIELD("", "face_heat") "</bsdf>"),
-		"an attribute of a mesh cannot be a bump or normal map");
-	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
+	expect_refused(PLY("grid.ply", "<bsdf type='bumpmap'><bsdf type='diffuse'/>" FIELD("", "face_heat") "</bsdf>"),
+		       "an attribute of a mesh cannot be a bump or normal map");
+	expect_refused(
+		PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
 		"an attribute of a mesh cannot displace a surface");
-	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_q") "</bsdf>"),
-		"the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
-	refuses(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_color") "</bsdf>"),
-		"the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
-	refuses("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
-		"attributes are only available on a mesh");
+	expect_refused(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_q") "</bsdf>"),
+		       "the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
+	expect_refused(PLY("large.ply", "<bsdf type='conductor'>" FIELD("eta", "vertex_color") "</bsdf>"),
+		       "the attribute has numbers up to 1.5e+09: they must be within [0, 1e+09]");
+	expect_refused("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
+		       "attributes are only available on a mesh");
 }
 
 static int teardown(void **state)
@@ -505,12 +512,18 @@ static int teardown(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_linear),	   cmocka_unit_test(test_instances),
-		cmocka_unit_test(test_picture),	   cmocka_unit_test(test_coordinates),
-		cmocka_unit_test(test_faces),	   cmocka_unit_test(test_light),
-		cmocka_unit_test(test_roughness),  cmocka_unit_test(test_vertexcolors),
-		cmocka_unit_test(test_shared),	   cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_beyond_one), cmocka_unit_test(test_colours_as_numbers),
+		cmocka_unit_test(test_attributes_follow_their_vertices),
+		cmocka_unit_test(test_instances_have_the_attributes_of_their_mesh),
+		cmocka_unit_test(test_attributes_match_a_picture),
+		cmocka_unit_test(test_images_may_use_other_coordinates),
+		cmocka_unit_test(test_face_attributes_match_separate_meshes),
+		cmocka_unit_test(test_lights_follow_attributes),
+		cmocka_unit_test(test_smallest_roughness_is_found),
+		cmocka_unit_test(test_vertexcolors_are_srgb_in_0_6),
+		cmocka_unit_test(test_equal_attributes_are_shared),
+		cmocka_unit_test(test_invalid_attributes_are_refused),
+		cmocka_unit_test(test_unbounded_parameters_may_exceed_one),
+		cmocka_unit_test(test_colours_as_numbers_are_their_means),
 	};
 	return cmocka_run_group_tests(tests, NULL, teardown);
 }

@@ -48,7 +48,7 @@ static void backs_by_material_and_setting(void **state)
 	(void)state;
 	static const struct {
 		const char *material;
-		double front, lit, black; /* of the front, and of the back with backs=lit and backs=black */
+		double front, lit_back, black_back; /* of the front, and of the back with backs=lit and backs=black */
 	} cases[] = {
 		{GREY, 0.5, 0.5, 0},
 		{TWO_SIDES, 0.5, 0.5, 0.5},
@@ -57,12 +57,12 @@ static void backs_by_material_and_setting(void **state)
 		{"<bsdf type='bumpmap'><texture type='checkerboard'/>" GREY "</bsdf>", 0.5, 0.5, 0},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		static const char *const how[] = {"backs=lit", "backs=black", "backs=auto"};
+		static const char *const settings[] = {"backs=lit", "backs=black", "backs=auto"};
 		for (int k = 0; k < 6; k++) {
-			const double back = k % 3 ? cases[i].black : cases[i].lit;
-			double is = mean_luminance(how[k % 3], cases[i].material, k / 3),
+			const double back = k % 3 ? cases[i].black_back : cases[i].lit_back;
+			double is = mean_luminance(settings[k % 3], cases[i].material, k / 3),
 			       expected = k / 3 ? back : cases[i].front;
-			print_message("%zu, %s, %s: %.4f of %.4f\n", i, k / 3 ? "back" : "front", how[k % 3], is,
+			print_message("%zu, %s, %s: %.4f of %.4f\n", i, k / 3 ? "back" : "front", settings[k % 3], is,
 				      expected);
 			assert_true(fabs(is - expected) <= 0.03 * expected); /* 4,096 samples of one bounce */
 		}
@@ -87,7 +87,7 @@ static void one_sided_materials_are_noted(void **state)
 	(void)state;
 	static const struct {
 		const char *accuracy, *material;
-		double half; /* half width of the rectangle; of 1 it covers 9.1 pixels */
+		double half_width; /* half width of the rectangle; of 1 it covers 9.1 pixels */
 		bool back, noted;
 	} cases[] = {
 		{"backs=auto", GREY, 9, true, true},
@@ -115,7 +115,7 @@ static void one_sided_materials_are_noted(void **state)
 				"<transform name='to_world'><scale value='%g'/><rotate y='1' angle='%d'/></transform>"
 				"%s"
 			"</shape>",
-			cases[i].half, cases[i].back ? 180 : 0, cases[i].material);
+			cases[i].half_width, cases[i].back ? 180 : 0, cases[i].material);
 		/* clang-format on */
 		worlds_accuracy = NULL;
 		bool noted = is_noted(w, "black backs of opaque materials");

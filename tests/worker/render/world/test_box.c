@@ -12,15 +12,15 @@
 
 #include <cmocka.h>
 
-static bool is_inside(const struct box *b, vec3 p, double out)
+static bool is_inside(const struct box *b, vec3 p, double margin)
 {
-	return p.x >= b->low.x - out && p.x <= b->high.x + out && p.y >= b->low.y - out && p.y <= b->high.y + out &&
-	       p.z >= b->low.z - out && p.z <= b->high.z + out;
+	return p.x >= b->min.x - margin && p.x <= b->max.x + margin && p.y >= b->min.y - margin &&
+	       p.y <= b->max.y + margin && p.z >= b->min.z - margin && p.z <= b->max.z + margin;
 }
 
-/* If a point along the ray lies in the box, the ray must meet it; if none comes within `out`, the spacing of the
+/* If a point along the ray lies in the box, the ray must meet it; if none comes within `margin`, the spacing of the
  * points, the ray must miss it. */
-static void test_points(void **state)
+static void test_rays_meet_the_box_of_their_points(void **state)
 {
 	(void)state;
 	const double out = 1e-3;
@@ -59,7 +59,7 @@ static void test_points(void **state)
 #define PANE(inner, bsdf) \
 	"<shape type='rectangle'><transform name='to_world'>" inner "</transform><bsdf type='" bsdf "'/></shape>"
 
-static void test_of_a_scene(void **state)
+static void test_see_through_bounds_enclose_see_through_shapes(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -69,7 +69,7 @@ static void test_of_a_scene(void **state)
 	const double slack = 1e-4;
 	const vec3 low = {-3, -1, 0}, high = {4, 2, 2};
 	for (int side = 0; side < 2; side++) {
-		vec3 p = side ? high : low, q = side ? w->see_through_bounds.high : w->see_through_bounds.low;
+		vec3 p = side ? high : low, q = side ? w->see_through_bounds.max : w->see_through_bounds.min;
 		vec3 off = vec3_sub(vec3_add(vec3_scale(1 / w->scale, q), w->center), p);
 		if (!side)
 			off = vec3_neg(off);
@@ -78,15 +78,15 @@ static void test_of_a_scene(void **state)
 	}
 	world_free(w);
 	w = world_from_text(16, 16, "%s", SENSOR("0,0,9", "0,0,0") "<emitter type='constant'/>" PANE("", "diffuse"));
-	assert_true(w->see_through_bounds.low.x > w->see_through_bounds.high.x);
+	assert_true(w->see_through_bounds.min.x > w->see_through_bounds.max.x);
 	world_free(w);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_points),
-		cmocka_unit_test(test_of_a_scene),
+		cmocka_unit_test(test_rays_meet_the_box_of_their_points),
+		cmocka_unit_test(test_see_through_bounds_enclose_see_through_shapes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

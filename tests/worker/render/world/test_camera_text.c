@@ -16,7 +16,7 @@
 #define LOOK "<transform name='to_world'><lookat origin='1,2,5' target='0.5,0,0' up='0,1,0'/></transform>"
 #define BALL "<shape type='sphere'/><emitter type='constant'/>"
 
-static void camera_of(const char *sensor, char text[RENDER_CAMERA_TEXT_MAX], mat4 *m)
+static void read_camera(const char *sensor, char text[RENDER_CAMERA_TEXT_MAX], mat4 *m)
 {
 	struct world *w = world_from_text(16, 8, "%s%s", sensor, BALL);
 	struct render_summary s;
@@ -32,12 +32,12 @@ static void expect_part(const char *text, const char *part)
 		fail_msg("\"%s\" does not say \"%s\"", text, part);
 }
 
-static void test_text(void **state)
+static void test_text_describes_the_camera(void **state)
 {
 	(void)state;
 	char text[RENDER_CAMERA_TEXT_MAX];
 	mat4 m;
-	camera_of(
+	read_camera(
 		"<sensor type='perspective'><float name='fov' value='40'/><string name='fov_axis' value='y'/>" LOOK FILM
 		"</sensor>",
 		text, &m);
@@ -53,18 +53,18 @@ static void test_text(void **state)
 		at = end + 1;
 	}
 	assert_true(m.m[0][3] == 1 && m.m[1][3] == 2 && m.m[2][3] == 5);
-	camera_of("<sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='0.25'/>"
-		  "<float name='focus_distance' value='4'/>" LOOK FILM "</sensor>",
-		  text, &m);
+	read_camera("<sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='0.25'/>"
+		    "<float name='focus_distance' value='4'/>" LOOK FILM "</sensor>",
+		    text, &m);
 	assert_true(strncmp(text, "thinlens fov=30 fov_axis=x aperture_radius=0.25 focus_distance=4 ", 65) == 0);
-	camera_of("", text, &m); /* a ball of radius 1 at the origin, entirely in view */
+	read_camera("", text, &m); /* a ball of radius 1 at the origin, entirely in view */
 	assert_true(strncmp(text, "perspective fov=45 fov_axis=x ", 30) == 0);
 	assert_true(fabs(m.m[2][3] + 1 + 1 / tan(M_PI / 8)) < 1e-9);
-	camera_of("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);
+	read_camera("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);
 	expect_part(text, "orthographic half_width=1 near_clip=");
-	camera_of("<sensor type='perspective'><float name='fov' value='40'/><float name='principal_point_offset_x' "
-		  "value='0.25'/>" LOOK FILM "</sensor>",
-		  text, &m);
+	read_camera("<sensor type='perspective'><float name='fov' value='40'/><float name='principal_point_offset_x' "
+		    "value='0.25'/>" LOOK FILM "</sensor>",
+		    text, &m);
 	expect_part(text, " principal_point_offset_x=0.25 principal_point_offset_y=0 ");
 }
 
@@ -80,7 +80,7 @@ static void check_note(const char *scene, bool dark)
 	world_free(w);
 }
 
-static void test_stand_in_is_noted(void **state)
+static void test_default_camera_is_noted(void **state)
 {
 	(void)state;
 	check_note(BALL, false);
@@ -89,6 +89,7 @@ static void test_stand_in_is_noted(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_text), cmocka_unit_test(test_stand_in_is_noted)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_text_describes_the_camera),
+					   cmocka_unit_test(test_default_camera_is_noted)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render_check_all() reports every invalid shape, material and emitter once each; for a valid scene it reports the
- * same as render_check(). */
+/* world_check_all() reports every invalid shape, material and emitter once each; for a valid scene it reports the
+ * same as world_check(). */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 #include "worker/render/world/build.h"
@@ -22,7 +22,7 @@
 struct checked {
 	struct scene scene;
 	struct arena arena;
-	struct report found;
+	struct report report;
 	struct render_summary summary;
 };
 
@@ -34,9 +34,9 @@ static void check(const char *xml, struct checked *c)
 	*c = (struct checked){.arena = {0}};
 	if (scene_read(&c->scene, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
-	assert_int_equal(report_init(&c->found, &c->arena, &e), 0);
+	assert_int_equal(report_init(&c->report, &c->arena, &e), 0);
 	const struct render_options as_it_is = {0};
-	if (render_check_all(&c->scene, &assets, &as_it_is, &c->found, &c->summary, &e))
+	if (world_check_all(&c->scene, &assets, &as_it_is, &c->report, &c->summary, &e))
 		fail_msg("%s", e.text);
 }
 
@@ -46,7 +46,7 @@ static void free_checked(struct checked *c)
 	arena_fini(&c->arena);
 }
 
-static void test_all_problems(void **state)
+static void test_all_problems_are_reported(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>\n"
@@ -67,15 +67,15 @@ static void test_all_problems(void **state)
 	enum { COUNT = sizeof expected / sizeof *expected };
 	struct checked c;
 	check(xml, &c);
-	for (uint32_t i = 0; i < c.found.problem_count; i++)
-		if (i >= COUNT || strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
-			fail_msg("problem %u: %s", i, c.found.problems[i]);
-	assert_int_equal(c.found.problem_count, COUNT);
+	for (uint32_t i = 0; i < c.report.problem_count; i++)
+		if (i >= COUNT || strncmp(c.report.problems[i], expected[i], strlen(expected[i])) != 0)
+			fail_msg("problem %u: %s", i, c.report.problems[i]);
+	assert_int_equal(c.report.problem_count, COUNT);
 	free_checked(&c);
 }
 
 /* Errors in instances come first, because shapes are listed before they are read. */
-static void test_instances(void **state)
+static void test_problems_of_instances_come_first(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>\n<shape type='instance'/>\n" SPHERE(METAL(
@@ -87,14 +87,14 @@ static void test_instances(void **state)
 	enum { COUNT = sizeof expected / sizeof *expected };
 	struct checked c;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, COUNT);
+	assert_int_equal(c.report.problem_count, COUNT);
 	for (uint32_t i = 0; i < COUNT; i++)
-		if (strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
-			fail_msg("problem %u: %s", i, c.found.problems[i]);
+		if (strncmp(c.report.problems[i], expected[i], strlen(expected[i])) != 0)
+			fail_msg("problem %u: %s", i, c.report.problems[i]);
 	free_checked(&c);
 }
 
-static void test_good_scene(void **state)
+static void test_valid_scene_has_no_problems(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("Cu")) ENVIRONMENT "</scene>";
@@ -102,18 +102,18 @@ static void test_good_scene(void **state)
 	struct render_summary alone;
 	struct error e;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, 0);
+	assert_int_equal(c.report.problem_count, 0);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(files);
 	const struct render_options as_it_is = {0};
-	assert_int_equal(render_check(&c.scene, &assets, &as_it_is, &alone, &e), 0);
+	assert_int_equal(world_check(&c.scene, &assets, &as_it_is, &alone, &e), 0);
 	assert_true(c.summary.shapes == 1 && alone.shapes == 1 && c.summary.brightness_bound == alone.brightness_bound);
 	free_checked(&c);
 }
 
 /* Mitsuba has two tables for most metals, and this renderer one: a note says so, unless this table is Mitsuba's only
  * one. */
-static void test_second_tables(void **state)
+static void test_metals_with_two_tables_are_noted(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("Ni_palik"))
@@ -121,7 +121,7 @@ static void test_second_tables(void **state)
 		"</scene>";
 	struct checked c;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, 0);
+	assert_int_equal(c.report.problem_count, 0);
 	assert_int_equal(c.scene.note_count, 1);
 	assert_string_equal(c.scene.notes[0],
 			    "s.xml:2: <bsdf type=\"conductor\">: the refractive indices of Cu are used for Cu_palik");
@@ -129,7 +129,7 @@ static void test_second_tables(void **state)
 }
 
 /* A metal that only Mitsuba has is unknown, and no other metal replaces it. */
-static void test_unknown_metals(void **state)
+static void test_unknown_metals_are_refused(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("TiO3_palik")) ENVIRONMENT
@@ -137,17 +137,17 @@ static void test_unknown_metals(void **state)
 	struct checked c;
 	check(xml, &c);
 	assert_int_equal(c.scene.note_count, 0);
-	assert_int_equal(c.found.problem_count, 3);
-	assert_non_null(strstr(c.found.problems[0],
+	assert_int_equal(c.report.problem_count, 3);
+	assert_non_null(strstr(c.report.problems[0],
 			       "unknown conductor \"TiO3_palik\"; eta and k are accepted, too (known: "
 			       "a-C, Ag, "));
-	assert_non_null(strstr(c.found.problems[0], ", W, none)"));
-	assert_non_null(strstr(c.found.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
-	assert_non_null(strstr(c.found.problems[2], "unknown conductor \"Gold\"; did you mean `Au`?"));
+	assert_non_null(strstr(c.report.problems[0], ", W, none)"));
+	assert_non_null(strstr(c.report.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
+	assert_non_null(strstr(c.report.problems[2], "unknown conductor \"Gold\"; did you mean `Au`?"));
 	free_checked(&c);
 }
 
-static void test_unknown_indices(void **state)
+static void test_unknown_indices_are_refused(void **state)
 {
 	(void)state;
 #define GLASS(name) "<bsdf type='dielectric'><string name='int_ior' value='" name "'/></bsdf>"
@@ -155,17 +155,17 @@ static void test_unknown_indices(void **state)
 		GLASS("glass")) "\n" SPHERE(GLASS("Kryptonite")) ENVIRONMENT "</scene>";
 	struct checked c;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, 3);
-	assert_non_null(strstr(c.found.problems[0], "int_ior: unknown material \"watter\"; did you mean `water`?"));
-	assert_non_null(strstr(c.found.problems[1], "int_ior: unknown material \"glass\"; did you mean `bk7`?"));
+	assert_int_equal(c.report.problem_count, 3);
+	assert_non_null(strstr(c.report.problems[0], "int_ior: unknown material \"watter\"; did you mean `water`?"));
+	assert_non_null(strstr(c.report.problems[1], "int_ior: unknown material \"glass\"; did you mean `bk7`?"));
 	assert_non_null(
-		strstr(c.found.problems[2], "\"Kryptonite\"; a number is accepted, too (known: vacuum, helium, "));
-	assert_non_null(strstr(c.found.problems[2], ", sapphire (o))"));
+		strstr(c.report.problems[2], "\"Kryptonite\"; a number is accepted, too (known: vacuum, helium, "));
+	assert_non_null(strstr(c.report.problems[2], ", sapphire (o))"));
 	free_checked(&c);
 }
 
 /* A value beside a texture: the texture applies, which Mitsuba 0.6 accepts; a value alone is no mistake. */
-static void test_values_beside_textures(void **state)
+static void test_textures_override_values_beside_them(void **state)
 {
 	(void)state;
 #define SCALED(inside)                                                                                         \
@@ -176,7 +176,7 @@ static void test_values_beside_textures(void **state)
 			ENVIRONMENT "</scene>";
 	struct checked c;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, 0);
+	assert_int_equal(c.report.problem_count, 0);
 	assert_int_equal(c.scene.note_count, 1);
 	assert_string_equal(c.scene.notes[0],
 			    "s.xml:3: <texture type=\"scale\">: `value` has no effect: the texture inside is scaled, "
@@ -185,7 +185,7 @@ static void test_values_beside_textures(void **state)
 }
 
 /* The number of reported errors ends where the report is full. */
-static void test_too_many(void **state)
+static void test_report_of_too_many_errors_is_cut(void **state)
 {
 	(void)state;
 	enum { MANY = REPORT_PROBLEMS_MAX + 50 };
@@ -198,7 +198,7 @@ static void test_too_many(void **state)
 	sprintf(xml + n, "</scene>");
 	struct checked c;
 	check(xml, &c);
-	assert_int_equal(c.found.problem_count, REPORT_PROBLEMS_MAX);
+	assert_int_equal(c.report.problem_count, REPORT_PROBLEMS_MAX);
 	free_checked(&c);
 	free(xml);
 }
@@ -206,14 +206,14 @@ static void test_too_many(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_problems),
-		cmocka_unit_test(test_instances),
-		cmocka_unit_test(test_good_scene),
-		cmocka_unit_test(test_second_tables),
-		cmocka_unit_test(test_unknown_metals),
-		cmocka_unit_test(test_unknown_indices),
-		cmocka_unit_test(test_values_beside_textures),
-		cmocka_unit_test(test_too_many),
+		cmocka_unit_test(test_all_problems_are_reported),
+		cmocka_unit_test(test_problems_of_instances_come_first),
+		cmocka_unit_test(test_valid_scene_has_no_problems),
+		cmocka_unit_test(test_metals_with_two_tables_are_noted),
+		cmocka_unit_test(test_unknown_metals_are_refused),
+		cmocka_unit_test(test_unknown_indices_are_refused),
+		cmocka_unit_test(test_textures_override_values_beside_them),
+		cmocka_unit_test(test_report_of_too_many_errors_is_cut),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

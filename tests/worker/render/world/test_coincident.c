@@ -32,8 +32,9 @@
 /* clang-format on */
 #define VIEW SENSOR("0,3,8", "0,0,0") "\n"
 
-/* Expects the notes `first` and `second`; NULL: no such note. on: whether rays must look coinciding primitives up. */
-static void expect(const char *text, const char *first, const char *second, bool on)
+/* Expects the notes `first` and `second`; NULL: no such note. looks_up: whether rays must look coinciding primitives
+ * up. */
+static void expect_notes(const char *text, const char *first, const char *second, bool looks_up)
 {
 	struct world *w = world_from_text(8, 8, "%s", text);
 	struct render_summary s;
@@ -48,62 +49,68 @@ static void expect(const char *text, const char *first, const char *second, bool
 		assert_string_equal(note, wanted[i]);
 	}
 	assert_null(wanted[i]);
-	assert_int_equal(render_effect_is_on(&s, "coincidence"), on);
+	assert_int_equal(render_effect_is_on(&s, "coincidence"), looks_up);
 	world_free(w);
 }
 
-static void test_notes(void **state)
+static void test_coincident_shapes_are_noted(void **state)
 {
 	(void)state;
-	expect(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
-	expect(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
-	       "`glass` (test.xml:2) coincides with `lamp` (test.xml:3), which shines and hides it where they "
-	       "overlap",
-	       NULL, true);
-	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
-	       "`glass` (test.xml:2) coincides with `floor` (test.xml:3), which is opaque and hides it where they "
-	       "overlap",
-	       NULL, true);
-	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
-		       CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
-	       "`ice` (test.xml:3) coincides with `glass` (test.xml:2), which comes first in the file and hides it "
-	       "where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
-	       "`hole` (test.xml:4) coincides with `glass` (test.xml:2), which refracts or scatters and hides it "
-	       "where they overlap",
-	       true);
+	expect_notes(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
+	expect_notes(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
+		     "`glass` (test.xml:2) coincides with `lamp` (test.xml:3), which shines and hides it where they "
+		     "overlap",
+		     NULL, true);
+	expect_notes(
+		VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
+		"`glass` (test.xml:2) coincides with `floor` (test.xml:3), which is opaque and hides it where they "
+		"overlap",
+		NULL, true);
+	expect_notes(
+		VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
+			CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
+		"`ice` (test.xml:3) coincides with `glass` (test.xml:2), which comes first in the file and hides it "
+		"where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
+		"`hole` (test.xml:4) coincides with `glass` (test.xml:2), which refracts or scatters and hides it "
+		"where they overlap",
+		true);
 	/* Glass with holes counts as glass; an opaque sheet with holes does not. */
-	expect(VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
-		       CUBE("net", "-1", "0.5", HOLES(GREY)),
-	       "`glass` (test.xml:3) coincides with `lace` (test.xml:2), which comes first in the file and hides it "
-	       "where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
-	       "`net` (test.xml:4) coincides with `lace` (test.xml:2), which refracts or scatters and hides it "
-	       "where they overlap",
-	       true);
+	expect_notes(
+		VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
+			CUBE("net", "-1", "0.5", HOLES(GREY)),
+		"`glass` (test.xml:3) coincides with `lace` (test.xml:2), which comes first in the file and hides it "
+		"where they overlap; where two media touch, use one surface with the int_ior and ext_ior of both",
+		"`net` (test.xml:4) coincides with `lace` (test.xml:2), which refracts or scatters and hides it "
+		"where they overlap",
+		true);
 	/* Of two lamps back to back only one exists, which emits towards its own side; a lamp that is there twice
 	 * loses no light. */
-	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
-		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
-	       "</shape>\n",
-	       "`back` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
-	       "where they overlap; light to the other side is lost: for a lamp with two sides use two surfaces, "
-	       "slightly apart",
-	       NULL, true);
-	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
-		       SHINES "</shape>\n",
-	       "`twin` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
-	       "where they overlap",
-	       NULL, true);
+	expect_notes(
+		VIEW LAMP "<shape type='rectangle' id='back'>" AT(
+			"<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
+		"</shape>\n",
+		"`back` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
+		"where they overlap; light to the other side is lost: for a lamp with two sides use two surfaces, "
+		"slightly apart",
+		NULL, true);
+	expect_notes(
+		VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
+			SHINES "</shape>\n",
+		"`twin` (test.xml:3) coincides with `lamp` (test.xml:2), which comes first in the file and hides it "
+		"where they overlap",
+		NULL, true);
 	/* A block on a floor hides the coinciding part of the floor, so there is no note; a picture in the plane of a
 	 * wall is visible, so there is one. */
-	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
-	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
-	       "the rectangle in test.xml:3 coincides with `floor` (test.xml:2), which comes first in the file and "
-	       "hides it where they overlap",
-	       NULL, true);
+	expect_notes(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
+	expect_notes(
+		VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
+		"the rectangle in test.xml:3 coincides with `floor` (test.xml:2), which comes first in the file and "
+		"hides it where they overlap",
+		NULL, true);
 }
 
 /* The ratio of sizes from which on double precision does not suffice for both shapes. */
-static void test_scales(void **state)
+static void test_extreme_size_ratios_are_noted(void **state)
 {
 	(void)state;
 	for (int far = 0; far < 2; far++) {
@@ -125,7 +132,7 @@ static void test_scales(void **state)
 }
 
 /* Of many pairs, only a few are named; a last note counts the rest. */
-static void test_many(void **state)
+static void test_only_a_few_of_many_pairs_are_named(void **state)
 {
 	(void)state;
 	char text[8192] = VIEW FLOOR(GREY), note[512];
@@ -156,7 +163,8 @@ static void test_many(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_scales),
-					   cmocka_unit_test(test_many)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_coincident_shapes_are_noted),
+					   cmocka_unit_test(test_extreme_size_ratios_are_noted),
+					   cmocka_unit_test(test_only_a_few_of_many_pairs_are_named)};
 	return cmocka_run_group_tests_name("what is said of coinciding surfaces", tests, NULL, NULL);
 }

@@ -28,7 +28,7 @@
 	"<texture type='bitmap' name='" name "'><string name='filename' value='p0'/>" \
 	"<boolean name='raw' value='true'/><string name='filter_type' value='nearest'/></texture>"
 
-static void compare(const char *test, uint32_t samples, const char *cut, const char *halves)
+static void compare_images(const char *test, uint32_t samples, const char *cut, const char *halves)
 {
 	static struct agreement_image image[2];
 	const char *body[2] = {cut, halves};
@@ -51,44 +51,46 @@ static void compare(const char *test, uint32_t samples, const char *cut, const c
 	pictures_fini(&p);
 }
 
-static void test_mask(void **state)
+static void test_mask_equals_halves(void **state)
 {
 	(void)state;
-	compare("mask", 1024,
-		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") DIFFUSE("0.8") "</bsdf></shape>",
-		HALF("0.5", DIFFUSE("0.8")));
+	compare_images("mask", 1024,
+		       "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") DIFFUSE("0.8") "</bsdf></shape>",
+		       HALF("0.5", DIFFUSE("0.8")));
 }
 
 /* A leaf lit from behind: light passes through its material, and through the part that is cut off. */
-static void test_mask_over_what_transmits(void **state)
+static void test_mask_over_a_translucent_leaf_equals_halves(void **state)
 {
 	(void)state;
 #define LEAF "<bsdf type='difftrans'><rgb name='transmittance' value='0.7'/></bsdf>"
-	compare("leaf", 1024, "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") LEAF "</bsdf></shape>",
-		HALF("0.5", LEAF));
+	compare_images("leaf", 1024,
+		       "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") LEAF "</bsdf></shape>",
+		       HALF("0.5", LEAF));
 }
 
 /* Smooth and frosted glass with one half cut off: refraction and straight transmission must stay separate. */
-static void test_mask_over_glass(void **state)
+static void test_mask_over_glass_equals_halves(void **state)
 {
 	(void)state;
 #define PANE(type) "<bsdf type='" type "'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/></bsdf>"
-	compare("glass", 1408,
-		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") PANE("dielectric") "</bsdf></shape>",
-		HALF("0.5", PANE("dielectric")));
-	compare("frosted", 2048,
-		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity")
-			PANE("roughdielectric") "</bsdf></shape>",
-		HALF("0.5", PANE("roughdielectric")));
+	compare_images("glass", 1408,
+		       "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity")
+			       PANE("dielectric") "</bsdf></shape>",
+		       HALF("0.5", PANE("dielectric")));
+	compare_images("frosted", 2048,
+		       "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity")
+			       PANE("roughdielectric") "</bsdf></shape>",
+		       HALF("0.5", PANE("roughdielectric")));
 }
 
-static void test_blend(void **state)
+static void test_blend_equals_halves(void **state)
 {
 	(void)state;
-	compare("blend", 1024,
-		"<shape type='rectangle'><bsdf type='blendbsdf'>" PICTURE("weight") DIFFUSE("0.8")
-			DIFFUSE("0.3") "</bsdf></shape>",
-		HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
+	compare_images("blend", 1024,
+		       "<shape type='rectangle'><bsdf type='blendbsdf'>" PICTURE("weight") DIFFUSE("0.8")
+			       DIFFUSE("0.3") "</bsdf></shape>",
+		       HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
 }
 
 /* Panes with a normal that faces away from the camera, and with one that faces it. */
@@ -98,7 +100,7 @@ static void test_blend(void **state)
 	"<boolean name='flip_invalid_normals' value='false'/>" DIFFUSE("0.8") "</bsdf></bsdf></bsdf></shape>"
 
 /* Light passes through a hole whatever the normal at that point. */
-static void test_bent_hole(void **state)
+static void test_holes_transmit_whatever_the_normal(void **state)
 {
 	(void)state;
 	static const char *const bodies[] = {BENT("0", "0.03"), BENT("0", "0.97")};
@@ -118,7 +120,7 @@ static void test_bent_hole(void **state)
 }
 
 /* A lamp seen through panes that transmit half of the light, with normals that face the camera or do not. */
-static void test_bent_panes(void **state)
+static void test_tilted_panes_transmit_their_share(void **state)
 {
 	(void)state;
 	static struct agreement_image path, bdpt, hslt;
@@ -148,11 +150,11 @@ static void test_bent_panes(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask),
-					   cmocka_unit_test(test_mask_over_what_transmits),
-					   cmocka_unit_test(test_mask_over_glass),
-					   cmocka_unit_test(test_blend),
-					   cmocka_unit_test(test_bent_hole),
-					   cmocka_unit_test(test_bent_panes)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask_equals_halves),
+					   cmocka_unit_test(test_mask_over_a_translucent_leaf_equals_halves),
+					   cmocka_unit_test(test_mask_over_glass_equals_halves),
+					   cmocka_unit_test(test_blend_equals_halves),
+					   cmocka_unit_test(test_holes_transmit_whatever_the_normal),
+					   cmocka_unit_test(test_tilted_panes_transmit_their_share)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@
 
 enum { SIDE = 16 };
 
-static const char old[] =
+static const char old_scene[] =
 	"<scene version='0.6.0'><integrator type='path'><integer name='maxDepth' value='5'/></integrator>"
 	"<sensor type='thinlens'><float name='fov' value='45'/><string name='fovAxis' value='y'/>"
 	"<float name='apertureRadius' value='0.05'/><float name='focusDistance' value='5'/>"
@@ -48,7 +48,7 @@ static const char old[] =
 	"<shape type='disk'><transform name='toWorld'><rotate x='1' angle='90'/><translate y='3'/></transform>"
 	"<emitter type='area'><spectrum name='radiance' value='5,4,3'/></emitter></shape></scene>";
 
-static const char new[] =
+static const char new_scene[] =
 	"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='5'/></integrator>"
 	"<sensor type='thinlens'><float name='fov' value='45'/><string name='fov_axis' value='y'/>"
 	"<float name='aperture_radius' value='0.05'/><float name='focus_distance' value='5'/>"
@@ -90,14 +90,14 @@ static void render(const char *xml, struct pictures *p, struct picture *out)
 	world_free(w);
 }
 
-static void test_twins(void **state)
+static void test_both_dialects_render_alike(void **state)
 {
 	(void)state;
 	struct pictures p = {.count = 0};
 	struct picture a, b;
 	pictures_add(&p, 2, 1, (const double[]){0.75, 0.25, 0.125, 0.125, 0.25, 0.75});
-	render(old, &p, &a);
-	render(new, &p, &b);
+	render(old_scene, &p, &a);
+	render(new_scene, &p, &b);
 	double sum = 0;
 	for (size_t i = 0; i < (size_t)SIDE * SIDE; i++)
 		for (int k = 0; k < 3; k++) {
@@ -114,7 +114,7 @@ static void test_twins(void **state)
 
 /* <spectrum value="2"> as a light is 2 at each wavelength in 3.x, where Mitsuba documents its colour as purple-ish,
  * and rgb 2 in 0.6; as a reflectance it is the same in both. */
-static void test_number_as_spectrum(void **state)
+static void test_number_as_spectrum_follows_the_dialect(void **state)
 {
 	(void)state;
 	static const char sky[] = "<scene version='%s'><integrator type='path'/><sensor type='perspective'>"
@@ -155,7 +155,7 @@ static void test_number_as_spectrum(void **state)
 
 /* Shapes without a BSDF are grey, on both sides in tests; in 0.6 shapes that bound a medium let light through, unless
  * they emit light. */
-static void test_boundaries_of_media(void **state)
+static void test_media_boundaries_follow_the_dialect(void **state)
 {
 	(void)state;
 #define MEDIUM(side) "<medium name='" side "' type='homogeneous'/>"
@@ -183,7 +183,8 @@ static void test_boundaries_of_media(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins), cmocka_unit_test(test_number_as_spectrum),
-					   cmocka_unit_test(test_boundaries_of_media)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_both_dialects_render_alike),
+					   cmocka_unit_test(test_number_as_spectrum_follows_the_dialect),
+					   cmocka_unit_test(test_media_boundaries_follow_the_dialect)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -40,7 +40,7 @@
 #define SKY "<emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
 /* clang-format on */
 
-static struct world *world_by(const char *choice, const char *shapes)
+static struct world *world_with_choice(const char *choice, const char *shapes)
 {
 	worlds_accuracy = choice;
 	struct world *w = world_from_text(64, 64, "%s%s", SENSOR("0,5,6", "0,0,0"), shapes);
@@ -53,20 +53,22 @@ static vec3 in_world(const struct world *w, double x, double y, double z)
 	return vec3_scale(w->scale, vec3_sub((vec3){x, y, z}, w->center));
 }
 
-static void find(const struct world *w, uint32_t most, struct arena *arena, struct emitter_points *out)
+static void find_emitter_points(const struct world *w, uint32_t max_points, struct arena *arena,
+				struct emitter_points *out)
 {
-	assert_int_equal(emitter_points_find(w, most, arena, out), 0);
+	assert_int_equal(emitter_points_find(w, max_points, arena, out), 0);
 }
 
 /* Lights of intensities I = 1 and 3 contribute I (0.1 + 0.9 cos) / d^2 to a point on the floor. */
-static void test_shares_of_point_lights(void **state)
+static void test_point_lights_are_chosen_by_contribution(void **state)
 {
 	(void)state;
-	struct world *w = world_by(NULL, FLOOR POINT_LIGHT("1", "2", "0", "1") POINT_LIGHT("-2", "1", "1", "3"));
+	struct world *w =
+		world_with_choice(NULL, FLOOR POINT_LIGHT("1", "2", "0", "1") POINT_LIGHT("-2", "1", "1", "3"));
 	const vec3 at[2] = {in_world(w, 1, 2, 0), in_world(w, -2, 1, 1)};
 	struct arena arena = {0};
 	struct emitter_points points;
-	find(w, 300, &arena, &points);
+	find_emitter_points(w, 300, &arena, &points);
 	assert_int_equal(points.count, 300);
 	for (uint32_t i = 0; i < points.count; i++) {
 		double brought[2];
@@ -86,11 +88,11 @@ static void test_shares_of_point_lights(void **state)
 
 static double share_of_second(const char *shapes)
 {
-	struct world *w = world_by(NULL, shapes);
+	struct world *w = world_with_choice(NULL, shapes);
 	struct arena arena = {0};
 	struct emitter_points points;
 	double sum = 0;
-	find(w, 300, &arena, &points);
+	find_emitter_points(w, 300, &arena, &points);
 	assert_true(points.count >= 250);
 	for (uint32_t i = 0; i < points.count; i++)
 		sum += (double)points.shares[emitter_part_count(w) * i + 1] / points.count;
@@ -101,7 +103,7 @@ static double share_of_second(const char *shapes)
 
 /* Light passes through glass and not through an opaque ball; a light enclosed by the opaque ball contributes nothing.
  */
-static void test_obstacles(void **state)
+static void test_occluded_lights_are_not_chosen(void **state)
 {
 	(void)state;
 #define TWO POINT_LIGHT("1", "2", "0", "1") POINT_LIGHT("-2", "2", "1", "1")
@@ -115,7 +117,7 @@ static void test_obstacles(void **state)
 
 /* Two closed rooms with a lamp each, and a camera in one of them: only the lamp of this room is chosen, however much
  * stronger the other is. */
-static void test_rooms(void **state)
+static void test_only_lamps_of_the_room_are_chosen(void **state)
 {
 	(void)state;
 	worlds_accuracy = NULL;
@@ -140,24 +142,24 @@ static void test_rooms(void **state)
 }
 
 /* A single emitter that is not divided into parts needs no choice. */
-static void test_without(void **state)
+static void test_single_emitter_needs_no_choice(void **state)
 {
 	(void)state;
-	struct world *w = world_by(NULL, FLOOR LAMP("0", "2", "0", "0.2", "1"));
+	struct world *w = world_with_choice(NULL, FLOOR LAMP("0", "2", "0", "0.2", "1"));
 	assert_null(w->emitter_choice);
 	world_free(w);
-	w = world_by("emitter-choice=power", FLOOR LAMP("0", "2", "0", "0.2", "1") SKY);
+	w = world_with_choice("emitter-choice=power", FLOOR LAMP("0", "2", "0", "0.2", "1") SKY);
 	assert_null(w->emitter_choice);
 	assert_true(fabs(w->emitter_pdf[0] - w->emitters[0].power / (w->emitters[0].power + w->emitters[1].power)) <
 		    1e-12);
 	world_free(w);
 	/* No light reaches any surface in a straight line. */
-	w = world_by(NULL, FLOOR POINT_LIGHT("1", "-2", "0", "1") POINT_LIGHT("-2", "-2", "1", "1"));
+	w = world_with_choice(NULL, FLOOR POINT_LIGHT("1", "-2", "0", "1") POINT_LIGHT("-2", "-2", "1", "1"));
 	assert_null(w->emitter_choice);
 	world_free(w);
 }
 
-static int by_value(const void *a, const void *b)
+static int compare_values(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
 	return (x > y) - (x < y);
@@ -165,21 +167,22 @@ static int by_value(const void *a, const void *b)
 
 /* Each cell has points: those of a floor do not all lie on one side of a split along its height. Nothing is in
  * shadow, so the probabilities differ between any two cells. */
-static void test_cells(void **state)
+static void test_every_cell_has_points(void **state)
 {
 	(void)state;
-	enum { MOST = 64 * 64, CELLS = MOST / 16 };
-	struct world *w = world_by(NULL, FLOOR WALL POINT_LIGHT("1", "4", "0", "1") POINT_LIGHT("-2", "3", "1", "3"));
+	enum { POINTS_MAX = 64 * 64, CELLS = POINTS_MAX / 16 };
+	struct world *w =
+		world_with_choice(NULL, FLOOR WALL POINT_LIGHT("1", "4", "0", "1") POINT_LIGHT("-2", "3", "1", "3"));
 	struct arena arena = {0};
 	struct emitter_points points;
-	static double chance[MOST];
+	static double chance[POINTS_MAX];
 	unsigned cells = 1;
-	find(w, MOST, &arena, &points);
-	assert_int_equal(points.count, MOST);
-	for (uint32_t i = 0; i < MOST; i++)
+	find_emitter_points(w, POINTS_MAX, &arena, &points);
+	assert_int_equal(points.count, POINTS_MAX);
+	for (uint32_t i = 0; i < POINTS_MAX; i++)
 		chance[i] = emitter_choice_density_ratio(w, points.nodes[i].p, 0, &w->emitters[0], NULL);
-	qsort(chance, MOST, sizeof *chance, by_value);
-	for (uint32_t i = 1; i < MOST; i++)
+	qsort(chance, POINTS_MAX, sizeof *chance, compare_values);
+	for (uint32_t i = 1; i < POINTS_MAX; i++)
 		cells += chance[i] > chance[i - 1];
 	assert_int_equal(cells, CELLS);
 	arena_fini(&arena);
@@ -187,14 +190,14 @@ static void test_cells(void **state)
 }
 
 /* Emitters that are switched off keep their place in the list and are never chosen. */
-static void test_switched_off(void **state)
+static void test_switched_off_emitters_are_never_chosen(void **state)
 {
 	(void)state;
 	static const char *const off[] = {"-area-light", "-delta-light", "-environment"};
 	const char *lights = FLOOR LAMP("2", "1", "0", "0.2", "9") POINT_LIGHT("0", "3", "-2", "1") SKY;
 	for (int32_t which = 0; which < 3; which++) {
 		worlds_effects = off[which];
-		struct world *w = world_by(NULL, lights);
+		struct world *w = world_with_choice(NULL, lights);
 		worlds_effects = NULL;
 		assert_non_null(w->emitter_choice);
 		assert_true(w->emitter_pdf[which] == 0);
@@ -211,11 +214,12 @@ static void test_switched_off(void **state)
 /* At positions within the scene and far from it, emitters are drawn as often as their densities say. For an emitter
  * that is not divided, emitter_choice_density_ratio() is its probability; for the environment, its mean over uniformly
  * drawn points is. 100,000 draws find an error of 2 % in a probability. */
-static void test_densities(void **state)
+static void test_emitters_are_drawn_by_their_density(void **state)
 {
 	(void)state;
-	struct world *w = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") LAMP("-2", "0.6", "1", "0.1", "20")
-						 POINT_LIGHT("0", "3", "-2", "1") SKY);
+	struct world *w =
+		world_with_choice(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") LAMP("-2", "0.6", "1", "0.1", "20")
+						POINT_LIGHT("0", "3", "-2", "1") SKY);
 	struct dice dice = dice_for_test("densities of choices");
 	const vec3 places[] = {in_world(w, 2, 0, 0.3), in_world(w, -1, 0, 1), in_world(w, 30, 20, -70)};
 	assert_non_null(w->emitter_choice);
@@ -251,7 +255,7 @@ static void test_densities(void **state)
 }
 
 /* Lights of extreme power, size and position: no invalid operation, and all densities are finite. */
-static void test_extremes(void **state)
+static void test_extreme_lights_have_finite_densities(void **state)
 {
 	(void)state;
 #define FOG                                                                                                   \
@@ -273,8 +277,8 @@ static void test_extremes(void **state)
 		struct arena arena = {0};
 		struct emitter_points points;
 		feclearexcept(FE_INVALID);
-		struct world *w = world_by("media=shown", scenes[k]);
-		find(w, 600, &arena, &points);
+		struct world *w = world_with_choice("media=shown", scenes[k]);
+		find_emitter_points(w, 600, &arena, &points);
 		for (uint32_t i = 0; i < points.count; i++) {
 			double sum = 0;
 			for (uint32_t e = 0; e < emitter_part_count(w); e++)
@@ -295,11 +299,11 @@ static void test_extremes(void **state)
 	}
 }
 
-static void test_the_same_twice(void **state)
+static void test_choice_is_reproducible(void **state)
 {
 	(void)state;
-	struct world *a = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY),
-		     *b = world_by(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY);
+	struct world *a = world_with_choice(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY),
+		     *b = world_with_choice(NULL, FLOOR LAMP("2", "1", "0", "0.2", "9") SKY);
 	struct dice dice = dice_for_test("the same twice");
 	for (int i = 0; i < 1000; i++) {
 		const double u[3] = {dice_uniform(&dice), dice_uniform(&dice), dice_uniform(&dice)};
@@ -314,12 +318,13 @@ static void test_the_same_twice(void **state)
 }
 
 /* The image does not depend on the choice of emitters; level and power as in tests/support/agreement.h. */
-static void test_the_same_image(void **state)
+static void test_image_does_not_depend_on_the_choice(void **state)
 {
 	(void)state;
 #define LIGHTS \
 	FLOOR LAMP("2", "1", "0", "0.5", "2") LAMP("-2", "1.5", "1", "0.4", "3") POINT_LIGHT("0", "3", "-2", "3") SKY
-	struct world *place = world_by(NULL, LIGHTS), *power = world_by("emitter-choice=power", LIGHTS);
+	struct world *place = world_with_choice(NULL, LIGHTS),
+		     *power = world_with_choice("emitter-choice=power", LIGHTS);
 	const struct agreement_options path = {.integrator = "path", .spp = dice_scaled_count(256), .groups = 16},
 				       bdpt = {.integrator = "bdpt", .spp = dice_scaled_count(128), .groups = 16};
 	static struct agreement_image a, b, c;
@@ -335,16 +340,16 @@ static void test_the_same_image(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_shares_of_point_lights),
-		cmocka_unit_test(test_obstacles),
-		cmocka_unit_test(test_rooms),
-		cmocka_unit_test(test_without),
-		cmocka_unit_test(test_cells),
-		cmocka_unit_test(test_switched_off),
-		cmocka_unit_test(test_densities),
-		cmocka_unit_test(test_extremes),
-		cmocka_unit_test(test_the_same_twice),
-		cmocka_unit_test(test_the_same_image),
+		cmocka_unit_test(test_point_lights_are_chosen_by_contribution),
+		cmocka_unit_test(test_occluded_lights_are_not_chosen),
+		cmocka_unit_test(test_only_lamps_of_the_room_are_chosen),
+		cmocka_unit_test(test_single_emitter_needs_no_choice),
+		cmocka_unit_test(test_every_cell_has_points),
+		cmocka_unit_test(test_switched_off_emitters_are_never_chosen),
+		cmocka_unit_test(test_emitters_are_drawn_by_their_density),
+		cmocka_unit_test(test_extreme_lights_have_finite_densities),
+		cmocka_unit_test(test_choice_is_reproducible),
+		cmocka_unit_test(test_image_does_not_depend_on_the_choice),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

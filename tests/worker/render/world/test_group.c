@@ -40,7 +40,7 @@ static void assert_same_shape(const struct geom_shape *a, const struct geom_shap
 			assert_int_equal(a->index[i][k], b->index[i][k]);
 }
 
-static void test_copies(void **state)
+static void test_groups_are_copied_with_their_transforms(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -81,7 +81,7 @@ static void test_copies(void **state)
 	world_free(b);
 }
 
-static int check(const char *inside, const char *accuracy, struct render_summary *out, struct error *e)
+static int check_scene(const char *inside, const char *accuracy, struct render_summary *out, struct error *e)
 {
 	static char xml[16384];
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", inside);
@@ -92,23 +92,23 @@ static int check(const char *inside, const char *accuracy, struct render_summary
 	snprintf(o.accuracy, sizeof o.accuracy, "%s", accuracy);
 	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, e);
 	if (!rc) {
-		rc = render_check(&s, &assets, &o, out, e);
+		rc = world_check(&s, &assets, &o, out, e);
 		scene_fini(&s);
 	}
 	return rc;
 }
 
-static void refuses(const char *inside, const char *accuracy, const char *text)
+static void expect_refused(const char *inside, const char *accuracy, const char *text)
 {
 	static struct render_summary summary;
 	struct error e = {""};
-	if (check(inside, accuracy, &summary, &e) >= 0 || !strstr(e.text, text))
+	if (check_scene(inside, accuracy, &summary, &e) >= 0 || !strstr(e.text, text))
 		fail_msg("%s\n gave: %s\n not: %s", inside, e.text, text);
 }
 
 /* A mesh without area is left out together with its material and its light; of a partly degenerate mesh, the
  * triangles with an area remain. Both are counted. */
-static void test_flat(void **state)
+static void test_shapes_without_area_are_left_out(void **state)
 {
 	(void)state;
 	static const char *const meshes[] = {"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 1 2\nf 1 2 1\n",
@@ -135,13 +135,13 @@ static void test_flat(void **state)
 }
 
 /* Mitsuba 0.6 reads the materials in the file of a mesh whose shape has no BSDF; a note tells users of such files. */
-static void test_materials_of_files(void **state)
+static void test_materials_in_mesh_files_are_noted(void **state)
 {
 	(void)state;
 	static const char mesh[] = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl red\nf 1 2 3\n";
 	static const struct {
 		const char *version, *inside;
-		bool said;
+		bool is_noted;
 	} cases[] = {{"0.6.0", "", true},
 		     {"0.6.0", "<bsdf type='diffuse'/>", false},
 		     {"0.6.0", "<boolean name='loadMaterials' value='false'/>", false},
@@ -159,23 +159,23 @@ static void test_materials_of_files(void **state)
 		struct world *w = world_from_files(8, 8, files);
 		const char *said =
 			strstr(w->notes.unread_materials, "of 1 mesh without a bsdf (first: the obj in scene.xml:2)");
-		assert_true(cases[i].said ? said != NULL : !*w->notes.unread_materials);
+		assert_true(cases[i].is_noted ? said != NULL : !*w->notes.unread_materials);
 		world_free(w);
 	}
 }
 
-static void test_refused(void **state)
+static void test_invalid_groups_are_refused(void **state)
 {
 	(void)state;
 #define GROUP(id, inner) "<shape type='shapegroup' id='" id "'>" inner "</shape>"
 #define INSTANCE(id) "<shape type='instance'><ref id='" id "'/></shape>"
-	refuses(VIEW "<shape type='instance'/>", "", "needs exactly one shapegroup");
-	refuses(VIEW "<shape type='instance'><shape type='cube'/></shape>", "", "needs exactly one shapegroup");
-	refuses(VIEW GROUP("a", "<shape type='cube'/>") GROUP("b", INSTANCE("a")) INSTANCE("b"), "",
-		"an instance in a shapegroup is not supported");
-	refuses(VIEW "<shape type='merge'>" GROUP("a", "") "</shape>", "",
-		"a shapegroup may stand directly in <scene>");
-	refuses(VIEW "<shape type='merge' id='m'><ref id='m'/></shape>", "", "refers to itself");
+	expect_refused(VIEW "<shape type='instance'/>", "", "needs exactly one shapegroup");
+	expect_refused(VIEW "<shape type='instance'><shape type='cube'/></shape>", "", "needs exactly one shapegroup");
+	expect_refused(VIEW GROUP("a", "<shape type='cube'/>") GROUP("b", INSTANCE("a")) INSTANCE("b"), "",
+		       "an instance in a shapegroup is not supported");
+	expect_refused(VIEW "<shape type='merge'>" GROUP("a", "") "</shape>", "",
+		       "a shapegroup may stand directly in <scene>");
+	expect_refused(VIEW "<shape type='merge' id='m'><ref id='m'/></shape>", "", "refers to itself");
 	/* The nested instances, sixteen of sixteen and so on, are counted before anything is built. */
 	char deep[8192], *at = deep, *end = deep + sizeof deep;
 	at += snprintf(at, (size_t)(end - at), VIEW "<shape type='merge' id='m0'><shape type='cube'/></shape>");
@@ -185,29 +185,29 @@ static void test_refused(void **state)
 			at += snprintf(at, (size_t)(end - at), "<ref id='m%d'/>", level - 1);
 		at += snprintf(at, (size_t)(end - at), "</shape>");
 	}
-	refuses(deep, "", "more than 1048576 shapes");
+	expect_refused(deep, "", "more than 1048576 shapes");
 }
 
 #define ORTHO(inner)                                                                                   \
 	"<sensor type='orthographic'>" inner "<film type='hdrfilm'><integer name='width' value='40'/>" \
 	"<integer name='height' value='20'/><rfilter type='box'/></film></sensor>"
 
-static void test_sensors(void **state)
+static void test_sensors_are_checked(void **state)
 {
 	(void)state;
 	static struct render_summary m;
 	struct error e = {""};
 	const char *two = VIEW ORTHO("") SKY "<shape type='cube'/>";
-	assert_int_equal(check(two, "", &m, &e), 0);
+	assert_int_equal(check_scene(two, "", &m, &e), 0);
 	assert_true(m.settings.width == 32 && !(m.settings.half_width > 0));
-	assert_int_equal(check(two, "sensor=2", &m, &e), 0);
+	assert_int_equal(check_scene(two, "sensor=2", &m, &e), 0);
 	assert_true(m.settings.width == 40 && m.settings.half_width == 1);
-	refuses(two, "sensor=3", "there is no sensor 3: the scene has 2");
-	refuses(ORTHO("<transform name='to_world'><scale x='2' y='3'/></transform>"), "", "only square pixels");
+	expect_refused(two, "sensor=3", "there is no sensor 3: the scene has 2");
+	expect_refused(ORTHO("<transform name='to_world'><scale x='2' y='3'/></transform>"), "", "only square pixels");
 }
 
 /* Positions of scene points on the film: over the width of the film x runs from -s to s, whatever the depth. */
-static void test_orthographic(void **state)
+static void test_orthographic_film_positions_ignore_depth(void **state)
 {
 	(void)state;
 	struct world *w = world_from_text(
@@ -239,12 +239,12 @@ static void test_orthographic(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_copies),
-		cmocka_unit_test(test_flat),
-		cmocka_unit_test(test_materials_of_files),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_sensors),
-		cmocka_unit_test(test_orthographic),
+		cmocka_unit_test(test_groups_are_copied_with_their_transforms),
+		cmocka_unit_test(test_shapes_without_area_are_left_out),
+		cmocka_unit_test(test_materials_in_mesh_files_are_noted),
+		cmocka_unit_test(test_invalid_groups_are_refused),
+		cmocka_unit_test(test_sensors_are_checked),
+		cmocka_unit_test(test_orthographic_film_positions_ignore_depth),
 	};
 	return cmocka_run_group_tests_name("group", tests, NULL, NULL);
 }

@@ -34,38 +34,38 @@
 /* clang-format on */
 
 /* Transforms of instances: a plain one, a stretched and turned one, a mirrored one, and one that combines all. */
-static const char *const places[] = {
+static const char *const instance_transforms[] = {
 	"<translate x='-1.6' y='0.47'/>",
 	"<scale x='0.7' y='1.5' z='1'/><rotate z='1' angle='20'/><translate y='0.9' z='-0.4'/>",
 	"<scale x='-0.8' y='0.8' z='0.8'/><translate x='1.6' y='0.376' z='0.3'/>",
 	"<scale x='0.5' y='0.5' z='-0.3'/><rotate x='1' y='1' angle='75'/><translate x='0.6' y='0.4' z='1.3'/>",
 };
-enum { PLACES = 4 };
+enum { INSTANCE_COUNT = 4 };
 
 /* Writes a pot with a flat foot at y = -0.47, which is no float in its frame: n vertices around, `rows` rows upwards,
  * smooth normals and texture coordinates. */
-static size_t print_pot(char *out, size_t size, int n, int rows)
+static size_t print_pot(char *out, size_t size, int sides, int rows)
 {
 	size_t at = 0;
 	for (int j = 0; j <= rows; j++)
-		for (int i = 0; i <= n; i++) {
-			double a = 2 * M_PI * i / n, h = (double)j / rows, r = 0.5 * (0.6 + 0.4 * sin(3 * h + 0.4)),
+		for (int i = 0; i <= sides; i++) {
+			double a = 2 * M_PI * i / sides, h = (double)j / rows, r = 0.5 * (0.6 + 0.4 * sin(3 * h + 0.4)),
 			       slope = 0.6 * cos(3 * h + 0.4);
-			at += (size_t)snprintf(out + at, size - at,
-					       "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n", r * cos(a),
-					       0.97 * h - 0.47, -r * sin(a), cos(a), -slope, -sin(a), (double)i / n, h);
+			at += (size_t)snprintf(
+				out + at, size - at, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n", r * cos(a),
+				0.97 * h - 0.47, -r * sin(a), cos(a), -slope, -sin(a), (double)i / sides, h);
 		}
 	for (int j = 0; j < rows; j++)
-		for (int i = 1; i <= n; i++) {
-			int a = j * (n + 1) + i, b = a + 1, c = a + n + 1, d = c + 1;
+		for (int i = 1; i <= sides; i++) {
+			int a = j * (sides + 1) + i, b = a + 1, c = a + sides + 1, d = c + 1;
 			at += (size_t)snprintf(out + at, size - at,
 					       "f %d/%d/%d %d/%d/%d %d/%d/%d\nf %d/%d/%d %d/%d/%d %d/%d/%d\n", a, a, a,
 					       b, b, b, d, d, d, a, a, a, d, d, d, c, c, c);
 		}
-	int foot = (rows + 1) * (n + 1) + 1;
+	int foot = (rows + 1) * (sides + 1) + 1;
 	at += (size_t)snprintf(out + at, size - at, "v 0 -0.47 0\nv 0 0.5 0\nvn 0 -1 0\nvn 0 1 0\nvt 0.5 0.5\n");
-	for (int i = 1; i <= n; i++) {
-		int t = rows * (n + 1) + i;
+	for (int i = 1; i <= sides; i++) {
+		int t = rows * (sides + 1) + i;
 		at += (size_t)snprintf(out + at, size - at,
 				       "f %d/%d/%d %d/%d/%d %d/%d/%d\nf %d/%d/%d %d/%d/%d %d/%d/%d\n", foot, foot, foot,
 				       i + 1, i + 1, foot, i, i, foot, foot + 1, foot, foot + 1, t, t, foot + 1, t + 1,
@@ -75,20 +75,20 @@ static size_t print_pot(char *out, size_t size, int n, int rows)
 	return at;
 }
 
-/* `common` precedes the instances, and `inside` is the content of each. shared: all instances refer to one group;
+/* `preamble` precedes the instances, and `inside` is the content of each. shared: all instances refer to one group;
  * otherwise each has its own group, which is used once and therefore built as if it were written out. */
-static struct world *world_of_pots(bool shared, const char *common, const char *inside, int n, int rows)
+static struct world *world_of_pots(bool shared, const char *preamble, const char *inside, int sides, int rows)
 {
 	static char obj[1 << 19], xml[1 << 14];
-	size_t size = print_pot(obj, sizeof obj, n, rows), at = 0;
-	at += (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s", common);
-	for (int k = 0; k < PLACES; k++) {
+	size_t size = print_pot(obj, sizeof obj, sides, rows), at = 0;
+	at += (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s", preamble);
+	for (int k = 0; k < INSTANCE_COUNT; k++) {
 		if (k == 0 || !shared)
 			at += (size_t)snprintf(xml + at, sizeof xml - at,
 					       "<shape type='shapegroup' id='g%d'>%s</shape>", k, inside);
 		at += (size_t)snprintf(xml + at, sizeof xml - at,
 				       "<shape type='instance'><ref id='g%d'/>" TO("%s") "</shape>", shared ? 0 : k,
-				       places[k]);
+				       instance_transforms[k]);
 	}
 	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
 	assert_true(at + 1 < sizeof xml);
@@ -114,13 +114,13 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 	struct dice d = dice_for_test("surfaces of instances");
 	struct world *a = world_of_pots(true, VIEW SKY, shape, 24, 16),
 		     *b = world_of_pots(false, VIEW SKY, shape, 24, 16);
-	assert_int_equal(a->shape_count, PLACES);
-	assert_int_equal(b->shape_count, PLACES);
-	assert_int_equal(a->sharing_shape_count, PLACES);
-	assert_int_equal(a->instance_count, PLACES);
+	assert_int_equal(a->shape_count, INSTANCE_COUNT);
+	assert_int_equal(b->shape_count, INSTANCE_COUNT);
+	assert_int_equal(a->sharing_shape_count, INSTANCE_COUNT);
+	assert_int_equal(a->instance_count, INSTANCE_COUNT);
 	assert_int_equal(a->shared_mesh_count, 1);
 	assert_int_equal(b->sharing_shape_count, 0);
-	for (uint32_t k = 0; k < PLACES; k++) {
+	for (uint32_t k = 0; k < INSTANCE_COUNT; k++) {
 		const struct geom_shape *s = &a->shapes[k], *t = &b->shapes[k];
 		assert_ptr_equal(s->position, a->shapes[0].position);
 		assert_ptr_equal(s->normal, a->shapes[0].normal);
@@ -154,7 +154,7 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 	world_free(b);
 }
 
-static void test_surfaces(void **state)
+static void test_shared_instances_have_the_same_surfaces(void **state)
 {
 	(void)state;
 	compare_surfaces(FILE_OF(GLASS), false, 1e-3);
@@ -164,7 +164,7 @@ static void test_surfaces(void **state)
 }
 
 /* Glass pots stand with their feet on the floor: the same primitives must hide the same others. */
-static void test_coincident(void **state)
+static void test_coincident_surfaces_of_instances_are_hidden(void **state)
 {
 	(void)state;
 	for (int lift = 0; lift < 2; lift++) {
@@ -174,7 +174,7 @@ static void test_coincident(void **state)
 			     : VIEW SKY FLOOR;
 		struct world *a = world_of_pots(true, floor, FILE_OF(GLASS), 24, 16),
 			     *b = world_of_pots(false, floor, FILE_OF(GLASS), 24, 16);
-		assert_int_equal(a->sharing_shape_count, PLACES);
+		assert_int_equal(a->sharing_shape_count, INSTANCE_COUNT);
 		assert_true((a->coincidence != NULL) == !lift && (b->coincidence != NULL) == !lift);
 		if (!lift) {
 			/* The plain instance and a mirrored one coincide with the floor; the others are tilted, or
@@ -192,7 +192,7 @@ static void test_coincident(void **state)
 
 /* Displacement is in scene units: a stretched instance has a mesh of its own, displaced by the same height as the
  * others. */
-static void test_displaced(void **state)
+static void test_stretched_instances_have_their_own_displacement(void **state)
 {
 	(void)state;
 #define DISPLACED                                                                               \
@@ -201,7 +201,7 @@ static void test_displaced(void **state)
 	struct world *a = world_of_pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
 		     *b = world_of_pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
 	assert_int_equal(a->sharing_shape_count, 1); /* only one of the four is merely moved */
-	for (uint32_t k = 0; k < PLACES; k++) {
+	for (uint32_t k = 0; k < INSTANCE_COUNT; k++) {
 		struct surface_point x, y;
 		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &x);
 		surface_on_triangle(&b->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &y);
@@ -212,7 +212,7 @@ static void test_displaced(void **state)
 	world_free(b);
 }
 
-static void test_not_shared(void **state)
+static void test_only_suitable_meshes_are_shared(void **state)
 {
 	(void)state;
 	static const char *const inside[] = {
@@ -223,7 +223,7 @@ static void test_not_shared(void **state)
 	for (size_t i = 0; i < sizeof inside / sizeof *inside; i++) {
 		struct world *w = world_of_pots(true, VIEW SKY, inside[i], 12, 8);
 		assert_int_equal(w->sharing_shape_count, 0);
-		assert_int_equal(w->shape_count, PLACES);
+		assert_int_equal(w->shape_count, INSTANCE_COUNT);
 		world_free(w);
 	}
 	world_check_refused("<shape type='shapegroup' id='g'><shape type='cube'/></shape>\n\n"
@@ -246,7 +246,7 @@ static void test_images(void **state)
 		"</shape>";
 	/* clang-format on */
 	struct world *a = world_of_pots(true, room, inside, 24, 16), *b = world_of_pots(false, room, inside, 24, 16);
-	assert_int_equal(a->sharing_shape_count, 2 * PLACES);
+	assert_int_equal(a->sharing_shape_count, 2 * INSTANCE_COUNT);
 	static struct agreement_image shared, written, chains;
 	agreement_render(a, __func__, "instances", &(struct agreement_options){"path", 640, 32, 0, 0}, &shared);
 	agreement_render(b, __func__, "copies", &(struct agreement_options){"path", 640, 32, 0, 0}, &written);
@@ -260,8 +260,11 @@ static void test_images(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_coincident), cmocka_unit_test(test_displaced),
-		cmocka_unit_test(test_not_shared), cmocka_unit_test(test_images),
+		cmocka_unit_test(test_shared_instances_have_the_same_surfaces),
+		cmocka_unit_test(test_coincident_surfaces_of_instances_are_hidden),
+		cmocka_unit_test(test_stretched_instances_have_their_own_displacement),
+		cmocka_unit_test(test_only_suitable_meshes_are_shared),
+		cmocka_unit_test(test_images),
 	};
 	return cmocka_run_group_tests_name("instance", tests, NULL, NULL);
 }

@@ -28,14 +28,14 @@ static vec3 in_scene(const struct world *w, vec3 p)
 }
 
 /* Tolerance in scene units: vertices are rounded to float in the frame of the world. */
-#define OFF 1e-5
+#define POSITION_TOLERANCE 1e-5
 
 #define SLIDES(type, inside)                                                                          \
 	"<shape type='" type "'><animation name='to_world'><transform time='0'/><transform time='2'>" \
 	"<translate x='4'/></transform></animation>" inside "</shape>"
 #define CUBE SLIDES("cube", "")
 
-static void check_still(const char *shutter, double x)
+static void check_still_position(const char *shutter, double x)
 {
 	struct world *w = world_from_text(32, 32, "%s" SKY CUBE, shutter);
 	assert_false(w->effects.motion);
@@ -47,20 +47,20 @@ static void check_still(const char *shutter, double x)
 		low = fmin(low, at.x);
 		high = fmax(high, at.x);
 	}
-	assert_true(fabs(low - (x - 1)) < OFF && fabs(high - (x + 1)) < OFF);
+	assert_true(fabs(low - (x - 1)) < POSITION_TOLERANCE && fabs(high - (x + 1)) < POSITION_TOLERANCE);
 	world_free(w);
 }
 
 /* Without shutter times in the scene, the shutter opens and closes at 0; a shutter that opens and closes at the same
  * time sees a single position. */
-static void test_still(void **state)
+static void test_equal_shutter_times_see_one_position(void **state)
 {
 	(void)state;
-	check_still(VIEW(""), 0);
-	check_still(VIEW(OPEN("0.5", "0.5")), 1);
-	check_still(VIEW(OPEN("-3", "0")), 0);
-	check_still(VIEW(OPEN("2", "1e30")), 4);
-	check_still(VIEW(OPEN("7", "7")), 4);
+	check_still_position(VIEW(""), 0);
+	check_still_position(VIEW(OPEN("0.5", "0.5")), 1);
+	check_still_position(VIEW(OPEN("-3", "0")), 0);
+	check_still_position(VIEW(OPEN("2", "1e30")), 4);
+	check_still_position(VIEW(OPEN("7", "7")), 4);
 	worlds_effects = "-motion";
 	struct world *w = world_from_text(32, 32, VIEW(OPEN("1", "2")) SKY CUBE);
 	worlds_effects = NULL;
@@ -72,7 +72,7 @@ static void test_still(void **state)
 	world_free(w);
 }
 
-static void refused(const char *body, const char *sentence)
+static void expect_refused(const char *body, const char *sentence)
 {
 	char xml[2048];
 	size_t n = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", body);
@@ -81,7 +81,7 @@ static void refused(const char *body, const char *sentence)
 }
 
 /* A stretched environment map would look as if it were not stretched, so its transform is refused. */
-static void refused_picture(void)
+static void expect_environment_refused(void)
 {
 	static const char xml[] = "<scene version='3.0.0'>" VIEW(OPEN(
 		"0",
@@ -92,48 +92,51 @@ static void refused_picture(void)
 	world_check_files_refused(files, "an environment that moves may only be turned");
 }
 
-static void test_refused(void **state)
+static void test_unsupported_motion_is_refused(void **state)
 {
 	(void)state;
-	refused(VIEW(OPEN("1", "0.5")) CUBE, "shutter_open=1 is after shutter_close=0.5");
-	refused(VIEW(OPEN("0", "nan")) CUBE, "is not a (finite) number");
+	expect_refused(VIEW(OPEN("1", "0.5")) CUBE, "shutter_open=1 is after shutter_close=0.5");
+	expect_refused(VIEW(OPEN("0", "nan")) CUBE, "is not a (finite) number");
 #define ROLL(type, duration)                                     \
 	"<string name='rolling_shutter_type' value='" type "'/>" \
 	"<float name='rolling_shutter_duration' value='" duration "'/>"
-	refused(VIEW(OPEN("0", "1") ROLL("row", "0.5")) CUBE, "(supported: none, top, bottom, left, right)");
-	refused(VIEW(OPEN("0", "1") "<string name='rolling_shutter_type' value='top'/>") CUBE,
-		"a rolling shutter needs a rolling_shutter_duration");
-	refused(VIEW(OPEN("0", "1") ROLL("top", "1.5")) CUBE, "rolling_shutter_duration=1.5 is outside [0, 1]");
-	refused(VIEW(OPEN("0", "1") ROLL("top", "-1")) CUBE, "rolling_shutter_duration=-1 is outside [0, 1]");
-	refused(VIEW(OPEN("0", "0.5") ROLL("top", "0.2")) CUBE,
-		"it moves, and a rolling shutter is only supported if shutter_close is 1 after shutter_open");
-	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
-				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
-		"a sphere that moves may not be stretched in one direction");
-	refused(VIEW(OPEN("0", "1")) "<emitter type='sky'><animation name='to_world'>"
+	expect_refused(VIEW(OPEN("0", "1") ROLL("row", "0.5")) CUBE, "(supported: none, top, bottom, left, right)");
+	expect_refused(VIEW(OPEN("0", "1") "<string name='rolling_shutter_type' value='top'/>") CUBE,
+		       "a rolling shutter needs a rolling_shutter_duration");
+	expect_refused(VIEW(OPEN("0", "1") ROLL("top", "1.5")) CUBE, "rolling_shutter_duration=1.5 is outside [0, 1]");
+	expect_refused(VIEW(OPEN("0", "1") ROLL("top", "-1")) CUBE, "rolling_shutter_duration=-1 is outside [0, 1]");
+	expect_refused(VIEW(OPEN("0", "0.5") ROLL("top", "0.2")) CUBE,
+		       "it moves, and a rolling shutter is only supported if shutter_close is 1 after shutter_open");
+	expect_refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
+					    "<transform time='1'><scale x='2'/></transform></animation></shape>",
+		       "a sphere that moves may not be stretched in one direction");
+	expect_refused(
+		VIEW(OPEN("0", "1")) "<emitter type='sky'><animation name='to_world'>"
 				     "<transform time='0'/><transform time='1'><rotate x='1' angle='9'/></transform>"
 				     "</animation></emitter>",
 		"motion of this plug-in is not supported");
-	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
-				     "<transform time='1'><scale y='2'/></transform></animation>"
-				     "<emitter type='area'/></shape>",
-		"a sphere that moves may not be stretched in one direction");
-	refused_picture();
-	refused(VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
+	expect_refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
+					    "<transform time='1'><scale y='2'/></transform></animation>"
+					    "<emitter type='area'/></shape>",
+		       "a sphere that moves may not be stretched in one direction");
+	expect_environment_refused();
+	expect_refused(
+		VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><translate x='1e30'/></transform></animation></emitter>",
 		"it moves more than");
-	refused(VIEW(OPEN("0", "1")) "<shape type='cube' id='c'><animation name='to_world'><transform time='0'/>"
-				     "<transform time='1'><translate x='2'/></transform></animation></shape>"
-				     "<shape type='shapegroup' id='g'><ref id='c'/></shape>"
-				     "<shape type='instance'><ref id='g'/></shape>",
-		"motion of a shape in a shapegroup is not supported");
-	refused(VIEW(OPEN(
+	expect_refused(VIEW(OPEN("0", "1")) "<shape type='cube' id='c'><animation name='to_world'><transform time='0'/>"
+					    "<transform time='1'><translate x='2'/></transform></animation></shape>"
+					    "<shape type='shapegroup' id='g'><ref id='c'/></shape>"
+					    "<shape type='instance'><ref id='g'/></shape>",
+		       "motion of a shape in a shapegroup is not supported");
+	expect_refused(
+		VIEW(OPEN(
 			"0",
 			"1")) "<shape type='cube'><animation name='to_world'><transform time='0'/>"
 			      "<transform time='1'><scale value='5e59'/><translate x='9e59'/></transform></animation></shape>",
 		"it moves beyond");
 	/* clang-format off */
-	refused(
+	expect_refused(
 		VIEW(OPEN("0", "1"))
 		"<shape type='cube'>"
 			"<texture name='displacement' type='checkerboard'/>"
@@ -148,7 +151,7 @@ static void test_refused(void **state)
 }
 
 /* The maximum number of keyframes in a file is read quickly, and only those that matter are kept. */
-static void test_many_keyframes(void **state)
+static void test_many_keyframes_are_read_quickly(void **state)
 {
 	(void)state;
 	enum { KEYS = 100000 };
@@ -173,9 +176,9 @@ static void test_many_keyframes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_still),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_many_keyframes),
+		cmocka_unit_test(test_equal_shutter_times_see_one_position),
+		cmocka_unit_test(test_unsupported_motion_is_refused),
+		cmocka_unit_test(test_many_keyframes_are_read_quickly),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,11 +38,11 @@ static const char points_obj[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
 			    "v 0.3 -1 0.1\nv 0.300000001 -1 0.1\nv 0.3 -1.000000001 0.1\nf 1 2 3\n"};
 
 /* Writes a .serialized file of version 4 with the given number of vertices and no triangles; returns its size. */
-static size_t faceless_serialized(unsigned char *file, size_t room, unsigned vertices)
+static size_t write_faceless_serialized(unsigned char *file, size_t capacity, unsigned vertices)
 {
 	unsigned char raw[64] = {0x00, 0x10, 0, 0, 'm', 0};
 	raw[6] = (unsigned char)vertices;
-	unsigned long size = room - 4;
+	unsigned long size = capacity - 4;
 	assert_int_equal(compress(file + 4, &size, raw, 22 + 12UL * vertices), Z_OK);
 	memcpy(file, (unsigned char[4]){0x1c, 0x04, 4, 0}, 4);
 	memset(file + 4 + size, 0, 12);
@@ -54,7 +54,8 @@ static struct world *world_with(const char *body)
 {
 	static char xml[4096];
 	static unsigned char serialized[2][256];
-	const size_t size[2] = {faceless_serialized(serialized[0], 200, 3), faceless_serialized(serialized[1], 200, 0)};
+	const size_t size[2] = {write_faceless_serialized(serialized[0], 200, 3),
+				write_faceless_serialized(serialized[1], 200, 0)};
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW "%s</scene>", body);
 	const struct memory_file files[] = {{"scene.xml", xml, strlen(xml)},
 					    {"points.obj", points_obj, strlen(points_obj)},
@@ -70,7 +71,7 @@ static struct world *world_with(const char *body)
 	return world_from_files(8, 8, files);
 }
 
-static void test_without_triangles(void **state)
+static void test_meshes_without_triangles_are_left_out(void **state)
 {
 	(void)state;
 	static const char *const alone[] = {
@@ -102,7 +103,7 @@ static void test_without_triangles(void **state)
 }
 
 /* Normals that are not finite are counted, in files of all meshes. */
-static void test_odd_normals(void **state)
+static void test_invalid_normals_are_counted(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'><emitter type='constant'/>" FILE_OF(
@@ -124,7 +125,7 @@ static void test_odd_normals(void **state)
 }
 
 /* The glTF specification forbids such meshes, but some exporters write them: here with 0 indices. */
-static void test_without_triangles_in_gltf(void **state)
+static void test_gltf_meshes_without_triangles_are_left_out(void **state)
 {
 	(void)state;
 	static const char text[] =
@@ -145,7 +146,7 @@ static void test_without_triangles_in_gltf(void **state)
 }
 
 /* Three shapes, and four that are too small for a world that contains the former: the four are left out. */
-static void test_too_small(void **state)
+static void test_too_small_shapes_are_left_out(void **state)
 {
 	(void)state;
 	struct world *w =
@@ -176,7 +177,7 @@ static void test_too_small(void **state)
 
 /* Shapes flattened by their transform are left out with `lenient` only; the remaining shapes of a group and its
  * instances are kept. */
-static void test_flattened(void **state)
+static void test_flattened_shapes_are_left_out_if_lenient(void **state)
 {
 	(void)state;
 #define FLAT "<transform name='to_world'><scale x='0'/></transform>"
@@ -208,39 +209,39 @@ static void test_flattened(void **state)
 	scene_fini(&s);
 }
 
-static void test_no_meshes(void **state)
+static void test_files_without_meshes_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *type, *text, *why;
-	} of[] = {
+	} cases[] = {
 		{"obj", "", "has no vertices and no faces"},
 		{"obj", "<html>not found</html>\n", "has no vertices and no faces"},
 		{"ply", PLY_HEAD PLY_VERTICES "element tristrips 1\nproperty list int int vertex_indices\nend_header\n",
 		 "has no faces with vertex_indices"},
 		{"ply", PLY_HEAD PLY_FACES("0") "end_header\n", "has no vertices with x, y and z"},
 	};
-	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[1024];
 		snprintf(xml, sizeof xml,
 			 "<scene version='3.0.0'>" VIEW "<shape type='%s'><string name='filename' value='m'/>"
 			 "</shape></scene>",
-			 of[i].type);
+			 cases[i].type);
 		const struct memory_file files[] = {
-			{"scene.xml", xml, strlen(xml)}, {"m", of[i].text, strlen(of[i].text)}, {NULL, NULL, 0}};
-		world_check_files_refused(files, of[i].why);
+			{"scene.xml", xml, strlen(xml)}, {"m", cases[i].text, strlen(cases[i].text)}, {NULL, NULL, 0}};
+		world_check_files_refused(files, cases[i].why);
 	}
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_odd_normals),
-		cmocka_unit_test(test_without_triangles),
-		cmocka_unit_test(test_without_triangles_in_gltf),
-		cmocka_unit_test(test_too_small),
-		cmocka_unit_test(test_flattened),
-		cmocka_unit_test(test_no_meshes),
+		cmocka_unit_test(test_invalid_normals_are_counted),
+		cmocka_unit_test(test_meshes_without_triangles_are_left_out),
+		cmocka_unit_test(test_gltf_meshes_without_triangles_are_left_out),
+		cmocka_unit_test(test_too_small_shapes_are_left_out),
+		cmocka_unit_test(test_flattened_shapes_are_left_out_if_lenient),
+		cmocka_unit_test(test_files_without_meshes_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@ enum { SIDE = 4, SPP = 64 };
 #define INSIDE(integrator) "<integrator type='" integrator "'/>"
 
 /* Returns the mean luminance of the image. */
-static double brightness(const char *accuracy, const char *integrator)
+static double mean_luminance(const char *accuracy, const char *integrator)
 {
 	worlds_accuracy = accuracy;
 	struct world *w = world_from_text(
@@ -33,12 +33,12 @@ static double brightness(const char *accuracy, const char *integrator)
 	return leases_mean_luminance(w, SIDE, SPP, 8);
 }
 
-static void test_who_leaves_media_out(void **state)
+static void test_media_are_left_out_by_setting_and_integrator(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *accuracy, *integrator;
-		bool clear;
+		bool is_clear;
 	} cases[] = {
 		{"media=auto", INSIDE("path"), true},
 		{"media=auto", INSIDE("prb"), true},
@@ -57,8 +57,8 @@ static void test_who_leaves_media_out(void **state)
 		{"media=none", "", true},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		double y = brightness(cases[i].accuracy, cases[i].integrator);
-		if (cases[i].clear ? !(y > 0.9 && y < 1.1) : !(y < 0.1))
+		double y = mean_luminance(cases[i].accuracy, cases[i].integrator);
+		if (cases[i].is_clear ? !(y > 0.9 && y < 1.1) : !(y < 0.1))
 			fail_msg("%s with %s: %g", cases[i].accuracy, cases[i].integrator, y);
 	}
 }
@@ -74,7 +74,7 @@ static bool is_noted(const struct world *w)
 	return noted;
 }
 
-static void test_what_hides_the_sky(void **state)
+static void test_media_that_hide_the_sky_are_noted(void **state)
 {
 	(void)state;
 	static const char camera[] = "<sensor type='perspective'><ref name='medium' id='smoke'/></sensor>",
@@ -109,8 +109,8 @@ static void test_what_hides_the_sky(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_who_leaves_media_out),
-		cmocka_unit_test(test_what_hides_the_sky),
+		cmocka_unit_test(test_media_are_left_out_by_setting_and_integrator),
+		cmocka_unit_test(test_media_that_hide_the_sky_are_noted),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

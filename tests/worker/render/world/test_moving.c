@@ -34,42 +34,42 @@ static const char ball_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv
 			       "f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6\n";
 
 /* The motion of a shape: its scale, rotation and position change at constant rates. */
-struct course {
+struct shape_motion {
 	const char *axis;
-	double turn[2]; /* degrees */
-	double scale[2], at[2][3];
+	double angle[2]; /* degrees */
+	double scale[2], position[2][3];
 };
-static const struct course courses[] = {
+static const struct shape_motion motions[] = {
 	{"x='0' y='1' z='0'", {10, 150}, {0.5, 0.8}, {{-2, 0, 0}, {-1, 1, 0.5}}},
 	{"x='1' y='1' z='0.5'", {0, 90}, {0.6, 0.6}, {{1, 1, 0}, {1, 1, 0}}},
 	{"x='0.3' y='0' z='1'", {-40, 60}, {0.7, 0.4}, {{2, -1, 1}, {0, -1.5, -1}}},
 	{"x='0' y='0' z='1'", {0, 0}, {0.3, 0.3}, {{0, 0, 2}, {0, 2, 2}}},
 };
-enum { COURSES = sizeof courses / sizeof *courses };
+enum { MOTION_COUNT = sizeof motions / sizeof *motions };
 
-static double at_time(const double v[2], double t)
+static double value_at_time(const double v[2], double t)
 {
 	return (1 - t) * v[0] + t * v[1];
 }
 
-static size_t put_steps(char *out, size_t size, const struct course *c, double t)
+static size_t append_steps(char *out, size_t size, const struct shape_motion *c, double t)
 {
 	double at[3];
 	for (int i = 0; i < 3; i++)
-		at[i] = (1 - t) * c->at[0][i] + t * c->at[1][i];
+		at[i] = (1 - t) * c->position[0][i] + t * c->position[1][i];
 	return (size_t)snprintf(
 		out, size, "<scale value='%.17g'/><rotate %s angle='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/>",
-		at_time(c->scale, t), c->axis, at_time(c->turn, t), at[0], at[1], at[2]);
+		value_at_time(c->scale, t), c->axis, value_at_time(c->angle, t), at[0], at[1], at[2]);
 }
 
 /* Writes the transform of shape k at time t, or its animation if t is negative; returns the length. */
-static size_t put_place(char *out, size_t size, int k, double t)
+static size_t append_transform(char *out, size_t size, int k, double t)
 {
 	size_t at = (size_t)snprintf(out, size, "%s", t < 0 ? "<animation name='to_world'>" : "");
 	for (int i = 0; i < (t < 0 ? 2 : 1); i++) {
 		at += (size_t)snprintf(out + at, size - at,
 				       t < 0 ? "<transform time='%d'>" : "<transform name='to_world'>", i);
-		at += put_steps(out + at, size - at, &courses[k], t < 0 ? i : t);
+		at += append_steps(out + at, size - at, &motions[k], t < 0 ? i : t);
 		at += (size_t)snprintf(out + at, size - at, "</transform>");
 	}
 	return at + (size_t)snprintf(out + at, size - at, "%s", t < 0 ? "</animation>" : "");
@@ -86,9 +86,9 @@ static struct world *world_at(double t)
 		"<shape type='sphere'>" TO(
 			"<translate x='1.5'/>") "</shape></shape><shape type='instance'><ref id='g'/>"};
 	size_t at = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) SKY FLOOR);
-	for (int k = 0; k < COURSES; k++) {
+	for (int k = 0; k < MOTION_COUNT; k++) {
 		at += (size_t)snprintf(xml + at, sizeof xml - at, "%s", begin[k]);
-		at += put_place(xml + at, sizeof xml - at, k, t);
+		at += append_transform(xml + at, sizeof xml - at, k, t);
 		at += (size_t)snprintf(xml + at, sizeof xml - at, "</shape>");
 	}
 	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
@@ -108,13 +108,13 @@ static vec3 in_world(const struct world *w, vec3 p)
 	return vec3_scale(w->scale, vec3_sub(p, w->center));
 }
 
-static void near(vec3 a, vec3 b, double off)
+static void assert_near(vec3 a, vec3 b, double off)
 {
 	if (!(vec3_length(vec3_sub(a, b)) <= off))
 		fail_msg("(%g, %g, %g) is not (%g, %g, %g)", a.x, a.y, a.z, b.x, b.y, b.z);
 }
 
-static struct surface_point point_on(const struct world *w, uint32_t shape, double t, const double u[2])
+static struct surface_point sample_shape_point(const struct world *w, uint32_t shape, double t, const double u[2])
 {
 	const struct geom_shape *s = &w->shapes[shape];
 	struct surface_point x;
@@ -140,27 +140,28 @@ static struct surface_point point_on(const struct world *w, uint32_t shape, doub
 }
 
 /* Tolerance in scene units: vertices are rounded to float in another frame. */
-#define OFF 1e-5
+#define POSITION_TOLERANCE 1e-5
 
 static void check_point(const struct world *moving, const struct world *still, uint32_t shape, double t, struct dice *d)
 {
 	const double u[2] = {dice_uniform(d), dice_uniform(d)};
-	struct surface_point x = point_on(moving, shape, t, u), y = point_on(still, shape, 0, u), z;
+	struct surface_point x = sample_shape_point(moving, shape, t, u), y = sample_shape_point(still, shape, 0, u), z;
 	struct surface_derivatives a, b;
-	near(in_scene(moving, x.p), in_scene(still, y.p), OFF);
-	near(x.ng, y.ng, OFF);
-	near(x.sh.n, y.sh.n, OFF);
+	assert_near(in_scene(moving, x.p), in_scene(still, y.p), POSITION_TOLERANCE);
+	assert_near(x.ng, y.ng, POSITION_TOLERANCE);
+	assert_near(x.sh.n, y.sh.n, POSITION_TOLERANCE);
 	assert_true(x.shape == &moving->shapes[shape] && x.prim.time == t);
-	assert_true(fabs(x.u - y.u) <= OFF && fabs(x.v - y.v) <= OFF);
+	assert_true(fabs(x.u - y.u) <= POSITION_TOLERANCE && fabs(x.v - y.v) <= POSITION_TOLERANCE);
 	surface_compute_derivatives(&moving->shapes[shape], &x, &a);
 	surface_compute_derivatives(&still->shapes[shape], &y, &b);
 	for (int k = 0; k < 2; k++)
-		near(vec3_scale(moving->scale, a.dn[k]), vec3_scale(still->scale, b.dn[k]), 10 * OFF);
+		assert_near(vec3_scale(moving->scale, a.dn[k]), vec3_scale(still->scale, b.dn[k]),
+			    10 * POSITION_TOLERANCE);
 	assert_true(surface_nearest(&moving->shapes[shape], x.prim, x.p, &z));
-	near(x.p, z.p, 1e-12);
+	assert_near(x.p, z.p, 1e-12);
 	const vec3 o = vec3_madd(x.p, 1, x.ng);
 	if (surface_reproject(&moving->shapes[shape], x.prim, prim_none_at(t), o, vec3_neg(x.ng), 1, &z))
-		near(x.p, z.p, 1e-9);
+		assert_near(x.p, z.p, 1e-9);
 }
 
 static void check_ray(const struct world *moving, const struct world *still, double t, struct dice *d)
@@ -184,8 +185,8 @@ static void check_ray(const struct world *moving, const struct world *still, dou
 	assert_true(hit.prim.time == t);
 	surface_from_hit(&moving->shapes[hit.prim.shape], from.p, w, &hit, &x);
 	surface_from_hit(&still->shapes[hit2.prim.shape], from2.p, w, &hit2, &y);
-	near(in_scene(moving, x.p), in_scene(still, y.p), 100 * OFF);
-	near(x.sh.n, y.sh.n, 100 * OFF);
+	assert_near(in_scene(moving, x.p), in_scene(still, y.p), 100 * POSITION_TOLERANCE);
+	assert_near(x.sh.n, y.sh.n, 100 * POSITION_TOLERANCE);
 	/* The next ray starts at the hit and must not meet the same point again. */
 	from = (struct ray_end){x.p, x.ng, x.prim};
 	vec3 away = vec3_scale(vec3_dot(x.ng, w) < 0 ? 1 : -1, x.ng);
@@ -193,7 +194,7 @@ static void check_ray(const struct world *moving, const struct world *still, dou
 		assert_true(hit.t > 1e-9);
 }
 
-static void test_at_a_time(void **state)
+static void test_moving_world_equals_still_ones(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("a world at a time");
@@ -238,7 +239,7 @@ static struct world *camera_world(double t)
 		place);
 }
 
-static void test_camera(void **state)
+static void test_moving_camera_equals_still_ones(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("a camera at a time");
@@ -250,14 +251,14 @@ static void test_camera(void **state)
 		struct world *still = camera_world(t);
 		struct camera room;
 		const struct camera *a = camera_at(&moving->camera, t, &room), *b = &still->camera;
-		near(in_scene(moving, a->position), in_scene(still, b->position), 1e-12);
-		near(a->axes.s, b->axes.s, 1e-12);
-		near(a->axes.t, b->axes.t, 1e-12);
-		near(a->axes.n, b->axes.n, 1e-12);
+		assert_near(in_scene(moving, a->position), in_scene(still, b->position), 1e-12);
+		assert_near(a->axes.s, b->axes.s, 1e-12);
+		assert_near(a->axes.t, b->axes.t, 1e-12);
+		assert_near(a->axes.n, b->axes.n, 1e-12);
 		vec3 p = camera_sample_point(a, u);
-		near(in_scene(moving, p), in_scene(still, camera_sample_point(b, u)), 1e-12);
+		assert_near(in_scene(moving, p), in_scene(still, camera_sample_point(b, u)), 1e-12);
 		vec3 w = camera_direction(a, p, film[0], film[1]);
-		near(w, camera_direction(b, camera_sample_point(b, u), film[0], film[1]), 1e-12);
+		assert_near(w, camera_direction(b, camera_sample_point(b, u), film[0], film[1]), 1e-12);
 		assert_true(camera_project(a, p, w, 1, &x, &y));
 		assert_true(fabs(x - film[0]) < 1e-9 && fabs(y - film[1]) < 1e-9);
 		world_free(still);
@@ -286,7 +287,7 @@ static struct world *lights_at(double t)
 	size_t at = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) FLOOR);
 	for (int k = 0; k < ITEMS; k++) {
 		at += (size_t)snprintf(xml + at, sizeof xml - at, "%s", begin[k]);
-		at += put_place(xml + at, sizeof xml - at, k % COURSES, t);
+		at += append_transform(xml + at, sizeof xml - at, k % MOTION_COUNT, t);
 		at += (size_t)snprintf(xml + at, sizeof xml - at, k < 4 ? "</shape>" : "</emitter>");
 	}
 	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
@@ -304,20 +305,20 @@ static void expect_close(double a, double b, double tolerance)
 
 /* Converts to scene units a density per area of the rescaled world, or an intensity, which is per square of the
  * world's unit of length. */
-static double per_area(const struct world *w, const struct emitter *em, double value)
+static double scene_density(const struct world *w, const struct emitter *em, double value)
 {
 	return em->is_delta || em->is_infinite ? value : value * w->scale * w->scale;
 }
 
-static void near_point(const struct world *moving, const struct world *still, const struct emitter_point *x,
-		       const struct emitter_point *y, double off)
+static void assert_near_point(const struct world *moving, const struct world *still, const struct emitter_point *x,
+			      const struct emitter_point *y, double off)
 {
 	assert_int_equal(x->is_infinite, y->is_infinite);
 	if (x->is_infinite)
-		near(x->p, y->p, off);
+		assert_near(x->p, y->p, off);
 	else
-		near(in_scene(moving, x->p), in_scene(still, y->p), off);
-	near(x->n, y->n, off);
+		assert_near(in_scene(moving, x->p), in_scene(still, y->p), off);
+	assert_near(x->n, y->n, off);
 }
 
 static void check_light(const struct world *moving, const struct world *still, uint32_t id, double t, struct dice *d)
@@ -332,15 +333,16 @@ static void check_light(const struct world *moving, const struct world *still, u
 	assert_true(moving->emitters[id].motion && !b->motion);
 	assert_true(a->ops->sample_point(a, u, &x, &p));
 	assert_true(b->ops->sample_point(b, u, &y, &q));
-	near_point(moving, still, &x, &y, 100 * OFF); /* the point lies in the cell of a narrow triangle */
-	expect_close(per_area(moving, a, p), per_area(still, b, q), OFF);
+	assert_near_point(moving, still, &x, &y,
+			  100 * POSITION_TOLERANCE); /* the point lies in the cell of a narrow triangle */
+	expect_close(scene_density(moving, a, p), scene_density(still, b, q), POSITION_TOLERANCE);
 	expect_close(a->ops->pdf_point(a, &x), p, 1e-9);
-	if (moving->emitter_shape[id] != UINT32_MAX) {
-		const struct prim_ref prim = {moving->emitter_shape[id], x.texture_point.prim, t};
+	if (moving->emitter_shapes[id] != UINT32_MAX) {
+		const struct prim_ref prim = {moving->emitter_shapes[id], x.texture_point.prim, t};
 		struct surface_point on;
 		assert_true(surface_nearest(&moving->shapes[prim.shape], prim, x.p, &on));
-		near(on.p, x.p, 1e-12);
-		near(on.ng, x.n, 1e-9);
+		assert_near(on.p, x.p, 1e-12);
+		assert_near(on.ng, x.n, 1e-9);
 		assert_true(fabs(on.u - x.texture_point.u) < 1e-9 && fabs(on.v - x.texture_point.v) < 1e-9);
 		a->ops->point_inverse(a, &x, back);
 		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
@@ -348,7 +350,7 @@ static void check_light(const struct world *moving, const struct world *still, u
 	if (!a->is_infinite) {
 		assert_true(a->ops->sample_direction(a, &x, v, &from, &p));
 		assert_true(b->ops->sample_direction(b, &y, v, &to, &q));
-		near(from, to, 1e-4);
+		assert_near(from, to, 1e-4);
 		expect_close(p, q, 2e-2);
 		double l = a->ops->radiance(a, &x, from, &grey).v[0], m = b->ops->radiance(b, &y, to, &grey).v[0];
 		expect_close(a->is_delta ? l / (moving->scale * moving->scale) : l,
@@ -360,12 +362,13 @@ static void check_light(const struct world *moving, const struct world *still, u
 	     met2 = emitter_sample_toward(b, in_world(still, ref), u, &y, &q);
 	if (!met || !met2)
 		return;
-	near_point(moving, still, &x, &y, 100 * OFF); /* the direction lies at the edge of a cone */
-	expect_close(per_area(moving, a, p), per_area(still, b, q), 1e-3);
+	assert_near_point(moving, still, &x, &y,
+			  100 * POSITION_TOLERANCE); /* the direction lies at the edge of a cone */
+	expect_close(scene_density(moving, a, p), scene_density(still, b, q), 1e-3);
 	expect_close(emitter_pdf_toward(a, in_world(moving, ref), &x), p, 1e-6);
 }
 
-static void test_lights(void **state)
+static void test_moving_lights_equal_still_ones(void **state)
 {
 	(void)state;
 	struct dice d = dice_for_test("lights at a time");
@@ -383,7 +386,7 @@ static void test_lights(void **state)
 	world_free(moving);
 }
 
-static double area_at(const struct world *w, uint32_t triangle, double t)
+static double triangle_area(const struct world *w, uint32_t triangle, double t)
 {
 	vec3 p[3];
 	for (int k = 0; k < 3; k++) {
@@ -397,7 +400,7 @@ static double area_at(const struct world *w, uint32_t triangle, double t)
 /* A cube of which one dimension grows and another shrinks. The number of points on each triangle must match the
  * stated density at every time, by Pearson's chi^2 with 11 degrees of freedom (limit 50: level 6e-7), and points must
  * be uniform within each triangle. */
-static void test_stretched(void **state)
+static void test_points_of_stretched_lights_follow_their_density(void **state)
 {
 	(void)state;
 	enum { TRIANGLES = 12 };
@@ -416,7 +419,7 @@ static void test_stretched(void **state)
 		size_t found[TRIANGLES] = {0}, n = dice_scaled_count(100000);
 		for (uint32_t i = 0; i < TRIANGLES; i++) {
 			const struct emitter_point x = {.texture_point.prim = i};
-			share[i] = em->ops->pdf_point(em, &x) * area_at(w, i, times[k]);
+			share[i] = em->ops->pdf_point(em, &x) * triangle_area(w, i, times[k]);
 			sum += share[i];
 		}
 		expect_close(sum, 1, 1e-12);
@@ -451,14 +454,14 @@ static void check_power(const char *shape, double area)
 		shape);
 	const struct emitter *em = &w->emitters[0];
 	bool said = false;
-	for (size_t i = 0; i < w->effects.line_count; i++)
-		said |= strstr(w->effects.lines[i].reason, "moves while the shutter is open") != NULL;
+	for (size_t i = 0; i < w->effects.effect_line_count; i++)
+		said |= strstr(w->effects.effect_lines[i].reason, "moves while the shutter is open") != NULL;
 	assert_true(said); /* exactly one note, not one for the shape and one for the emitter */
 	expect_close(em->power / (M_PI * em->brightness_bound * w->scale * w->scale), area * 7 / 3, 1e-3);
 	world_free(w);
 }
 
-static void test_emitted_power(void **state)
+static void test_growing_lights_have_their_mean_power(void **state)
 {
 	(void)state;
 	check_power("rectangle", 4);
@@ -468,8 +471,11 @@ static void test_emitted_power(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_at_a_time),     cmocka_unit_test(test_lights), cmocka_unit_test(test_stretched),
-		cmocka_unit_test(test_emitted_power), cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_moving_world_equals_still_ones),
+		cmocka_unit_test(test_moving_lights_equal_still_ones),
+		cmocka_unit_test(test_points_of_stretched_lights_follow_their_density),
+		cmocka_unit_test(test_growing_lights_have_their_mean_power),
+		cmocka_unit_test(test_moving_camera_equals_still_ones),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-static void no_memory_for_a_world(void **state)
+static void failed_allocations_of_a_world_are_reported(void **state)
 {
 	(void)state;
 	/* clang-format off */
@@ -57,7 +57,7 @@ static void no_memory_for_a_world(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(no_memory_for_a_world),
+		cmocka_unit_test(failed_allocations_of_a_world_are_reported),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

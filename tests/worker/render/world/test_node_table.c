@@ -21,7 +21,7 @@ enum { NODES = 20000, STRIDE = 96 }; /* bytes from one node to the next, as in a
 static char nodes[NODES * STRIDE], meshes[NODES * STRIDE];
 
 /* Returns the number of entries probed to add `count` nodes and to find each once. */
-static uint64_t work_of(uint32_t count)
+static uint64_t count_probes(uint32_t count)
 {
 	struct arena arena = {0};
 	struct node_table t;
@@ -44,14 +44,14 @@ static uint64_t work_of(uint32_t count)
  * 2.5 for an unsuccessful search and 1.5 for a successful one (Knuth, volume 3, section 6.4), 6.5 in all when the
  * table is fullest; a linear search would need count / 2.
  */
-static void test_work(void **state)
+static void test_few_entries_are_probed(void **state)
 {
 	(void)state;
-	assert_true(work_of(200) < 10 * 200);
-	assert_true(work_of(NODES) < 10 * NODES);
+	assert_true(count_probes(200) < 10 * 200);
+	assert_true(count_probes(NODES) < 10 * NODES);
 }
 
-static void test_by_mesh(void **state)
+static void test_nodes_are_found_by_mesh(void **state)
 {
 	(void)state;
 	struct arena arena = {0};
@@ -76,7 +76,7 @@ static void test_by_mesh(void **state)
 	arena_fini(&arena);
 }
 
-static void test_out_of_memory(void **state)
+static void test_failed_allocations_are_reported(void **state)
 {
 	(void)state;
 	struct arena arena = {.limit = 1024};
@@ -85,7 +85,7 @@ static void test_out_of_memory(void **state)
 	arena_fini(&arena);
 }
 
-static void test_one_each(void **state)
+static void test_each_node_is_added_once(void **state)
 {
 	(void)state;
 	enum { SHAPES = 300 };
@@ -115,10 +115,10 @@ static void test_one_each(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_work),
-		cmocka_unit_test(test_by_mesh),
-		cmocka_unit_test(test_out_of_memory),
-		cmocka_unit_test(test_one_each),
+		cmocka_unit_test(test_few_entries_are_probed),
+		cmocka_unit_test(test_nodes_are_found_by_mesh),
+		cmocka_unit_test(test_failed_allocations_are_reported),
+		cmocka_unit_test(test_each_node_is_added_once),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,7 +29,7 @@ static struct world *world_with(const char *shapes)
 }
 
 /* Returns the position of point i in scene units. */
-static vec3 place_of(const struct world *w, uint32_t i)
+static vec3 point_position(const struct world *w, uint32_t i)
 {
 	return vec3_add(vec3_scale(1 / w->scale, w->refracting_points[i].p), w->center);
 }
@@ -41,7 +41,7 @@ static vec3 in_world(const struct world *w, vec3 p)
 
 /* The water has an area of 32 and the ball one of 4 pi: each gets its share of 128 points, and so does each half of
  * the water and of the ball. */
-static void test_spread(void **state)
+static void test_points_are_spread_by_area(void **state)
 {
 	(void)state;
 	struct world *w = world_with(SURFACE(
@@ -50,7 +50,7 @@ static void test_spread(void **state)
 	assert_int_equal(w->refracting_point_count, 128);
 	for (uint32_t i = 0; i < 128; i++) {
 		const struct refracting_point *q = &w->refracting_points[i];
-		vec3 p = place_of(w, i), out = vec3_sub(p, (vec3){0, 4, 0});
+		vec3 p = point_position(w, i), out = vec3_sub(p, (vec3){0, 4, 0});
 		if (fabs(p.y) < 1e-5) {
 			assert_true(fabs(p.x) <= 4 && fabs(p.z) <= 2 && q->n.y > 1 - 1e-6);
 			assert_true(fabs(q->eta - 1.33) < 1e-6);
@@ -76,7 +76,7 @@ static void test_spread(void **state)
 }
 
 /* Two meshes: the fine one, with a hundredth of the area, has about a hundredth of the points. */
-static void test_by_area(void **state)
+static void test_triangle_count_does_not_matter(void **state)
 {
 	(void)state;
 	struct world *w =
@@ -84,12 +84,12 @@ static void test_by_area(void **state)
 						  "z='0'/><float name='radius' value='.16'/>" WATER("1.5") "</shape>");
 	uint32_t on_ball = 0;
 	for (uint32_t i = 0; i < w->refracting_point_count; i++)
-		on_ball += place_of(w, i).y > 1;
+		on_ball += point_position(w, i).y > 1;
 	assert_true(on_ball <= 2);
 	world_free(w);
 }
 
-static void test_none(void **state)
+static void test_scene_without_refraction_has_no_points(void **state)
 {
 	(void)state;
 	struct refracting_light from = {{0, 1, 0}, true};
@@ -105,28 +105,28 @@ static void test_none(void **state)
 	world_free(w);
 }
 
-static double path_by(const struct refracting_point *q, vec3 z, vec3 from)
+static double path_length(const struct refracting_point *q, vec3 z, vec3 from)
 {
 	return q->eta * vec3_length(vec3_sub(z, q->p)) + vec3_length(vec3_sub(from, q->p)) -
 	       vec3_length(vec3_sub(from, z));
 }
 
 /* An end at infinity is represented by a point so far away that its direction is the same from everywhere. */
-static void check_soonest(const struct world *w, vec3 z, const struct refracting_light *from)
+static void check_shortest_path(const struct world *w, vec3 z, const struct refracting_light *from)
 {
 	const struct refracting_point *found[REFRACTING_POINTS_RANKED];
-	vec3 far = from->infinite ? vec3_scale(1e6, from->position) : from->position;
+	vec3 far = from->is_infinite ? vec3_scale(1e6, from->position) : from->position;
 	assert_int_equal(refracting_points_rank(w, z, from, found), REFRACTING_POINTS_RANKED);
 	for (uint32_t k = 0; k < REFRACTING_POINTS_RANKED; k++) {
 		uint32_t sooner = 0;
-		double here = path_by(found[k], z, far);
+		double here = path_length(found[k], z, far);
 		for (uint32_t i = 0; i < w->refracting_point_count; i++)
-			sooner += path_by(&w->refracting_points[i], z, far) < here - 1e-8;
+			sooner += path_length(&w->refracting_points[i], z, far) < here - 1e-8;
 		assert_true(sooner <= k && (k == 0 || found[k] != found[k - 1]));
 	}
 }
 
-static void test_soonest(void **state)
+static void test_shortest_path_is_found(void **state)
 {
 	(void)state;
 	struct dice dice = dice_for_test("soonest");
@@ -146,8 +146,8 @@ static void test_soonest(void **state)
 			vec3 above = {below.x, -below.y, below.z};
 			struct refracting_light near = {in_world(w, lamp), false},
 						far = {vec3_normalize((vec3){lamp.x, lamp.y + .1, lamp.z}), true};
-			check_soonest(w, in_world(w, below), &near);
-			check_soonest(w, in_world(w, below), &far);
+			check_shortest_path(w, in_world(w, below), &near);
+			check_shortest_path(w, in_world(w, below), &far);
 			assert_int_equal(refracting_points_rank(w, in_world(w, above), &near, by), 0);
 		}
 		world_free(w);
@@ -157,10 +157,10 @@ static void test_soonest(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_spread),
-		cmocka_unit_test(test_by_area),
-		cmocka_unit_test(test_none),
-		cmocka_unit_test(test_soonest),
+		cmocka_unit_test(test_points_are_spread_by_area),
+		cmocka_unit_test(test_triangle_count_does_not_matter),
+		cmocka_unit_test(test_scene_without_refraction_has_no_points),
+		cmocka_unit_test(test_shortest_path_is_found),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

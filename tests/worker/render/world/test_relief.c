@@ -39,7 +39,7 @@ static struct world *world_with_picture(const char *inside)
 }
 
 /* Stores the luminance of each pixel. */
-static void image_of(struct world *w, double mean[SIDE * SIDE])
+static void render_luminance(struct world *w, double mean[SIDE * SIDE])
 {
 	float *xyz = leases_render_image(w, SIDE, 64, 2);
 	for (int i = 0; i < SIDE * SIDE; i++)
@@ -59,13 +59,13 @@ static double relative_difference(const double *a, const double *b)
 }
 
 /* 256 x 256 cells of height 0.02 at most, in sunlight: shadows are short, and slopes reach about 0.1. */
-static void test_bump_against_geometry(void **state)
+static void test_bump_map_matches_geometry(void **state)
 {
 	(void)state;
 	static double flat[SIDE * SIDE], bump[SIDE * SIDE], real[SIDE * SIDE], back[SIDE * SIDE];
-	image_of(world_with_picture(VIEW SUN "<shape type='rectangle'/>"), flat);
+	render_luminance(world_with_picture(VIEW SUN "<shape type='rectangle'/>"), flat);
 	/* clang-format off */
-	image_of(world_with_picture(
+	render_luminance(world_with_picture(
 		VIEW SUN
 		"<shape type='rectangle'>"
 			"<bsdf type='bumpmap'>"
@@ -74,7 +74,7 @@ static void test_bump_against_geometry(void **state)
 				"<bsdf type='diffuse'/>"
 			"</bsdf>"
 		"</shape>"), bump);
-	image_of(world_with_picture(
+	render_luminance(world_with_picture(
 		VIEW SUN
 		"<shape type='rectangle'>"
 			"<bsdf type='bumpmap'>"
@@ -83,7 +83,7 @@ static void test_bump_against_geometry(void **state)
 				"<bsdf type='diffuse'/>"
 			"</bsdf>"
 		"</shape>"), back);
-	image_of(world_with_picture(
+	render_luminance(world_with_picture(
 		VIEW SUN
 		"<shape type='rectangle'>"
 			"<texture name='displacement' type='bitmap'>" PICTURE "</texture>"
@@ -102,7 +102,7 @@ static void test_bump_against_geometry(void **state)
 /* A square whose normals lean by 45 degrees along the map's y, in light that falls along this direction or
  * perpendicular to it: the square is as bright as a flat one lit from the front, or black. obj: seen from outside, u
  * runs to the right or to the left, and v up, or down in files with flipped v. */
-static void test_y_of_normal_maps(void **state)
+static void test_normal_maps_have_the_right_y(void **state)
 {
 	(void)state;
 	static const struct {
@@ -140,12 +140,12 @@ static void test_y_of_normal_maps(void **state)
 			const struct memory_file files[] = {
 				{"s.xml", xml, (size_t)n}, {"m.obj", obj, strlen(obj)}, {NULL, NULL, 0}};
 			static double got[SIDE * SIDE], level[SIDE * SIDE];
-			image_of(world_from_files(SIDE, SIDE, files), got);
-			image_of(world_with_picture(
-					 VIEW
-					 "<emitter type='directional'><vector name='direction' x='0' y='0' z='-1'/>"
-					 "</emitter><shape type='rectangle'/>"),
-				 level);
+			render_luminance(world_from_files(SIDE, SIDE, files), got);
+			render_luminance(
+				world_with_picture(
+					VIEW "<emitter type='directional'><vector name='direction' x='0' y='0' z='-1'/>"
+					     "</emitter><shape type='rectangle'/>"),
+				level);
 			int at = SIDE / 2 * SIDE + SIDE / 2;
 			double share = got[at] / level[at];
 			assert_true(fabs(share - (cases[k].up == (up == 1))) < 1e-3);
@@ -202,8 +202,8 @@ static void test_integrators_agree(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_bump_against_geometry),
-		cmocka_unit_test(test_y_of_normal_maps),
+		cmocka_unit_test(test_bump_map_matches_geometry),
+		cmocka_unit_test(test_normal_maps_have_the_right_y),
 		cmocka_unit_test(test_integrators_agree),
 	};
 	return cmocka_run_group_tests_name("relief", tests, NULL, NULL);

@@ -20,7 +20,7 @@
 
 static const struct wavelengths rgb_lanes = {.is_rgb = true};
 
-static void same_lanes(const struct color *c, const double rgb[3], double tolerance)
+static void assert_same_lanes(const struct color *c, const double rgb[3], double tolerance)
 {
 	spectrum s = color_eval(c, &rgb_lanes);
 	for (int k = 0; k < 3; k++)
@@ -45,7 +45,7 @@ static void integrate(const struct color *c, bool under_d65, double rgb[3])
 	rec709_from_xyz(xyz, rgb);
 }
 
-static void test_lanes(void **state)
+static void test_lanes_are_the_rgb_components(void **state)
 {
 	(void)state;
 	struct arena arena = {0};
@@ -54,13 +54,13 @@ static void test_lanes(void **state)
 	double expected[3];
 	const double rgb[3] = {0.63, 0.065, 0.05}, light[3] = {5, 2, 0};
 	assert_int_equal(color_from_rgb(rgb, COLOR_REFLECTANCE, &c), 0);
-	same_lanes(&c, rgb, 1e-15);
+	assert_same_lanes(&c, rgb, 1e-15);
 	assert_int_equal(color_from_rgb(light, COLOR_ILLUMINANT, &c), 0);
-	same_lanes(&c, light, 1e-14);
+	assert_same_lanes(&c, light, 1e-14);
 	assert_int_equal(color_from_rgb(light, COLOR_UNBOUNDED, &c), 0);
-	same_lanes(&c, light, 1e-14);
+	assert_same_lanes(&c, light, 1e-14);
 	c = color_constant(0.25);
-	same_lanes(&c, (const double[]){0.25, 0.25, 0.25}, 0);
+	assert_same_lanes(&c, (const double[]){0.25, 0.25, 0.25}, 0);
 	spectrum s = color_eval_rgb_reflectance(rgb, &rgb_lanes), t = color_eval_rgb_illuminant(light, &rgb_lanes);
 	for (int k = 0; k < SPECTRUM_LANES; k++)
 		assert_true(s.v[k] == rgb[k % 3 + (k == 3)] && t.v[k] == light[k % 3 + (k == 3)]);
@@ -71,20 +71,20 @@ static void test_lanes(void **state)
 	for (int k = 0; k < 3; k++) {
 		assert_int_equal(color_from_value(&v, roles[k], &arena, &c, &e), 0);
 		integrate(&c, roles[k] != COLOR_ILLUMINANT, expected);
-		same_lanes(&c, expected, 2e-4);
+		assert_same_lanes(&c, expected, 2e-4);
 	}
 	v.as.spectrum.count = 1;
 	v.as.spectrum.value = one;
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
 	integrate(&c, false, expected);
-	same_lanes(&c, expected, 2e-4);
+	assert_same_lanes(&c, expected, 2e-4);
 	assert_true(expected[0] > 2.4 && expected[2] < 1.85);
 	arena_fini(&arena);
 }
 
 /* A reflectance is at most 1, and no component of a colour is negative, although monochromatic red light has negative
  * green. */
-static void test_beyond_the_gamut(void **state)
+static void test_colours_beyond_the_gamut_are_clipped(void **state)
 {
 	(void)state;
 	struct arena arena = {0};
@@ -105,7 +105,7 @@ static void test_beyond_the_gamut(void **state)
 }
 
 /* In a closed diffuse sphere of reflectance rho that emits E, the radiance is L = E / (1 - rho) everywhere. */
-static void test_closed_sphere(void **state)
+static void test_closed_sphere_has_its_radiance(void **state)
 {
 	(void)state;
 	static const double emitted[3] = {1, 2, 3}, rho[3] = {0.63, 0.065, 0.05};
@@ -134,7 +134,7 @@ static void test_closed_sphere(void **state)
 	"<shape type='sphere'><point name='center' y='-0.5' z='0.3'/><float name='radius' value='0.5'/>" \
 	"<bsdf type='dielectric'><float name='int_cauchy_b' value='0.0042'/></bsdf></shape>"
 
-static void test_nothing_disperses(void **state)
+static void test_dispersion_is_off(void **state)
 {
 	(void)state;
 	worlds_accuracy = "colour=rgb";
@@ -143,8 +143,9 @@ static void test_nothing_disperses(void **state)
 					  "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>");
 	assert_true(w->effects.colour && !w->effects.dispersion);
 	bool said = false;
-	for (size_t i = 0; i < w->effects.line_count; i++)
-		said |= !w->effects.lines[i].is_on && strstr(w->effects.lines[i].reason, "but colours are rgb");
+	for (size_t i = 0; i < w->effects.effect_line_count; i++)
+		said |= !w->effects.effect_lines[i].is_on &&
+			strstr(w->effects.effect_lines[i].reason, "but colours are rgb");
 	assert_true(said);
 	world_free(w);
 	worlds_effects = "+dispersion";
@@ -187,10 +188,10 @@ static void test_integrators_agree(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lanes),
-		cmocka_unit_test(test_beyond_the_gamut),
-		cmocka_unit_test(test_closed_sphere),
-		cmocka_unit_test(test_nothing_disperses),
+		cmocka_unit_test(test_lanes_are_the_rgb_components),
+		cmocka_unit_test(test_colours_beyond_the_gamut_are_clipped),
+		cmocka_unit_test(test_closed_sphere_has_its_radiance),
+		cmocka_unit_test(test_dispersion_is_off),
 		cmocka_unit_test(test_integrators_agree),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

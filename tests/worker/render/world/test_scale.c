@@ -20,37 +20,37 @@
 
 enum { SIDE = PLACED_SCENE_SIDE };
 
-static struct world *world_at(double s, double m)
+static struct world *placed_world(double s, double m)
 {
 	return placed_scene_make(s, m, "<bsdf type='dielectric'/>", "");
 }
 
-static void test_same(void **state)
+static void test_image_does_not_depend_on_scale_and_position(void **state)
 {
 	(void)state;
 	static const struct {
-		double scale, move;
-		bool exact;
+		double scale, offset;
+		bool is_exact;
 	} cases[] = {
 		{0x1p-13, 0, true},	 {0x1p13, 0, true},	  {1, 0x1p17, true}, {0x1p-13, 0x1p4, true},
 		{0x1p13, -0x1p30, true}, {1e-4, 0, false},	  {1e4, 0, false},   {1, 1e5, false},
 		{3, 1e5 / 7, false},	 {1e-4, 10.0 / 3, false},
 	};
-	float *reference = leases_render_image(world_at(1, 0), SIDE, 32, 6);
+	float *reference = leases_render_image(placed_world(1, 0), SIDE, 32, 6);
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-		float *image = leases_render_image(world_at(cases[i].scale, cases[i].move), SIDE, 32, 6);
+		float *image = leases_render_image(placed_world(cases[i].scale, cases[i].offset), SIDE, 32, 6);
 		size_t differ = 0;
 		double a = 0, b = 0;
 		for (size_t k = 0; k < (size_t)SIDE * SIDE * 3; k++) {
 			double x = (double)reference[k], y = (double)image[k];
 			a += x;
 			b += y;
-			differ += cases[i].exact ? x != y : !(fabs(x - y) <= 1e-5 * (x + y));
+			differ += cases[i].is_exact ? x != y : !(fabs(x - y) <= 1e-5 * (x + y));
 		}
-		print_message("x %g + %g: %zu of %d values differ, the mean by %.1e\n", cases[i].scale, cases[i].move,
+		print_message("x %g + %g: %zu of %d values differ, the mean by %.1e\n", cases[i].scale, cases[i].offset,
 			      differ, SIDE * SIDE * 3, b / a - 1);
 		assert_true(a > 0);
-		if (cases[i].exact)
+		if (cases[i].is_exact)
 			assert_int_equal(differ, 0);
 		assert_true(differ < SIDE * SIDE * 3 / 20);
 		assert_true(fabs(b / a - 1) < 1e-3);
@@ -61,6 +61,6 @@ static void test_same(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_same)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_image_does_not_depend_on_scale_and_position)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

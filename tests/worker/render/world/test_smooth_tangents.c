@@ -32,7 +32,7 @@ static struct world *world_with(const char *obj, const char *bsdf)
 }
 
 /* Returns the unit sphere with n meridians and n / 2 circles; each triangle has its own vertices. */
-static const char *sphere_obj(int n)
+static const char *make_sphere_obj(int n)
 {
 	static char text[1 << 22];
 	size_t at = 0;
@@ -60,7 +60,7 @@ static const char *sphere_obj(int n)
 
 /* Returns the largest angle between the frame's first axis and the sphere's dp/du, away from the poles and from the
  * seam of u, where tangents average over one side only. */
-static double worst_turn(const struct world *w, bool smooth, int n)
+static double max_frame_rotation(const struct world *w, bool smooth, int n)
 {
 	struct dice d = dice_for_test("points of a sphere");
 	struct geom_shape s = w->shapes[0];
@@ -79,14 +79,14 @@ static double worst_turn(const struct world *w, bool smooth, int n)
 	return worst;
 }
 
-static void test_sphere(void **state)
+static void test_tangents_of_a_sphere_are_smooth(void **state)
 {
 	(void)state;
 	double before = 0;
 	for (int n = 16; n <= 64; n *= 2) {
-		struct world *w = world_with(sphere_obj(n), METAL("0.1"));
+		struct world *w = world_with(make_sphere_obj(n), METAL("0.1"));
 		assert_non_null(w->shapes[0].tangent);
-		double smooth = worst_turn(w, true, n), flat = worst_turn(w, false, n);
+		double smooth = max_frame_rotation(w, true, n), flat = max_frame_rotation(w, false, n);
 		print_message("%d meridians: frames are off by %.4f, without tangents by %.4f\n", n, smooth, flat);
 		/* The error with tangents is of second order in the size of the triangles, the error without them of
 		 * first order. */
@@ -97,12 +97,12 @@ static void test_sphere(void **state)
 	}
 }
 
-static void test_only_for_those_that_use_them(void **state)
+static void test_only_materials_that_need_tangents_have_them(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *bsdf;
-		bool uses;
+		bool needs_tangents;
 	} cases[] = {
 		{METAL("0.3"), false},
 		{METAL("0.1"), true},
@@ -119,8 +119,8 @@ static void test_only_for_those_that_use_them(void **state)
 		{"<bsdf type='roughconductor'><texture name='alpha' type='checkerboard'/></bsdf>", false},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct world *w = world_with(sphere_obj(8), cases[i].bsdf);
-		if ((w->shapes[0].tangent != NULL) != cases[i].uses)
+		struct world *w = world_with(make_sphere_obj(8), cases[i].bsdf);
+		if ((w->shapes[0].tangent != NULL) != cases[i].needs_tangents)
 			fail_msg("%s", cases[i].bsdf);
 		world_free(w);
 	}
@@ -129,7 +129,7 @@ static void test_only_for_those_that_use_them(void **state)
 /* A strip along x from -1 to 1 with u = |x|, v = y: its two halves share the vertices at 0 and have opposite dp/du. A
  * triangle to the right has no area in the texture and takes its neighbours' tangents; another beyond it has no
  * neighbour. */
-static void test_mirrored(void **state)
+static void test_mirrored_halves_keep_their_tangents(void **state)
 {
 	(void)state;
 	static const char strip[] = "v -1 0 0\nv 0 0 0\nv 1 0 0\nv -1 1 0\nv 0 1 0\nv 1 1 0\nv 2 0 0\nv 3 0 0\n"
@@ -152,7 +152,7 @@ static void test_mirrored(void **state)
 }
 
 /* Two triangles at a vertex, with dp/du along (1, 0) and (1, -1) and angles of 90 and 45 degrees. */
-static void test_weighted_by_angles(void **state)
+static void test_tangents_are_weighted_by_angles(void **state)
 {
 	(void)state;
 	static const char fan[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt -1 0\nvn 0 0 1\n"
@@ -168,8 +168,9 @@ static void test_weighted_by_angles(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_sphere),
-					   cmocka_unit_test(test_only_for_those_that_use_them),
-					   cmocka_unit_test(test_mirrored), cmocka_unit_test(test_weighted_by_angles)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_tangents_of_a_sphere_are_smooth),
+					   cmocka_unit_test(test_only_materials_that_need_tangents_have_them),
+					   cmocka_unit_test(test_mirrored_halves_keep_their_tangents),
+					   cmocka_unit_test(test_tangents_are_weighted_by_angles)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,7 +24,7 @@
 	"-1 -0.8 0 0.3\n-0.2 -0.7 0.3 0.25\n0.1 0.1 0.2 0.2\n0.9 0.2 -0.2 0.2\n" \
 	"0.8 0.9 0 0.15\n-0.1 1 -0.3 0.1\n\n-1 0.6 0 0.1\n-0.9 0.9 0 0.1\n-0.8 1.2 0 0.1\n-0.7 1.5 0 0.1\n"
 #define FLAT "<float name='displacement' value='0'/><integer name='displacement_level' value='0'/>"
-#define MOVE                                                                            \
+#define MOTION                                                                          \
 	"<animation name='to_world'><transform time='0'><translate x='0'/></transform>" \
 	"<transform time='1'><translate x='0.5'/></transform></animation>"
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
@@ -45,12 +45,12 @@ static struct world *world_of_curves(const char *xml)
 
 #define CURVES(type, inner) "<shape type='" type "'><string name='filename' value='c.txt'/>" inner "</shape>"
 
-static void test_kinds(void **state)
+static void test_curves_become_strands_where_possible(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *xml;
-		bool cones;
+		bool has_cones;
 		uint32_t count;
 	} cases[] = {
 		{CURVES("linearcurve", ""), true, 8},
@@ -61,7 +61,7 @@ static void test_kinds(void **state)
 		{CURVES("linearcurve", FLAT), false, 0},
 		{CURVES("bsplinecurve", FLAT), false, 0},
 		{CURVES("linearcurve", "<emitter type='area'/>"), false, 0},
-		{CURVES("linearcurve", MOVE), false, 0},
+		{CURVES("linearcurve", MOTION), false, 0},
 		{"<shape type='shapegroup' id='g'>" CURVES("linearcurve",
 							   "") "</shape><shape type='instance'><ref id='g'/></shape>",
 		 true, 8},
@@ -78,7 +78,7 @@ static void test_kinds(void **state)
 		const struct geom_shape *g = &w->shapes[0];
 		struct render_summary m;
 		world_summary(w, &m);
-		if ((g->curves != NULL) != cases[i].cones || (g->triangle_count > 0) == cases[i].cones ||
+		if ((g->curves != NULL) != cases[i].has_cones || (g->triangle_count > 0) == cases[i].has_cones ||
 		    m.segments != cases[i].count)
 			fail_msg("%s: %llu segments, %u triangles", cases[i].xml, (unsigned long long)m.segments,
 				 g->triangle_count);
@@ -89,7 +89,7 @@ static void test_kinds(void **state)
 			begun += (g->curves->cone[k] & CURVE_BEGINS) != 0;
 			ended += (g->curves->cone[k] & CURVE_ENDS) != 0;
 		}
-		assert_true(begun == (cases[i].cones ? 2 : 0) && ended == begun);
+		assert_true(begun == (cases[i].has_cones ? 2 : 0) && ended == begun);
 		world_free(w);
 	}
 	/* A bent piece of a spline is split into more than one segment, and into fewer than a hundred. */
@@ -100,7 +100,7 @@ static void test_kinds(void **state)
 }
 
 /* The points of a curve's surface that rays meet, by texture coordinates, must lie on the tube as well. */
-static void test_places(void **state)
+static void test_hit_points_lie_on_the_tube(void **state)
 {
 	(void)state;
 	static const char *const types[] = {"linearcurve", "bsplinecurve"};
@@ -144,7 +144,7 @@ static void test_places(void **state)
 	}
 }
 
-static void furnace(const char *test, const char *xml, uint64_t spp)
+static void check_furnace(const char *test, const char *xml, uint64_t spp)
 {
 	static struct agreement_image image;
 	struct world *w = world_of_curves(xml);
@@ -163,21 +163,22 @@ static void furnace(const char *test, const char *xml, uint64_t spp)
 
 /* In constant light, curves that absorb nothing are invisible. Glass that a ray enters and does not leave at a joint,
  * or leaves twice, would become visible. */
-static void test_furnaces(void **state)
+static void test_lossless_curves_are_invisible(void **state)
 {
 	(void)state;
-	furnace("strands of glass", PATHS("128") CURVES("linearcurve", "<bsdf type='dielectric'/>") SKY, 128);
-	furnace("strands of mirrors",
-		PATHS("64") CURVES("linearcurve",
-				   "<bsdf type='conductor'><string name='material' value='none'/></bsdf>") SKY,
-		64);
-	furnace("strands of fog",
+	check_furnace("strands of glass", PATHS("128") CURVES("linearcurve", "<bsdf type='dielectric'/>") SKY, 128);
+	check_furnace("strands of mirrors",
+		      PATHS("64") CURVES("linearcurve",
+					 "<bsdf type='conductor'><string name='material' value='none'/></bsdf>") SKY,
+		      64);
+	check_furnace(
+		"strands of fog",
 		PATHS("128") CURVES(
 			"linearcurve",
 			"<bsdf type='null'/><medium type='homogeneous' name='interior'><float name='albedo' value='1'/>"
 			"<float name='sigma_t' value='2'/></medium>") SKY,
 		128);
-	furnace("strands of a null boundary", PATHS("16") CURVES("linearcurve", "<bsdf type='null'/>") SKY, 64);
+	check_furnace("strands of a null boundary", PATHS("16") CURVES("linearcurve", "<bsdf type='null'/>") SKY, 64);
 }
 
 /* Half-vector mutations through glossy strands, with a lamp. */
@@ -208,9 +209,9 @@ static void test_integrators_agree(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_kinds),
-		cmocka_unit_test(test_places),
-		cmocka_unit_test(test_furnaces),
+		cmocka_unit_test(test_curves_become_strands_where_possible),
+		cmocka_unit_test(test_hit_points_lie_on_the_tube),
+		cmocka_unit_test(test_lossless_curves_are_invisible),
 		cmocka_unit_test(test_integrators_agree),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

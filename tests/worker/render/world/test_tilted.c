@@ -48,7 +48,7 @@
 static const struct wavelengths white = {.nm = {450, 500, 550, 600}};
 
 /* Makes a world with one shape of the type `shape`. */
-static struct world *world_of(const char *shape, const char *bsdf)
+static struct world *make_world(const char *shape, const char *bsdf)
 {
 	static struct pictures pictures;
 	static char xml[4096];
@@ -80,7 +80,7 @@ static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 
 /* Returns f |cos| for light from wi scattered to wo, both in world space; *side: whether both directions lie on the
  * same side of the shading normal as of the geometric one. */
-static spectrum scattered_at(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
+static spectrum scattered_light(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
 {
 	struct surface_point x;
 	point_on(w, i, &x);
@@ -97,23 +97,23 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 		    int via)
 {
 	enum { POINTS = 400 };
-	struct world *all = world_of(shape, whole), *one[3] = {NULL};
+	struct world *all = make_world(shape, whole), *one[3] = {NULL};
 	int lit = 0;
 	for (int k = 0; k < parts; k++)
-		one[k] = world_of(shape, bsdf[k]);
+		one[k] = make_world(shape, bsdf[k]);
 	for (uint64_t i = 0; i < 4 * POINTS; i++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		bool side, part_side, via_side = true;
-		spectrum got = scattered_at(all, i, wo, wi, t, &side), expected = spectrum_constant(0);
+		spectrum got = scattered_light(all, i, wo, wi, t, &side), expected = spectrum_constant(0);
 		if (!side) /* here the integrators do not evaluate the BSDF */
 			continue;
 		if (via)
-			scattered_at(one[via], i, wo, wi, t, &via_side);
+			scattered_light(one[via], i, wo, wi, t, &via_side);
 		for (int k = 0; k < parts; k++) {
-			spectrum f = scattered_at(one[k], i, wo, wi, t, &part_side);
+			spectrum f = scattered_light(one[k], i, wo, wi, t, &part_side);
 			if (part_side && (via_side || k == 0))
 				expected = spectrum_add(expected, spectrum_scale(share[k], f));
 		}
@@ -129,38 +129,39 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 		world_free(one[k]);
 }
 
-static void both_shapes(const char *whole, const char *const *bsdf, const double *share, int parts, int via)
+static void compare_on_both_shapes(const char *whole, const char *const *bsdf, const double *share, int parts, int via)
 {
 	compare("sphere", whole, bsdf, share, parts, via);
 	compare("rectangle", whole, bsdf, share, parts, via);
 }
 
-static void test_two_normals(void **state)
+static void test_blends_of_two_normals_scatter_like_their_parts(void **state)
 {
 	(void)state;
-	both_shapes(BLEND("0.3", DENTS(PLASTIC), SLOPE(METAL)), (const char *const[]){DENTS(PLASTIC), SLOPE(METAL)},
-		    (const double[]){0.7, 0.3}, 2, 0);
+	compare_on_both_shapes(BLEND("0.3", DENTS(PLASTIC), SLOPE(METAL)),
+			       (const char *const[]){DENTS(PLASTIC), SLOPE(METAL)}, (const double[]){0.7, 0.3}, 2, 0);
 	/* One of the parts is smooth. */
-	both_shapes(BLEND("0.3", METAL, DENTS(PAPER)), (const char *const[]){METAL, DENTS(PAPER)},
-		    (const double[]){0.7, 0.3}, 2, 0);
+	compare_on_both_shapes(BLEND("0.3", METAL, DENTS(PAPER)), (const char *const[]){METAL, DENTS(PAPER)},
+			       (const double[]){0.7, 0.3}, 2, 0);
 }
 
 /* One part of a blend is itself a blend with different parts, of which the last determines its normal. */
-static void test_nested(void **state)
+static void test_nested_blends_scatter_like_their_parts(void **state)
 {
 	(void)state;
-	both_shapes(BLEND("0.25", METAL, BLEND("0.5", DENTS(CHALK), SLOPE(PLASTIC))),
-		    (const char *const[]){METAL, DENTS(CHALK), SLOPE(PLASTIC)}, (const double[]){0.75, 0.125, 0.125}, 3,
-		    2);
+	compare_on_both_shapes(BLEND("0.25", METAL, BLEND("0.5", DENTS(CHALK), SLOPE(PLASTIC))),
+			       (const char *const[]){METAL, DENTS(CHALK), SLOPE(PLASTIC)},
+			       (const double[]){0.75, 0.125, 0.125}, 3, 2);
 }
 
 /* One side and then the other: a side seen from the wrong side of its own normal is black. */
-static void test_two_sides(void **state)
+static void test_tilted_sides_scatter_separately(void **state)
 {
 	(void)state;
-	both_shapes(TWOSIDED(DENTS(PLASTIC), SLOPE(METAL)),
-		    (const char *const[]){TWOSIDED(DENTS(PLASTIC), DENTS(BLACK)), TWOSIDED(SLOPE(BLACK), SLOPE(METAL))},
-		    (const double[]){1, 1}, 2, 0);
+	compare_on_both_shapes(
+		TWOSIDED(DENTS(PLASTIC), SLOPE(METAL)),
+		(const char *const[]){TWOSIDED(DENTS(PLASTIC), DENTS(BLACK)), TWOSIDED(SLOPE(BLACK), SLOPE(METAL))},
+		(const double[]){1, 1}, 2, 0);
 }
 
 /* The distribution of sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere:
@@ -169,7 +170,7 @@ static void test_two_sides(void **state)
 static void check_sampling(const char *whole)
 {
 	enum { SAMPLES = 60000, MOMENTS = 6 };
-	struct world *w = world_of("sphere", whole);
+	struct world *w = make_world("sphere", whole);
 	const struct bsdf *b = &w->bsdfs[w->shape_bindings[0].bsdf];
 	struct surface_point x;
 	point_on(w, 3, &x);
@@ -206,7 +207,7 @@ static void check_sampling(const char *whole)
 	world_free(w);
 }
 
-static void test_sampling(void **state)
+static void test_samples_follow_the_density(void **state)
 {
 	(void)state;
 	check_sampling(BLEND("0.3", METAL, DENTS(PAPER)));
@@ -222,7 +223,7 @@ static double smith_between(vec3 n0, vec3 n, vec3 light)
 	return 1 / (1 + (sqrt(1 + pow(a * tan(angle), 2)) - 1) / 2);
 }
 
-static double smith(const struct surface_point *x, vec3 light)
+static double smith_shadowing(const struct surface_point *x, vec3 light)
 {
 	return smith_between(x->ng, x->sh.n, light);
 }
@@ -238,7 +239,7 @@ static void assert_scaled(const char *what, spectrum got, double k, spectrum pla
 static double check_shadow(const char *shape, const char *with, const char *without)
 {
 	enum { POINTS = 2000 };
-	struct world *shadowed = world_of(shape, with), *lit = world_of(shape, without);
+	struct world *shadowed = make_world(shape, with), *lit = make_world(shape, without);
 	const struct bsdf *b = &shadowed->bsdfs[0], *plain = &lit->bsdfs[0];
 	double least = 1;
 	int specular = 0, smooth = 0;
@@ -252,11 +253,11 @@ static double check_shadow(const char *shape, const char *with, const char *with
 		const struct bsdf_point p = world_bsdf_point(&x, &white, t), q = world_bsdf_point(&y, &white, t);
 		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2), o = frame_to_local(&x.sh, wo),
 		     in = frame_to_local(&x.sh, wi);
-		double k = smith(&x, t == TRANSPORT_RADIANCE ? wi : wo);
+		double k = smith_shadowing(&x, t == TRANSPORT_RADIANCE ? wi : wo);
 		spectrum f = plain->ops->eval(plain, &q, o, in);
 		assert_scaled("eval", b->ops->eval(b, &p, o, in), k, f);
 		assert_true(b->ops->pdf_solid(b, &p, o, in) == plain->ops->pdf_solid(plain, &q, o, in));
-		assert_scaled("halfvec", bsdf_eval_halfvec(b, &p, o, in), smith(&x, wi),
+		assert_scaled("halfvec", bsdf_eval_halfvec(b, &p, o, in), smith_shadowing(&x, wi),
 			      bsdf_eval_halfvec(plain, &q, o, in));
 		if (!spectrum_is_zero(f)) {
 			smooth++;
@@ -266,7 +267,7 @@ static double check_shadow(const char *shape, const char *with, const char *with
 		if (plain->ops->sample(plain, &q, o, u + 1, &r)) {
 			assert_true(b->ops->sample(b, &p, o, u + 1, &s));
 			assert_true(s.pdf == r.pdf && s.mode == r.mode && vec3_length(vec3_sub(s.wi, r.wi)) == 0);
-			k = smith(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
+			k = smith_shadowing(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
 			assert_scaled("sample", s.f, k, r.f);
 			specular += (s.mode & BSDF_DELTA) != 0;
 		}
@@ -275,7 +276,7 @@ static double check_shadow(const char *shape, const char *with, const char *with
 		if (!spectrum_is_zero(weight)) {
 			spectrum got = bsdf_eval_delta(b, &p, o, BSDF_REFLECT, &s.wi, &chance);
 			assert_true(chance == other && vec3_length(vec3_sub(s.wi, r.wi)) == 0);
-			k = smith(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
+			k = smith_shadowing(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
 			assert_scaled("eval_delta", got, k, weight);
 		}
 	}
@@ -285,7 +286,7 @@ static double check_shadow(const char *shape, const char *with, const char *with
 	return least;
 }
 
-static void test_shadow(void **state)
+static void test_shadowing_function_darkens_tilted_surfaces(void **state)
 {
 	(void)state;
 #define BOTH(shape, MAP, inner) check_shadow(shape, MAP(inner), MAP(LIT inner))
@@ -305,7 +306,7 @@ static void test_shadow(void **state)
 static void check_two_shadows(const char *shape, const char *outer, const char *both, const char *without)
 {
 	enum { POINTS = 2000 };
-	struct world *one = world_of(shape, outer), *two = world_of(shape, both), *lit = world_of(shape, without);
+	struct world *one = make_world(shape, outer), *two = make_world(shape, both), *lit = make_world(shape, without);
 	int smooth = 0;
 	for (uint64_t i = 0; i < POINTS; i++) {
 		double u[4];
@@ -317,7 +318,8 @@ static void check_two_shadows(const char *shape, const char *outer, const char *
 		vec3 wo = sphere_from_square(u), wi = sphere_from_square(u + 2),
 		     light = t == TRANSPORT_RADIANCE ? wi : wo;
 		bool side;
-		spectrum plain = scattered_at(lit, i, wo, wi, t, &side), got = scattered_at(two, i, wo, wi, t, &side);
+		spectrum plain = scattered_light(lit, i, wo, wi, t, &side),
+			 got = scattered_light(two, i, wo, wi, t, &side);
 		double k = smith_between(x1.ng, x1.sh.n, light) * smith_between(x1.sh.n, x2.sh.n, light);
 		assert_scaled("two maps", got, k, plain);
 		smooth += !spectrum_is_zero(plain) && vec3_length(vec3_sub(x1.sh.n, x2.sh.n)) > 0.1;
@@ -335,10 +337,12 @@ static void test_maps_in_maps(void **state)
 	check_two_shadows("rectangle", SLOPE(PLASTIC), SLOPE(DENTS(PLASTIC)), SLOPE(LIT DENTS(LIT PLASTIC)));
 	check_two_shadows("sphere", DENTS(METAL), DENTS(SLOPE(METAL)), DENTS(LIT SLOPE(LIT METAL)));
 	/* Parts in a map: one has another map inside it, the other is plain, and either may be the narrower one. */
-	both_shapes(SLOPE(BLEND("0.3", DENTS(PLASTIC), METAL)),
-		    (const char *const[]){SLOPE(DENTS(PLASTIC)), SLOPE(METAL)}, (const double[]){0.7, 0.3}, 2, 0);
-	both_shapes(SLOPE(BLEND("0.3", CHALK, DENTS(METAL))), (const char *const[]){SLOPE(CHALK), SLOPE(DENTS(METAL))},
-		    (const double[]){0.7, 0.3}, 2, 0);
+	compare_on_both_shapes(SLOPE(BLEND("0.3", DENTS(PLASTIC), METAL)),
+			       (const char *const[]){SLOPE(DENTS(PLASTIC)), SLOPE(METAL)}, (const double[]){0.7, 0.3},
+			       2, 0);
+	compare_on_both_shapes(SLOPE(BLEND("0.3", CHALK, DENTS(METAL))),
+			       (const char *const[]){SLOPE(CHALK), SLOPE(DENTS(METAL))}, (const double[]){0.7, 0.3}, 2,
+			       0);
 	check_sampling(DENTS(SLOPE(METAL)));
 	check_sampling(SLOPE(BLEND("0.3", CHALK, DENTS(METAL))));
 }
@@ -346,8 +350,12 @@ static void test_maps_in_maps(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_two_normals), cmocka_unit_test(test_nested), cmocka_unit_test(test_two_sides),
-		cmocka_unit_test(test_sampling),    cmocka_unit_test(test_shadow), cmocka_unit_test(test_maps_in_maps),
+		cmocka_unit_test(test_blends_of_two_normals_scatter_like_their_parts),
+		cmocka_unit_test(test_nested_blends_scatter_like_their_parts),
+		cmocka_unit_test(test_tilted_sides_scatter_separately),
+		cmocka_unit_test(test_samples_follow_the_density),
+		cmocka_unit_test(test_shadowing_function_darkens_tilted_surfaces),
+		cmocka_unit_test(test_maps_in_maps),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

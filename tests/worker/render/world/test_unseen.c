@@ -24,7 +24,7 @@
 	"' up='0,1,0'/></transform>" more "</sensor>"
 
 /* Finds the world's note about `subject`; "": none. */
-static void note_of(const struct world *w, const char *subject, char note[1024])
+static void find_note(const struct world *w, const char *subject, char note[1024])
 {
 	struct render_summary s;
 	char sentence[1024];
@@ -40,13 +40,13 @@ static void assert_note(const char *text, const char *why)
 {
 	struct world *w = world_from_text(32, 32, "%s", text);
 	char note[1024];
-	note_of(w, NOTE, note);
+	find_note(w, NOTE, note);
 	if (*why ? !strstr(note, why) : *note)
 		fail_msg("of %s: '%s', not '%s'", text, note, why);
 	world_free(w);
 }
 
-static void test_sentences(void **state)
+static void test_cameras_that_see_nothing_are_noted(void **state)
 {
 	(void)state;
 	assert_note(LOOK("0,0,0", "") BALLS("0"), "");
@@ -65,7 +65,7 @@ static void test_sentences(void **state)
 }
 
 /* Returns whether one of n x n rays, from points all over the aperture, meets a shape. */
-static bool meets_something(const struct world *w, uint32_t n)
+static bool meets_shape(const struct world *w, uint32_t n)
 {
 	const struct camera *c = &w->camera;
 	for (uint32_t i = 0; i < n * n; i++) {
@@ -80,7 +80,7 @@ static bool meets_something(const struct world *w, uint32_t n)
 	return false;
 }
 
-static void test_against_rays(void **state)
+static void test_note_agrees_with_rays(void **state)
 {
 	(void)state;
 	static const char *const kinds[] = {
@@ -104,8 +104,8 @@ static void test_against_rays(void **state)
 			kinds[i % 3], x[0], x[1], 2 * x[2] + copysign(2, x[2]), x[3], x[4], x[5], x[6], x[7], x[8],
 			-x[4]);
 		char note[1024];
-		note_of(w, NOTE, note);
-		bool seen = meets_something(w, 64);
+		find_note(w, NOTE, note);
+		bool seen = meets_shape(w, 64);
 		if (*note && seen)
 			fail_msg("case %zu: a ray meets a shape, but '%s'", i, note);
 		blind += !seen;
@@ -116,14 +116,14 @@ static void test_against_rays(void **state)
 	assert_true(blind > 60 && noted > blind * 3 / 4 && blind < 240);
 }
 
-static void test_dark(void **state)
+static void test_dark_scenes_are_noted(void **state)
 {
 	(void)state;
 #define BALL(radiance) \
 	"<shape type='sphere'><emitter type='area'><spectrum name='radiance' value='" radiance "'/></emitter></shape>"
 	static const struct {
 		const char *emitters;
-		bool dark;
+		bool is_dark;
 	} cases[] = {
 		{"", false},
 		{BALL("0"), true},
@@ -138,8 +138,8 @@ static void test_dark(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct world *w = world_from_text(32, 32, SENSOR("0,0,9", "0,0,0") "%s", cases[i].emitters);
 		char note[1024];
-		note_of(w, "no emitter gives light from 360 to 830 nm", note);
-		if ((*note != 0) != cases[i].dark)
+		find_note(w, "no emitter gives light from 360 to 830 nm", note);
+		if ((*note != 0) != cases[i].is_dark)
 			fail_msg("%s: '%s'", cases[i].emitters, note);
 		world_free(w);
 	}
@@ -147,14 +147,14 @@ static void test_dark(void **state)
 
 /* A shape so large that rays from the camera beside it drown in its rounding is named; one at a proper distance, or
  * with the camera beside it, is not. */
-static void test_too_close(void **state)
+static void test_camera_beside_a_huge_shape_is_noted(void **state)
 {
 	(void)state;
 #define WIDE(turn, size) \
 	"<shape type='rectangle'><transform name='to_world'><scale value='" size "'/>" turn "</transform></shape>"
 	static const struct {
 		const char *shape;
-		bool close;
+		bool is_close;
 	} cases[] = {
 		{WIDE("", "1e16"), true},
 		{WIDE("<rotate x='1' y='1' angle='40'/><translate z='4.5'/>", "1e16"), true},
@@ -170,15 +170,15 @@ static void test_too_close(void **state)
 		struct world *w =
 			world_from_text(32, 32, LOOK("0,0,0", "") "<emitter type='constant'/>%s", cases[i].shape);
 		char note[1024];
-		note_of(w, "the camera is too near to the ", note);
-		if ((*note != 0) != cases[i].close)
+		find_note(w, "the camera is too near to the ", note);
+		if ((*note != 0) != cases[i].is_close)
 			fail_msg("%s: '%s'", cases[i].shape, note);
 		world_free(w);
 	}
 }
 
 /* Negative pixels of an environment count as 0, with a note, whatever the others are. */
-static void test_negative_pixels(void **state)
+static void test_negative_pixels_of_environments_are_noted(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>" SENSOR(
@@ -196,7 +196,7 @@ static void test_negative_pixels(void **state)
 						    {"sky.pfm", pfm, (size_t)head + sizeof pixels[i]},
 						    {NULL, NULL, 0}};
 		struct world *w = world_from_files(32, 32, files);
-		note_of(w, "negative", note);
+		find_note(w, "negative", note);
 		assert_string_equal(note, said[i]);
 		world_free(w);
 	}
@@ -241,7 +241,7 @@ static void test_negative_texels(void **state)
 						    {NULL, NULL, 0}};
 		struct world *w = world_from_files(32, 32, files);
 		char note[1024];
-		note_of(w, "negative", note);
+		find_note(w, "negative", note);
 		assert_string_equal(note, cases[i].said);
 		world_free(w);
 	}
@@ -250,9 +250,12 @@ static void test_negative_texels(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sentences), cmocka_unit_test(test_against_rays),
-		cmocka_unit_test(test_dark),	  cmocka_unit_test(test_negative_pixels),
-		cmocka_unit_test(test_too_close), cmocka_unit_test(test_negative_texels),
+		cmocka_unit_test(test_cameras_that_see_nothing_are_noted),
+		cmocka_unit_test(test_note_agrees_with_rays),
+		cmocka_unit_test(test_dark_scenes_are_noted),
+		cmocka_unit_test(test_negative_pixels_of_environments_are_noted),
+		cmocka_unit_test(test_camera_beside_a_huge_shape_is_noted),
+		cmocka_unit_test(test_negative_texels),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

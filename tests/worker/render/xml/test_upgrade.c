@@ -18,7 +18,7 @@
 
 static struct memory_file files[4];
 
-static int read_as(struct scene *s, const char *version, const char *body, const char *included, struct error *e)
+static int read_version(struct scene *s, const char *version, const char *body, const char *included, struct error *e)
 {
 	static char text[8192];
 	snprintf(text, sizeof text, "<scene version='%s'>%s</scene>", version, body);
@@ -28,11 +28,11 @@ static int read_as(struct scene *s, const char *version, const char *body, const
 	return scene_read(s, &assets, "s.xml", render_plugins(), NULL, 0, e);
 }
 
-static struct scene read_ok(const char *version, const char *body, const char *included)
+static struct scene read_valid(const char *version, const char *body, const char *included)
 {
 	struct scene s;
 	struct error e;
-	if (read_as(&s, version, body, included, &e))
+	if (read_version(&s, version, body, included, &e))
 		fail_msg("%s: %s", version, e.text);
 	return s;
 }
@@ -76,7 +76,7 @@ static void assert_same_node(const struct scene_node *a, const struct scene_node
 static void assert_twins(const char *version, const char *body, const char *included, const char *now,
 			 const char *other)
 {
-	struct scene a = read_ok(version, body, included), b = read_ok("0.6.0", now, other);
+	struct scene a = read_valid(version, body, included), b = read_valid("0.6.0", now, other);
 	assert_int_equal(a.object_count, b.object_count);
 	for (uint32_t i = 0; i < a.object_count; i++)
 		assert_same_node(a.objects[i], b.objects[i]);
@@ -88,7 +88,7 @@ static void assert_twins(const char *version, const char *body, const char *incl
 #define PART "<film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='4'/></film>"
 #define TO(x) "<transform name='toWorld'>" x "</transform>"
 
-static void test_version_3(void **state)
+static void test_version_0_3_reads_like_its_twin(void **state)
 {
 	(void)state;
 	assert_twins(
@@ -120,7 +120,7 @@ static void test_version_3(void **state)
 		"");
 }
 
-static void test_version_2(void **state)
+static void test_version_0_2_reads_like_its_twin(void **state)
 {
 	(void)state;
 	assert_twins("0.2.1",
@@ -145,7 +145,7 @@ static void test_version_2(void **state)
 }
 
 /* Colours with a factor other than 1 move into a texture `scale`, and missing colours had other default values. */
-static void test_materials_of_version_2(void **state)
+static void test_materials_of_version_0_2_are_upgraded(void **state)
 {
 	(void)state;
 	assert_twins(
@@ -188,7 +188,7 @@ static void test_materials_of_version_2(void **state)
 }
 
 /* The first lookAt was mirrored, and so were cameras: both together give today's result. */
-static void test_first_lookat(void **state)
+static void test_mirrored_lookat_of_first_versions_is_undone(void **state)
 {
 	(void)state;
 	static const char first[] = "<lookAt ox='1' oy='2' oz='3' tx='0' ty='0' tz='0' ux='0' uy='1' uz='0'/>";
@@ -209,7 +209,7 @@ static void test_first_lookat(void **state)
 }
 
 /* A file that includes one of another version keeps its own; the field of view refers to the smaller side. */
-static void test_each_file_for_itself(void **state)
+static void test_each_file_keeps_its_own_version(void **state)
 {
 	(void)state;
 	static const char *const axes[][2] = {{"", "smaller"},
@@ -230,14 +230,14 @@ static void test_each_file_for_itself(void **state)
 }
 
 /* Parameters that the upgrade moves to another element have an effect: no note calls them ignored. */
-static void test_nothing_is_called_ignored(void **state)
+static void test_moved_parameters_are_not_noted_as_ignored(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("0.2.0",
-				 "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>" TO(
-					 LOOK) "<boolean name='mapSmallerSide' value='false'/></camera>"
-					       "<bsdf type='phong'><float name='specularAmount' value='.5'/></bsdf>",
-				 "");
+	struct scene s = read_valid("0.2.0",
+				    "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>" TO(
+					    LOOK) "<boolean name='mapSmallerSide' value='false'/></camera>"
+						  "<bsdf type='phong'><float name='specularAmount' value='.5'/></bsdf>",
+				    "");
 	assert_false(scene_has_note(&s, "is ignored"));
 	assert_string_equal(node_string(s.objects[0], "fov_axis", ""), "larger");
 	scene_fini(&s);
@@ -245,7 +245,7 @@ static void test_nothing_is_called_ignored(void **state)
 
 /* `disney`, the name of `principled` and `principledthin` before their release, is read in files of 2.x and 3.x only.
  */
-static void test_disney(void **state)
+static void test_disney_is_read_as_principled(void **state)
 {
 	(void)state;
 	static const struct {
@@ -259,7 +259,7 @@ static void test_disney(void **state)
 		char body[256];
 		snprintf(body, sizeof body, "<bsdf type='twosided'><bsdf type='Disney'>%s</bsdf></bsdf>",
 			 cases[i].inside);
-		struct scene s = read_ok("2.0.0", body, "");
+		struct scene s = read_valid("2.0.0", body, "");
 		const struct scene_node *n = node_child(s.objects[0], PLUGIN_BSDF, 0);
 		assert_string_equal(n->type, cases[i].type);
 		assert_int_equal(n->property_count, 1);
@@ -268,18 +268,18 @@ static void test_disney(void **state)
 	}
 	struct scene s;
 	struct error e;
-	assert_true(read_as(&s, "0.6.0", "<bsdf type='disney'/>", "", &e));
+	assert_true(read_version(&s, "0.6.0", "<bsdf type='disney'/>", "", &e));
 	assert_non_null(strstr(e.text, "there is no bsdf of this type"));
-	assert_true(read_as(&s, "3.0.0", "<bsdf type='disney'><boolean name='thin' value='x'/></bsdf>", "", &e));
+	assert_true(read_version(&s, "3.0.0", "<bsdf type='disney'><boolean name='thin' value='x'/></bsdf>", "", &e));
 	assert_non_null(strstr(e.text, "`thin` of <bsdf type=\"principled\"> would change the image"));
 }
 
 /* The same text as version 0.3, and as 0.4, which does not mirror cameras. */
-static void test_left_is_right(void **state)
+static void test_version_0_3_mirrors_cameras(void **state)
 {
 	(void)state;
 	const char *text = "<camera type='perspective'>" TO(LOOK) PART "</camera>";
-	struct scene a = read_ok("0.3.0", text, ""), b = read_ok("0.4.0", text, "");
+	struct scene a = read_valid("0.3.0", text, ""), b = read_valid("0.4.0", text, "");
 	const mat4 m = node_transform(a.objects[0], "to_world"), n = node_transform(b.objects[0], "to_world");
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 4; k++)
@@ -290,7 +290,7 @@ static void test_left_is_right(void **state)
 	scene_fini(&b);
 }
 
-static void test_refused(void **state)
+static void test_invalid_old_files_are_refused(void **state)
 {
 	(void)state;
 	static const struct {
@@ -311,7 +311,7 @@ static void test_refused(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct scene s;
 		struct error e = {""};
-		int r = read_as(&s, cases[i].version, cases[i].body, "", &e);
+		int r = read_version(&s, cases[i].version, cases[i].body, "", &e);
 		if (!*cases[i].sentence) {
 			if (!r)
 				scene_fini(&s);
@@ -323,7 +323,7 @@ static void test_refused(void **state)
 }
 
 /* Before 0.3, files had no version. Files included by a file without a version need none either. */
-static void test_no_version(void **state)
+static void test_files_without_version_are_the_oldest(void **state)
 {
 	(void)state;
 	static const char marked[] = "<scene version='0.2.0'>", plain[] = "<scene>",
@@ -366,7 +366,7 @@ static void test_no_version(void **state)
 
 /* From 2.x on an object may have a version: the names in this object and the objects inside it follow it, and no
  * others do. */
-static void test_versions_of_objects(void **state)
+static void test_objects_may_have_their_own_version(void **state)
 {
 	(void)state;
 	static const char old[] =
@@ -378,7 +378,7 @@ static void test_versions_of_objects(void **state)
 				  "<bsdf type='plastic'><float name='int_ior' value='1.4'/></bsdf></shape>"
 				  "<shape type='disk'><transform name='to_world'><translate y='2'/></transform>"
 				  "<bsdf type='plastic'><float name='int_ior' value='1.3'/></bsdf></shape>";
-	struct scene s[2] = {read_ok("2.0.0", old, ""), read_ok("3.0.0", now, "")};
+	struct scene s[2] = {read_valid("2.0.0", old, ""), read_valid("3.0.0", now, "")};
 	assert_int_equal(s[0].object_count, 2);
 	for (uint32_t i = 0; i < 2; i++)
 		assert_same_node(s[0].objects[i], s[1].objects[i]);
@@ -395,7 +395,7 @@ static void test_versions_of_objects(void **state)
 	};
 	for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
 		struct error e;
-		if (!read_as(&s[0], refused[i][0], refused[i][1], "", &e) || !strstr(e.text, refused[i][2]))
+		if (!read_version(&s[0], refused[i][0], refused[i][1], "", &e) || !strstr(e.text, refused[i][2]))
 			fail_msg("%s: \"%s\"", refused[i][1], e.text);
 	}
 }
@@ -403,17 +403,17 @@ static void test_versions_of_objects(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_version_3),
-		cmocka_unit_test(test_version_2),
-		cmocka_unit_test(test_materials_of_version_2),
-		cmocka_unit_test(test_first_lookat),
-		cmocka_unit_test(test_each_file_for_itself),
-		cmocka_unit_test(test_nothing_is_called_ignored),
-		cmocka_unit_test(test_disney),
-		cmocka_unit_test(test_left_is_right),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_no_version),
-		cmocka_unit_test(test_versions_of_objects),
+		cmocka_unit_test(test_version_0_3_reads_like_its_twin),
+		cmocka_unit_test(test_version_0_2_reads_like_its_twin),
+		cmocka_unit_test(test_materials_of_version_0_2_are_upgraded),
+		cmocka_unit_test(test_mirrored_lookat_of_first_versions_is_undone),
+		cmocka_unit_test(test_each_file_keeps_its_own_version),
+		cmocka_unit_test(test_moved_parameters_are_not_noted_as_ignored),
+		cmocka_unit_test(test_disney_is_read_as_principled),
+		cmocka_unit_test(test_version_0_3_mirrors_cameras),
+		cmocka_unit_test(test_invalid_old_files_are_refused),
+		cmocka_unit_test(test_files_without_version_are_the_oldest),
+		cmocka_unit_test(test_objects_may_have_their_own_version),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,7 @@
 
 /* The names that exist, and names outside the folders that may be read. */
 struct disk {
-	const char *scene, *there[4], *outside[4];
+	const char *scene, *existing[4], *outside_existing[4];
 };
 
 static bool is_listed(const char *const *list, const char *name)
@@ -33,9 +33,9 @@ static int disk_open(void *user, const char *name, struct asset *out, struct err
 {
 	const struct disk *d = user;
 	bool scene = strcmp(name, "s.xml") == 0;
-	if (is_listed(d->outside, name))
+	if (is_listed(d->outside_existing, name))
 		return error_set(e, EINVAL, "%s: leads out", name);
-	if (!scene && !is_listed(d->there, name))
+	if (!scene && !is_listed(d->existing, name))
 		return error_set(e, ENOENT, "%s: not there", name);
 	const char *bytes = scene ? d->scene : name;
 	*out = (struct asset){.bytes = (const unsigned char *)bytes, .size = strlen(bytes)};
@@ -69,47 +69,49 @@ static void expect_name(struct disk d, const char *paths, const char *written, c
 #define PATHS "<path value='a'/><path value='../b'/>"
 
 /* Mitsuba 3 puts each folder before those that it already searches, the scene's own among them. */
-static void test_paths_in_order(void **state)
+static void test_later_paths_are_searched_first(void **state)
 {
 	(void)state;
-	expect_name((struct disk){.there = {"m.ply"}}, PATHS, "m.ply", "m.ply", 0);
-	expect_name((struct disk){.there = {"m.ply", "a/m.ply"}}, PATHS, "m.ply", "a/m.ply", 0);
-	expect_name((struct disk){.there = {"m.ply", "a/m.ply", "%2e%2e/b/m.ply"}}, PATHS, "m.ply", "%2e%2e/b/m.ply",
+	expect_name((struct disk){.existing = {"m.ply"}}, PATHS, "m.ply", "m.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply", "a/m.ply"}}, PATHS, "m.ply", "a/m.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply", "a/m.ply", "%2e%2e/b/m.ply"}}, PATHS, "m.ply", "%2e%2e/b/m.ply",
 		    0);
-	expect_name((struct disk){.there = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
 }
 
 /* A file that may not be read is named if no other folder has the file, so that opening it can report how to allow
  * it. */
-static void test_path_outside(void **state)
+static void test_outside_file_is_named_only_if_no_folder_has_it(void **state)
 {
 	(void)state;
 	static const char outside[] = "%2e%2e/b/m.ply";
-	expect_name((struct disk){.outside = {outside}}, PATHS, "m.ply", outside, 0);
-	expect_name((struct disk){.there = {"m.ply"}, .outside = {outside}}, PATHS, "m.ply", "m.ply", 0);
-	expect_name((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
+	expect_name((struct disk){.outside_existing = {outside}}, PATHS, "m.ply", outside, 0);
+	expect_name((struct disk){.existing = {"m.ply"}, .outside_existing = {outside}}, PATHS, "m.ply", "m.ply", 0);
+	expect_name((struct disk){.existing = {"a/m.ply"}, .outside_existing = {outside}}, PATHS, "m.ply", "a/m.ply",
+		    0);
 }
 
 /* A path that does not exist is replaced by its longest suffix that does; an existing path is kept, even if it may
  * not be read. */
-static void test_ends_of_paths(void **state)
+static void test_missing_paths_are_replaced_by_their_existing_suffix(void **state)
 {
 	(void)state;
-	expect_name((struct disk){.there = {"x/m.ply", "m.ply"}}, "", "/home/me/x/m.ply", "x/m.ply", 1);
-	expect_name((struct disk){.there = {"m.ply"}}, "", "/home/me/x/m.ply", "m.ply", 1);
-	expect_name((struct disk){.there = {"m.ply"}}, "", "C:\\me\\x\\m.ply", "m.ply", 1);
-	expect_name((struct disk){.there = {"%2f/x/m.ply", "m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
-	expect_name((struct disk){.there = {"m.ply"}, .outside = {"%2f/x/m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
-	expect_name((struct disk){.there = {"m.ply"}}, "", "/x/none.ply", "%2f/x/none.ply", 0);
-	expect_name((struct disk){.there = {"m.ply"}}, "", "x/m.ply", "x/m.ply", 0);
+	expect_name((struct disk){.existing = {"x/m.ply", "m.ply"}}, "", "/home/me/x/m.ply", "x/m.ply", 1);
+	expect_name((struct disk){.existing = {"m.ply"}}, "", "/home/me/x/m.ply", "m.ply", 1);
+	expect_name((struct disk){.existing = {"m.ply"}}, "", "C:\\me\\x\\m.ply", "m.ply", 1);
+	expect_name((struct disk){.existing = {"%2f/x/m.ply", "m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply"}, .outside_existing = {"%2f/x/m.ply"}}, "", "/x/m.ply",
+		    "%2f/x/m.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply"}}, "", "/x/none.ply", "%2f/x/none.ply", 0);
+	expect_name((struct disk){.existing = {"m.ply"}}, "", "x/m.ply", "x/m.ply", 0);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_paths_in_order),
-		cmocka_unit_test(test_path_outside),
-		cmocka_unit_test(test_ends_of_paths),
+		cmocka_unit_test(test_later_paths_are_searched_first),
+		cmocka_unit_test(test_outside_file_is_named_only_if_no_folder_has_it),
+		cmocka_unit_test(test_missing_paths_are_replaced_by_their_existing_suffix),
 	};
 	return cmocka_run_group_tests_name("xml_files", tests, NULL, NULL);
 }

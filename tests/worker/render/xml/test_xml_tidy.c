@@ -27,7 +27,7 @@ static void expect_unchanged(const char *text)
 	expect_tidied(text, text);
 }
 
-static void test_comments(void **state)
+static void test_comments_are_tidied(void **state)
 {
 	(void)state;
 	expect_tidied("<a><!-- b -- c\n--- d --></a>", "<a>           \n         </a>");
@@ -37,7 +37,7 @@ static void test_comments(void **state)
 	expect_unchanged("<a/><!-- no end <!-- either");
 }
 
-static void test_ampersands(void **state)
+static void test_bare_ampersands_are_escaped(void **state)
 {
 	(void)state;
 	expect_tidied("<a b='c & d'/>", "<a b='c &amp; d'/>");
@@ -46,7 +46,7 @@ static void test_ampersands(void **state)
 	expect_unchanged("<a><![CDATA[ & <!-- -- -->]]></a><?pi & ?>");
 }
 
-static void test_declarations(void **state)
+static void test_misplaced_declarations_are_tidied(void **state)
 {
 	(void)state;
 	expect_unchanged("<?xml version='1.0' encoding='ISO-8859-1'?><a/>");
@@ -57,7 +57,7 @@ static void test_declarations(void **state)
 	expect_unchanged("\n<?xml version='1.0'");
 }
 
-static void test_sizes(void **state)
+static void test_empty_wide_and_endless_texts_are_handled(void **state)
 {
 	(void)state;
 	size_t size = 0;
@@ -89,10 +89,10 @@ static void test_sizes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_comments),
-		cmocka_unit_test(test_ampersands),
-		cmocka_unit_test(test_declarations),
-		cmocka_unit_test(test_sizes),
+		cmocka_unit_test(test_comments_are_tidied),
+		cmocka_unit_test(test_bare_ampersands_are_escaped),
+		cmocka_unit_test(test_misplaced_declarations_are_tidied),
+		cmocka_unit_test(test_empty_wide_and_endless_texts_are_handled),
 	};
 	return cmocka_run_group_tests_name("xml_tidy", tests, NULL, NULL);
 }
