@@ -159,7 +159,7 @@ $(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c 
 	@mkdir -p $(@D); id=$$(LC_ALL=C readelf -n $< | sed -n 's/.*Build ID: //p'); \
 	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
 # Sanitized runs take 1/20 of the samples, and skip tests that only draw more samples: other tests run the same code.
-SAN_WITHOUT := /tests/(image/|(numerics/test_(agree|random)|worker/render/(test_choose|mutation/test_(balance|forced|broken)))$$)
+SAN_WITHOUT := /tests/(image/|(numerics/test_(agree|random)|worker/render/(test_choose_integrator|mutation/test_(balance|forced|broken)))$$)
 TEST_RUN    := $(if $(SAN),$(shell printf '%s\n' $(TEST_BIN) | grep -vE '$(SAN_WITHOUT)'),$(TEST_BIN))
 # A build without sanitizers also compiles the fuzzers (linked with clang only), the benchmarks and the calibration, so that they keep building.
 TEST_MORE   := $(if $(SAN),,$(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c)))

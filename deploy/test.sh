@@ -110,7 +110,7 @@ else
 	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
 	# With --ci, tests that compare images for minutes are left out, to stay within half an hour; others run the same code.
 	without=${HSLT_TEST_WITHOUT:-}
-	[ $mode != ci ] || without='path/test_(motion|volume_emission|closed_form|integrators|merging|longer)$|test_infinite$|bsdf/test_sampling$|test_redistribution$|test_many$|render/test_rays$'
+	[ $mode != ci ] || without='path/test_(motion|volume_emission|closed_form|integrators|merging|overlong)$|test_infinite$|bsdf/test_sampling$|test_redistribution$|test_many$|render/test_count_rays$'
 	kind "tests with sanitizers, 1/20 of the samples" env HSLT_TEST_KINDS=unit HSLT_TEST_WITHOUT="$without" \
 		make -s SAN=address,undefined test
 	step "build with clang" sh tests/fuzz/run.sh --build programs fuzzers test-syntax

@@ -22,7 +22,7 @@ void *arena_alloc(struct arena *a, size_t count, size_t size);
 /* Returns a copy of s; NULL as for arena_alloc. */
 char *arena_strdup(struct arena *a, const char *s);
 
-/* Bytes that the arena holds once, however often arena_share is called with them. They must not be changed. */
+/* Bytes that the arena holds once, however often arena_intern is called with them. They must not be changed. */
 struct arena_interned {
 	const void *bytes;
 	size_t size;

@@ -114,7 +114,7 @@ static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct e
 	return 0;
 }
 
-/* Reads the whole file and compares the CRC_SIZE at its end. Sets the number of bytes before the CRC_SIZE. */
+/* Reads the whole file and compares the CRC at its end. Sets the number of bytes before the CRC. */
 static int verify_crc(struct checked_file *s, struct error *e)
 {
 	struct stat st;

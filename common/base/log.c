@@ -148,7 +148,7 @@ static void restore_dropped(uint64_t lines)
 static size_t format_dropped(char *line, size_t size, uint64_t lines)
 {
 	char text[32];
-	snprintf(text, sizeof text, "more=%llu", log_value_from_u64(lines));
+	snprintf(text, sizeof text, "more=%llu", log_u64_arg(lines));
 	size_t n = log_format(line, size - 1, LOG_LOG_DROPPED, text);
 	line[n++] = '\n';
 	return n;

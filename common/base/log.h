@@ -84,7 +84,7 @@ struct log_value {
 /* Returns the text in double quotes, escaped, without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
 /* Converts for %llu, whatever type uint64_t is. */
-static inline unsigned long long log_value_from_u64(uint64_t n)
+static inline unsigned long long log_u64_arg(uint64_t n)
 {
 	return n;
 }

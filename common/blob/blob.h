@@ -84,8 +84,8 @@ void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path
 int blob_write_defer(struct blob_writer *w, struct blob_deferred *deferred, struct error *e);
 /* Marks the blob as present: its file has been flushed and renamed. */
 void blob_deferred_publish(struct blob_store *s, const struct blob_deferred *deferred);
-/* Ends the hold that blob_write_defer took; to be called once for each kept file. Returns true if the blob is missing
- * and no longer held: then call blob_store_sweep after the last one. */
+/* Ends the hold that blob_write_defer took; to be called once for each deferred file. Returns true if the blob is
+ * missing and no longer held: then call blob_store_sweep after the last one. */
 bool blob_deferred_release(struct blob_store *s, const struct blob_deferred *deferred);
 /* Removes the entries of all blobs that are missing and not held, in one pass. */
 void blob_store_sweep(struct blob_store *s);

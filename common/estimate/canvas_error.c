@@ -184,7 +184,7 @@ static double block_variance(const double *deviations, uint32_t groups, double p
 }
 
 /* If all groups but a few agree about a pixel, settles it by the brightness that they agree on, plus the block's mean
- * excess of the few, `rare_sum` per pixel with the variance `variance`. In this way a wall beside a lamp stays dark.
+ * excess of the few, `rare` per pixel with the variance `variance`. In this way a wall beside a lamp stays dark.
  * Returns false if that brightness is not reliable either. */
 static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double variance)
 {

@@ -23,8 +23,8 @@ struct error_sums {
 	double kurtosis_total;	/* sum of the kurtosis of the groups' values, weighted by parts */
 	double tail_index;	/* tail index of the groups' relative errors on the bright side; INFINITY: not known */
 	size_t tail_count;	/* number of largest errors from which it was estimated */
-	double gram[ERROR_GROUPS_FOLDED]
-		   [ERROR_GROUPS_FOLDED]; /* products of the errors of two groups; further groups are folded */
+	/* Products of the errors of two groups; further groups are folded. */
+	double gram[ERROR_GROUPS_FOLDED][ERROR_GROUPS_FOLDED];
 	double distance[PLAN_GROUPS_MAX]; /* squared error of each group, if there are more than ERROR_GROUPS_FOLDED */
 };
 

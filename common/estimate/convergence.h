@@ -35,7 +35,7 @@ struct convergence {
 	char text[CONVERGENCE_TEXT_MAX]; /* one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
 };
 
-/* Judges the chains of an image that canvas_image has made. */
+/* Judges the chains of an image that canvas_image_init has made. */
 void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *a);
 const char *convergence_name(enum convergence_verdict v); /* "agree", "too short", "disagree" */
 

@@ -24,8 +24,8 @@ enum {
 	STEPS_MAX = 256,    /* looks of a simulated render; 2^60 rounds have fewer */
 	TRIES_MAX = 64,
 };
-static const double min_work_share =
-	1.0 / 16;		     /* looks at less than this share of the work say little about the future */
+/* Looks at less than this share of the work say little about the future. */
+static const double min_work_share = 1.0 / 16;
 static const double burst_sd = 0.15; /* spread of a look in addition to chi-square: rare bursts of light */
 /* Prior standard deviation of the trend: rare bursts of light, and chains that remember their seeds. */
 static const double trend_prior_sd = 0.2;

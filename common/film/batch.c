@@ -111,8 +111,8 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 
 enum {
 	STATE_HEAD_MAX = 64, /* most bytes of a state besides its vertices */
-	STATE_VERTEX_MAX =
-		128,	     /* most bytes per vertex: random numbers of both sub-paths; a stored path needs only 40 */
+	/* Most bytes per vertex: random numbers of both sub-paths; a stored path needs only 40. */
+	STATE_VERTEX_MAX = 128,
 	STATE_OVERHEAD = 48, /* memory per state besides its bytes: struct chain_state and the allocator's overhead */
 };
 

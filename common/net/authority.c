@@ -380,8 +380,8 @@ static int write_pair(const struct authority *a, const char *name, X509 *cert, E
 		rc = rename_in_folder(a, name, "cert.pem" KEY_PAIR_NEXT, "cert.pem", e);
 	static const char *const files[] = {"cert.pem" KEY_PAIR_NEXT, "key.pem.next"};
 	for (size_t i = 0; i < 2; i++)
-		if (!*key_replaced &&
-		    join_path(path, &ignored, a->folder, name, files[i]) == 0) /* it will not be recorded */
+		/* It will not be recorded. */
+		if (!*key_replaced && join_path(path, &ignored, a->folder, name, files[i]) == 0)
 			disk_unlink(path);
 	return rc;
 }

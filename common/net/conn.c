@@ -98,7 +98,7 @@ void conn_close(struct conn *c, const char *why)
 	uv_close((uv_handle_t *)&c->tcp, on_handle_closed);
 }
 
-/* ---- the connection's clock_ms ---- */
+/* ---- the connection's clock ---- */
 
 /* Returns the connection's clock, which stands still while the loop is busy: bytes that arrive then have not been read
  * yet, for which no peer is to blame. */
@@ -235,7 +235,7 @@ static size_t handle_frames(struct conn *c, const unsigned char *bytes, size_t s
 		} else if (rc) {
 			c->frame_count++;
 			deliver_frame(c);
-			/* now: the next frame, which would do it, may be long in coming. */
+			/* Reset now: the next frame, which would do it, may be long in coming. */
 			frame_reader_reset(&c->reader);
 			release_turn(c);
 		}

@@ -192,7 +192,7 @@ void send_queue_send_raw(struct send_queue *q, const void *bytes, size_t size)
 }
 
 /* Sends the output of TLS, which stands for `plaintext_bytes` bytes of frames. */
-static void flush_tls(struct send_queue *q, size_t plain)
+static void flush_tls(struct send_queue *q, size_t plaintext_bytes)
 {
 	const unsigned char *bytes;
 	size_t size = tls_link_output(q->link, &bytes);
@@ -201,7 +201,7 @@ static void flush_tls(struct send_queue *q, size_t plain)
 	if (q->in_flight_bytes > 2 * WINDOW_BYTES) /* a peer that sends requests and does not read the answers */
 		report_failure(q, "the peer does not read what is sent to it");
 	else
-		write_copy(q, bytes, size, plain);
+		write_copy(q, bytes, size, plaintext_bytes);
 	tls_link_clear_output(q->link);
 }
 

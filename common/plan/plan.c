@@ -23,8 +23,8 @@ enum {
 	DEFAULT_CHAINS = 1024,
 	DEFAULT_BOOTSTRAP = 1000000,
 	BOOTSTRAP_MIN = 16384,
-	SAMPLES_BOOTSTRAP_MIN =
-		4096,		    /* minimum for plans of samples, whose bootstrap only sets the scale of the grid */
+	/* Minimum for plans of samples, whose bootstrap only sets the scale of the grid. */
+	SAMPLES_BOOTSTRAP_MIN = 4096,
 	SAMPLES_PER_BOOTSTRAP = 64, /* plans of samples have one bootstrap sample per 64 samples */
 	SLOW_BOOTSTRAP_MIN = 256,   /* minimum if a bootstrap sample takes thousands of rays: each then connects as many
 					 pairs of vertices, so that 256 samples find light if there is any */
@@ -488,25 +488,25 @@ static int check_division(const struct plan *p, struct error *e)
 	if (p->bootstrap < 1 || p->bootstrap > PLAN_BOOTSTRAP_MAX || p->bootstrap % leases)
 		return error_set(e, EINVAL, "%llu bootstrap samples are not a multiple of %llu up to %d",
 				 (unsigned long long)p->bootstrap, (unsigned long long)leases, PLAN_BOOTSTRAP_MAX);
-	uint64_t lease_unit;
+	uint64_t unit;
 	if (p->kind == PLAN_CHAINS) {
 		if (p->chains < 1 || p->chains > PLAN_CHAINS_MAX || p->chains % leases)
 			return error_set(e, EINVAL, "%u chains are not a multiple of %llu up to %d", p->chains,
 					 (unsigned long long)leases, PLAN_CHAINS_MAX);
-		lease_unit = p->chains / leases;
-		if (lease_unit > PLAN_LEASE_CHAINS_MAX)
+		unit = p->chains / leases;
+		if (unit > PLAN_LEASE_CHAINS_MAX)
 			return error_set(
 				e, EINVAL,
 				"%u chains in %u groups of %u parts are %llu per lease, of at most %d: choose more groups or parts",
-				p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_LEASE_CHAINS_MAX);
+				p->chains, p->groups, p->parts, (unsigned long long)unit, PLAN_LEASE_CHAINS_MAX);
 	} else {
 		if (p->chains)
 			return error_set(e, EINVAL, "a plan without chains names %u of them", p->chains);
 		if (p->parts > p->crop_height + 2 * p->border)
 			return error_set(e, EINVAL, "%u parts of %u rows", p->parts, p->crop_height + 2 * p->border);
-		lease_unit = plan_extended_pixels(p);
+		unit = plan_extended_pixels(p);
 	}
-	if (p->epoch < 1 || p->epoch > LEASE_SIZE_MAX / lease_unit)
+	if (p->epoch < 1 || p->epoch > LEASE_SIZE_MAX / unit)
 		return error_set(e, EINVAL, "an epoch of %llu is not possible", (unsigned long long)p->epoch);
 	return 0;
 }

@@ -18,12 +18,12 @@ static size_t unseen_to_wire(const struct plan_unseen *u, double **out)
 	return 0;
 }
 
-static int unseen_from_wire(const double *at, size_t count, struct plan_unseen *out, struct error *e)
+static int unseen_from_wire(const double *values, size_t count, struct plan_unseen *out, struct error *e)
 {
 	if (count && count != PLAN_UNSEEN_COUNT)
 		return error_set(e, EBADMSG, "a plan with %zu numbers of unseen light", count);
 	for (size_t i = 0; i < count; i++)
-		out->mean_squares[i] = at[i];
+		out->mean_squares[i] = values[i];
 	return 0;
 }
 

@@ -121,8 +121,8 @@ static void merge_result(struct farm *f, struct peer *p, struct job *j, struct s
 	if (l)
 		lease_drop(f, l);
 	for (const struct lease *k = s->leases; k; k = k->next)
-		if (k->sent_at < sent && !k->is_delivered &&
-		    !k->is_overdue) /* a copy sent later has overtaken this one */
+		/* A copy sent later has overtaken this one. */
+		if (k->sent_at < sent && !k->is_delivered && !k->is_overdue)
 			peer_note_lateness(f, k->peer);
 	lease_revoke_slot(f, s);
 	j->counts.verified += verified;

@@ -21,8 +21,8 @@ const char *doubt_maker_name(const struct farm *f, const struct lease_key *k)
 	bool known_slot =
 		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
 	const struct slot *s = known_slot ? job_get_slot(j, k->group, k->part) : NULL;
-	return s && s->next_epoch == k->epoch && k->epoch > 0 ? worker_name(f, s->doubt.maker)
-							      : "?"; /* only the maker of the latest states is known */
+	/* Only the maker of the latest states is known. */
+	return s && s->next_epoch == k->epoch && k->epoch > 0 ? worker_name(f, s->doubt.maker) : "?";
 }
 
 static bool is_party(const struct slot *s, uint64_t worker_id)

@@ -20,7 +20,7 @@ enum event_kind {
 	EVENT_LEFT,	     /* peer: its connection is closed */
 	EVENT_HEARTBEAT,     /* peer: every other event of a peer counts as a heartbeat, too */
 	EVENT_LEASE_REQUEST, /* peer, wanted_leases */
-	EVENT_BATCH,	     /* peer, key, valid, text: the result of a lease */
+	EVENT_BATCH,	     /* peer, key, is_valid, text: the result of a lease */
 	EVENT_STORED_BATCH,  /* key, digest: a result stored by an earlier run, which may count now */
 	/* peer, key: a result has arrived and will be judged later (EVENT_BATCH); meanwhile the worker may get
 	 * another lease */

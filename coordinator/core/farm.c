@@ -108,7 +108,7 @@ static void handle_request(struct farm *f, const struct event *ev)
 		peer_requeue(f, p);
 }
 
-static void handle_job_broken(struct farm *f, const struct event *ev)
+static void handle_job_failed(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
 	if (j && job_is_live(j))
@@ -142,7 +142,7 @@ static void (*const event_handlers[])(struct farm *, const struct event *) = {
 	[EVENT_SET_PRIORITY] = orders_set_priority,
 	[EVENT_EXTEND] = orders_extend,
 	[EVENT_QUARANTINED] = handle_quarantined,
-	[EVENT_JOB_FAILED] = handle_job_broken,
+	[EVENT_JOB_FAILED] = handle_job_failed,
 };
 
 void farm_step(struct farm *f, const struct event *ev, struct update *u)

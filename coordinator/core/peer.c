@@ -126,9 +126,8 @@ void peer_note_failure(const struct farm *f, struct peer *p, uint64_t job, bool 
  * everything and returns nothing blocks little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
-	struct peer **peers = p->identity->reference_count > 1
-				      ? f->peers
-				      : &p; /* an old connection of the same worker may still exist */
+	/* An old connection of the same worker may still exist. */
+	struct peer **peers = p->identity->reference_count > 1 ? f->peers : &p;
 	uint32_t count = p->identity->reference_count > 1 ? f->peer_count : 1;
 	p->identity->lease_window = window;
 	for (uint32_t i = 0; i < count; i++)

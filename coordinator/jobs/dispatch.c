@@ -98,7 +98,7 @@ static void note_job_change(struct jobs *jobs, const struct action *a)
 		     : a->state == JOB_DONE ? LOG_JOB_DONE
 					    : LOG_JOB_STATE,
 		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
-		     a->end == END_NONE ? "none" : job_end_name(a->end), log_value_from_u64(a->rounds),
+		     a->end == END_NONE ? "none" : job_end_name(a->end), log_u64_arg(a->rounds),
 		     log_quote(a->text).text);
 	job->has_ended = job_state_is_end(a->state);
 }
@@ -134,8 +134,8 @@ static void write_partials(const struct jobs *jobs, const struct lease_key *k, c
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", jobs->config.partials_folder,
-			 log_value_from_u64(k->job), log_value_from_u64(k->epoch), k->group, k->part,
-			 in->batch->tiles[i].x, in->batch->tiles[i].y);
+			 log_u64_arg(k->job), log_u64_arg(k->epoch), k->group, k->part, in->batch->tiles[i].x,
+			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 		int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
 		if (fd >= 0 && disk_close(fd) && !rc)
@@ -171,8 +171,8 @@ static void merge_result(struct jobs *jobs, const struct action *a, const struct
 		jobs_defer_failure(jobs, a->job, e.text);
 	trust_count_unverified(job, a);
 	live_job_note_times(job, farm_job_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
-	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_value_from_u64(a->job),
-		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key), in->is_stored ? " late=1" : "");
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_u64_arg(a->job), log_u64_arg(a->peer),
+		  LEASE_VALUES(&a->key), in->is_stored ? " late=1" : "");
 }
 
 static void roll_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
@@ -197,8 +197,8 @@ static void acknowledge_result(struct jobs *jobs, const struct action *a)
 		log_event(a->ack == ACK_REPEATED ? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED	 ? LOG_BATCH_NOTED
 						 : LOG_BATCH_REFUSED,
-			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_value_from_u64(a->job),
-			  log_value_from_u64(a->peer), log_quote(name ? name : "?").text, LEASE_VALUES(&a->key),
+			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_u64_arg(a->job),
+			  log_u64_arg(a->peer), log_quote(name ? name : "?").text, LEASE_VALUES(&a->key),
 			  log_quote(a->text).text);
 }
 
@@ -210,15 +210,15 @@ static void send_lease(struct jobs *jobs, const struct action *a)
 		return;
 	live_job_count_worker(job, a->peer);
 	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->starts_from_seeds);
-	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->job),
-		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64_arg(a->job), log_u64_arg(a->peer),
+		  LEASE_VALUES(&a->key));
 }
 
 static void revoke_lease(struct jobs *jobs, const struct action *a)
 {
 	jobs->peers.revoke_lease(jobs->peers.user, a->peer, &a->key);
-	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->job),
-		  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64_arg(a->job), log_u64_arg(a->peer),
+		  LEASE_VALUES(&a->key));
 }
 
 static void close_peer(struct jobs *jobs, const struct action *a)

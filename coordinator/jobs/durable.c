@@ -118,16 +118,16 @@ static int ledger_end_with_reserve(struct jobs *jobs, const struct job_record *r
 
 /* Records the end of a job, and deletes its films once the ledger durably contains the end. has_kept_films: the films
  * stay (kept_films.h). */
-static int write_end(struct jobs *jobs, const struct job_record *r, bool films_kept, struct error *e)
+static int write_end(struct jobs *jobs, const struct job_record *r, bool has_kept_films, struct error *e)
 {
-	int rc = ledger_end_job(jobs->ledger, r, films_kept, e);
-	if (rc && !r->has_result && !films_kept) /* its films are useless now, and may be what fills the disk */
+	int rc = ledger_end_job(jobs->ledger, r, has_kept_films, e);
+	if (rc && !r->has_result && !has_kept_films) /* its films are useless now, and may be what fills the disk */
 		kept_films_drop(jobs, r->id);
 	if (disk_is_full(rc))
 		kept_films_drop_all(jobs);
 	if (rc)
-		rc = ledger_end_with_reserve(jobs, r, films_kept, e);
-	if (!rc && !films_kept)
+		rc = ledger_end_with_reserve(jobs, r, has_kept_films, e);
+	if (!rc && !has_kept_films)
 		kept_films_drop(jobs, r->id);
 	return rc;
 }
@@ -348,8 +348,8 @@ static void finish_ack(struct jobs *jobs, struct durable_ack *a)
 		return;
 	}
 	if (a->ack == ACK_MERGED)
-		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_value_from_u64(a->key.job),
-			  log_value_from_u64(a->peer), LEASE_VALUES(&a->key));
+		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64_arg(a->key.job),
+			  log_u64_arg(a->peer), LEASE_VALUES(&a->key));
 	if (!jobs->is_stopping && a->peer != NO_PEER)
 		jobs->peers.acknowledge_result(jobs->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);
@@ -475,8 +475,8 @@ int durable_retry_job(struct jobs *jobs, struct live_job *job)
 			rc = -ENOSPC;
 		if (!rc)
 			rc = journal_reserve(job->journal, 2 * job->blocked_result_bytes, &e);
-	} while (disk_is_full(rc) &&
-		 storage_evict(jobs)); /* deletes scene files and films that were kept for later use */
+		/* storage_evict deletes scene files and films that were kept for later use. */
+	} while (disk_is_full(rc) && storage_evict(jobs));
 	if (!rc)
 		set_storage_hold(jobs, job, "");
 	return rc;

@@ -82,8 +82,8 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 			return false;
 		if (!rc && !jobs_find_live(jobs, id)) /* a sum left the films' range, which ended the job */
 			return true;
-		if (!rc &&
-		    replay_readiness(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
+		/* The core waits for an estimate of the error. */
+		if (!rc && replay_readiness(job, &l.key) != REPLAY_MERGED)
 			continue;
 		l = job->late_results[i];
 		late_results_remove(job, i);

@@ -168,7 +168,8 @@ static void handle_lease_failed(struct jobs *jobs, uint64_t peer, const Farm__Le
 	struct rollback rollback = {0};
 	bool holds_lease = answer_judge_delivery(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 			   !ev.lease.has_outdated_states; /* otherwise no batch is read for it */
-	/* Failures with `is_memory_full` may come every few seconds: the status shows them, but they are not logged. */
+	/* Failures with `later` (memory is full) may come every few seconds: the status shows them, but they are not
+	 * logged. */
 	if (job && *text && !f->later)
 		log_failure(jobs, jobs->peers.peer_name(jobs->peers.user, peer), job, f, &ev.lease.key, text,
 			    holds_lease);

@@ -45,8 +45,8 @@ static void run_step(struct jobs *jobs, struct event *ev, const struct incoming 
 	struct update u;
 	ev->time = jobs_now(jobs);
 	ev->unread_seconds = ev->time - jobs->messages_read_until;
-	if (ev->unread_seconds <
-	    jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* too short a silence to blame anybody */
+	/* Too short a silence to blame anybody. */
+	if (ev->unread_seconds < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS)
 		ev->unread_seconds = 0;
 	farm_step(jobs->farm, ev, &u);
 	jobs->change_count++;

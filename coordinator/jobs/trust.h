@@ -20,8 +20,8 @@ double trust_verify_fraction(const struct jobs *jobs, const Farm__Submit *m);
 
 /* Counts a merged result of the worker that was not verified. */
 void trust_count_unverified(struct live_job *job, const struct action *a);
-void trust_discount_unverified(struct live_job *job,
-			       uint64_t worker_id); /* one of its results does not count any more */
+/* One of its results does not count any more. */
+void trust_discount_unverified(struct live_job *job, uint64_t worker_id);
 /* Logs a wrong result in the job's log. */
 void trust_log_wrong_result(struct jobs *jobs, const struct action *a);
 /* chains start again from their seeds: logs and notes that in the job. */

@@ -78,8 +78,8 @@ struct jobs {
 	STAILQ_HEAD(ack_list, durable_ack) acks; /* acknowledgements that wait for a flush */
 	struct ack_list parked_acks; /* acknowledgements that wait for a new journal in place of a failed one */
 	struct unrecorded_end *unrecorded_ends; /* jobs that have ended and whose records could not be written yet */
-	double unrecorded_ends_retry_at,
-		ledger_retry_at;	 /* next attempts to write records, and the copy of the ledger */
+	/* Next attempts to write records, and the copy of the ledger. */
+	double unrecorded_ends_retry_at, ledger_retry_at;
 	struct age_clock observed_clock; /* observed time when this run started */
 	double next_folder_check_at;	 /* next check of the jobs' folders */
 	double next_clearing_at;	 /* next round of clearing finished jobs */

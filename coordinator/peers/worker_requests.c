@@ -12,8 +12,8 @@ enum {
 	CHUNK_MIN = 1 << 16,
 	CHUNK_MAX = 1 << 20,
 	SEND_AHEAD_MAX = 1 << 22, /* another answer is made while fewer bytes than this are unsent */
-	SEND_AHEAD_TOTAL_MAX =
-		1 << 30,    /* shared by all connections, since thousands of workers may begin a job at once */
+	/* Shared by all connections, since thousands of workers may begin a job at once. */
+	SEND_AHEAD_TOTAL_MAX = 1 << 30,
 	REQUESTS_MAX = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 

@@ -188,8 +188,8 @@ static void init_handles(struct server *s)
 	uv_check_init(&s->loop, &s->after_poll);
 	uv_signal_init(&s->loop, &s->sigterm_handle);
 	uv_signal_init(&s->loop, &s->sigint_handle);
-	s->tick_timer.data = s->before_poll.data = s->after_poll.data = s->sigterm_handle.data = s->sigint_handle.data =
-		s;
+	s->tick_timer.data = s->before_poll.data = s->after_poll.data = s;
+	s->sigterm_handle.data = s->sigint_handle.data = s;
 	uv_signal_start(&s->sigterm_handle, on_signal, SIGTERM);
 	uv_signal_start(&s->sigint_handle, on_signal, SIGINT);
 	uv_timer_start(&s->tick_timer, on_tick, TICK_MS, TICK_MS);

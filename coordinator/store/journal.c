@@ -399,9 +399,8 @@ static int ensure_space(struct journal *j, uint64_t size, struct error *e)
 	int code = errno;
 	pthread_mutex_lock(&j->write_lock);
 	int cut = truncate_reserved(j);
-	bool kept = j->written_bytes == end ||
-		    reserve_space(j, j->written_bytes,
-				  end - j->written_bytes); /* queued records need the space they had reserved */
+	/* Queued records need the space they had reserved. */
+	bool kept = j->written_bytes == end || reserve_space(j, j->written_bytes, end - j->written_bytes);
 	pthread_mutex_unlock(&j->write_lock);
 	(void)cut;
 	(void)kept;

@@ -23,7 +23,7 @@ void record_start(struct recorded_ray *rays, size_t capacity);
 size_t record_stop(void); /* returns the number of rays kept; rays beyond the buffer are dropped */
 
 enum { WALK_ENDS = WALK_ITERATION_LIMIT + 1 };
-struct recorded_walks { /* since the program started, by enum walk_end */
+struct recorded_walks { /* since the program started, by enum walk_result */
 	uint64_t forward[WALK_ENDS], backward[WALK_ENDS];
 	uint64_t occluded; /* walks in `forward` that arrived, but whose path has an occluded edge */
 };

@@ -27,7 +27,8 @@ const Farm__HelloAck *scripted_peer_exchange_hello(struct scripted_peer *p, uint
 struct scripted_peer *scripted_peer_connect_as(uint16_t port, Farm__Role role); /* NULL: nobody answers */
 void scripted_peer_disconnect(struct scripted_peer *p);				/* NULL: nothing */
 /* false: it hung up. */
-bool scripted_peer_send(const struct scripted_peer *p, const Farm__Envelope *m, const void *payload, size_t size);
+bool scripted_peer_send(const struct scripted_peer *p, const Farm__Envelope *m, const void *payload,
+			size_t payload_size);
 /* Returns the next message that is not a heartbeat, valid until the next call; the payload is in p->reader. */
 const Farm__Envelope *scripted_peer_receive(struct scripted_peer *p);
 bool scripted_peer_is_merge_ack(const Farm__Envelope *m); /* m says that a result is merged and stored; not NULL */

@@ -383,8 +383,8 @@ int agent_run(const struct agent_config *c, struct error *e)
 	notify_send("READY=1"); /* without waiting for a connection, which may take long */
 	while (!a->has_left || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
-	if (a->has_hung_thread || a->is_resolving ||
-	    thread_pool_pending(a->thread_pool)) /* busy threads cannot be joined; everything has been sent */
+	/* Busy threads cannot be joined; everything has been sent. */
+	if (a->has_hung_thread || a->is_resolving || thread_pool_pending(a->thread_pool))
 		_exit(a->has_hung_thread ? AGENT_EXIT_HUNG : a->is_refused ? AGENT_EXIT_REFUSED : 0);
 	int refused =
 		a->is_refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator_address, a->refusal) : 0;

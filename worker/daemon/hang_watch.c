@@ -40,14 +40,14 @@ static bool fail_hung_leases(struct agent *a)
 static bool fail_hung_builds(struct agent *a)
 {
 	bool found = false;
-	for (struct job_cache *b = a->job_caches; b; b = b->next) {
+	for (struct job_cache *cache = a->job_caches; cache; cache = cache->next) {
 		struct error e;
-		if (b->state != JOB_CACHE_BUILDING || b->task.is_hung || !detect_hang(&b->task))
+		if (cache->state != JOB_CACHE_BUILDING || cache->task.is_hung || !detect_hang(&cache->task))
 			continue;
 		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs",
 			  a->config.stall_seconds);
-		lease_list_fail(a, b, &e);
-		b->task.is_hung = found = true;
+		lease_list_fail(a, cache, &e);
+		cache->task.is_hung = found = true;
 	}
 	return found;
 }

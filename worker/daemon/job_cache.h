@@ -67,23 +67,24 @@ struct job_cache {
 struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL if none has this number */
 int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs, struct error *e); /* 0 or -ENOMEM */
 /* Must not be called while BUILDING, nor while a file is being read. */
-void job_cache_free(struct job_cache *b);
+void job_cache_free(struct job_cache *cache);
 
 /* Takes the answer to JobGet, which it then owns; call job_cache_check_files next. Returns 0, -EBADMSG or -ENOMEM. */
-int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
+int job_cache_set_info(struct job_cache *cache, struct envelope *info, struct error *e);
 /* Returns whether a description is that of this job: all but the bounds, which may have been changed, must be equal.
  * False also if memory is out. */
-bool job_cache_matches(const struct job_cache *b, const Farm__JobInfo *info);
+bool job_cache_matches(const struct job_cache *cache, const Farm__JobInfo *info);
 /* Holds the job's files that are in the cache, up to the first that is missing or must be read first.
  * reading.stop_requested and reading.on_done must be set. */
-enum job_cache_files job_cache_check_files(struct job_cache *b, uv_loop_t *loop);
+enum job_cache_files job_cache_check_files(struct job_cache *cache, uv_loop_t *loop);
 /* Builds the world in the thread pool, after job_cache_check_files has returned JOB_CACHE_FILES_COMPLETE. Returns 0 or
  * -ENOMEM. */
-int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
+int job_cache_build(struct job_cache *cache, struct thread_pool *pool, struct error *e);
 
-/* Call when a lease of b begins, or the building of its world does: notes whether other worlds are in memory. */
-void job_cache_note_other_worlds(struct job_cache *b, struct job_cache *all, bool building);
-/* Call when an allocation has failed for b. If other worlds were in memory, tells crash_record_note_memory_short. */
-void job_cache_note_memory_failure(const struct job_cache *b);
+/* Call when a lease of the job begins, or the building of its world does: notes whether other worlds are in memory. */
+void job_cache_note_other_worlds(struct job_cache *cache, struct job_cache *all, bool building);
+/* Call when an allocation has failed for the job. If other worlds were in memory, tells crash_record_note_memory_short.
+ */
+void job_cache_note_memory_failure(const struct job_cache *cache);
 
 #endif

@@ -19,15 +19,15 @@ void lease_list_drop(struct agent *a, struct lease_task *l)
 	lease_task_free(l);
 }
 
-void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e)
+void lease_list_fail(struct agent *a, struct job_cache *cache, const struct error *e)
 {
-	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_value_from_u64(b->job), log_quote(e->text).text);
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64_arg(cache->job), log_quote(e->text).text);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->job_cache != b || l->state != LEASE_WAITING)
+		if (l->job_cache != cache || l->state != LEASE_WAITING)
 			continue;
 		send_lease_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built",
-				  b->is_worker_at_fault);
+				  cache->is_worker_at_fault);
 		lease_list_drop(a, l);
 	}
 }

@@ -14,7 +14,7 @@ void lease_list_drop(struct agent *a, struct lease_task *l);
  * dropped when the thread returns it. */
 void lease_list_forget(struct agent *a, struct lease_task *l);
 /* Returns all leases that wait for this scene as failed, with this error, and drops them. */
-void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e);
+void lease_list_fail(struct agent *a, struct job_cache *cache, const struct error *e);
 
 /* Call when the number of results has changed. If leases are short and the coordinator's disk is slow, results pile up:
  * then no more leases are requested until enough results have been acknowledged. */

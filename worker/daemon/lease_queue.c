@@ -29,10 +29,10 @@
 /* ---- scenes ---- */
 
 /* Fails a job's waiting leases. The next scene_limit_drop_unused drops the job. */
-static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
+static void fail_job_cache(struct agent *a, struct job_cache *cache, const struct error *e)
 {
-	b->state = JOB_CACHE_FAILED;
-	lease_list_fail(a, b, e);
+	cache->state = JOB_CACHE_FAILED;
+	lease_list_fail(a, cache, e);
 }
 
 static void on_rendered(struct lease_task *l);
@@ -44,75 +44,75 @@ static void start_lease(struct agent *a, struct lease_task *l)
 	lease_task_start(l, a->thread_pool);
 }
 
-/* Returns is_out_of_memory, which means that this machine is at fault, not the job: the client that submitted the scene
+/* Returns no_memory, which means that this machine is at fault, not the job: the client that submitted the scene
  * had enough memory, and other workers may have. */
-static bool note_memory_failure(const struct job_cache *b, bool no_memory)
+static bool note_memory_failure(const struct job_cache *cache, bool no_memory)
 {
 	if (no_memory)
-		job_cache_note_memory_failure(b);
+		job_cache_note_memory_failure(cache);
 	return no_memory;
 }
 
-static void on_built(struct job_cache *b)
+static void on_built(struct job_cache *cache)
 {
-	struct agent *a = b->owner;
-	if (b->state == JOB_CACHE_FAILED) {
-		b->is_worker_at_fault |= note_memory_failure(b, b->is_out_of_memory);
-		fail_job_cache(a, b, &b->error);
+	struct agent *a = cache->owner;
+	if (cache->state == JOB_CACHE_FAILED) {
+		cache->is_worker_at_fault |= note_memory_failure(cache, cache->is_out_of_memory);
+		fail_job_cache(a, cache, &cache->error);
 	} else {
-		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_value_from_u64(b->job),
-			  b->build_seconds, world_embree_bytes(b->world));
+		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64_arg(cache->job),
+			  cache->build_seconds, world_embree_bytes(cache->world));
 		for (struct lease_task *l = a->leases; l; l = l->next)
-			if (l->job_cache == b && l->state == LEASE_WAITING)
+			if (l->job_cache == cache && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
 	scene_limit_drop_unused(a);
 	a->leave_if_idle(a);
 }
 
-static void on_file_read(struct job_cache *b);
+static void on_file_read(struct job_cache *cache);
 
 /* Requests the next missing chunk of a job's files, unless another job has done so. If no file is missing, builds the
  * scene. Does nothing in a worker that is leaving, which has returned all leases that have not begun. */
-static void fetch_or_build(struct agent *a, struct job_cache *b)
+static void fetch_or_build(struct agent *a, struct job_cache *cache)
 {
 	struct error e;
 	int rc = 0;
-	if (b->state != JOB_CACHE_FETCHING || a->is_leaving)
+	if (cache->state != JOB_CACHE_FETCHING || a->is_leaving)
 		return;
-	b->owner = a;
-	b->reading.stop_requested = &a->has_left;
-	b->reading.on_done = on_file_read;
-	enum job_cache_files files = job_cache_check_files(b, &a->loop);
+	cache->owner = a;
+	cache->reading.stop_requested = &a->has_left;
+	cache->reading.on_done = on_file_read;
+	enum job_cache_files files = job_cache_check_files(cache, &a->loop);
 	if (files == JOB_CACHE_FILE_MISSING) {
-		rc = fetch_request(a, &b->wanted_file, &e);
-	} else if (files == JOB_CACHE_FILES_COMPLETE && !scene_limit_must_wait(a, b)) {
-		b->on_built = on_built;
+		rc = fetch_request(a, &cache->wanted_file, &e);
+	} else if (files == JOB_CACHE_FILES_COMPLETE && !scene_limit_must_wait(a, cache)) {
+		cache->on_built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
-			if (l->job_cache == b)
-				b->waiting_lease = l->grant.key;
-		job_cache_note_other_worlds(b, a->job_caches, true);
-		rc = job_cache_build(b, a->thread_pool, &e);
+			if (l->job_cache == cache)
+				cache->waiting_lease = l->grant.key;
+		job_cache_note_other_worlds(cache, a->job_caches, true);
+		rc = job_cache_build(cache, a->thread_pool, &e);
 	}
 	if (rc) {
-		b->is_worker_at_fault = rc == -ENOMEM;
-		fail_job_cache(a, b, &e);
+		cache->is_worker_at_fault = rc == -ENOMEM;
+		fail_job_cache(a, cache, &e);
 	}
 }
 
 static void fetch_or_build_all(struct agent *a)
 {
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		fetch_or_build(a, b);
+	for (struct job_cache *cache = a->job_caches; cache; cache = cache->next)
+		fetch_or_build(a, cache);
 }
 
-static void on_file_read(struct job_cache *b)
+static void on_file_read(struct job_cache *cache)
 {
-	struct agent *a = b->owner;
+	struct agent *a = cache->owner;
 	if (a->has_left)
 		return;
-	if (!b->has_ended)
-		fetch_or_build(a, b);
+	if (!cache->has_ended)
+		fetch_or_build(a, cache);
 	scene_limit_drop_unused(a);
 	a->leave_if_idle(a);
 }
@@ -142,17 +142,17 @@ static void on_rendered(struct lease_task *l)
 	a->leave_if_idle(a);
 }
 
-static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
+static int find_or_begin_job(struct agent *a, struct job_cache **cache, uint64_t job, struct error *e)
 {
 	int rc = scene_limit_admit(a, job, e);
-	*b = rc ? NULL : job_cache_find(a->job_caches, job);
-	if (rc || *b)
+	*cache = rc ? NULL : job_cache_find(a->job_caches, job);
+	if (rc || *cache)
 		return rc;
-	rc = job_cache_new(b, job, a->cache.blobs, e);
+	rc = job_cache_new(cache, job, a->cache.blobs, e);
 	if (rc)
 		return rc;
-	(*b)->next = a->job_caches;
-	a->job_caches = *b;
+	(*cache)->next = a->job_caches;
+	a->job_caches = *cache;
 	send_job_get(a, job);
 	return 0;
 }
@@ -165,10 +165,10 @@ static void handle_grant(struct agent *a, const Farm__LeaseGrant *m, const unsig
 		conn_close(a->conn, e.text);
 		return;
 	}
-	struct job_cache *b;
+	struct job_cache *cache;
 	struct lease_task *l = lease_list_find(a, &g.key);
-	if (l && !blob_hash_equal(&l->grant.digest,
-				  &g.digest)) { /* the epoch before was computed again: this is another lease */
+	/* If the epoch before was computed again, this is another lease. */
+	if (l && !blob_hash_equal(&l->grant.digest, &g.digest)) {
 		lease_list_forget(a, l);
 		l = NULL;
 	}
@@ -188,9 +188,9 @@ static void handle_grant(struct agent *a, const Farm__LeaseGrant *m, const unsig
 		grant_fini(&g);
 		return;
 	}
-	int rc = find_or_begin_job(a, &b, g.key.job, &e);
+	int rc = find_or_begin_job(a, &cache, g.key.job, &e);
 	if (!rc)
-		rc = lease_task_new(&l, &g, b, &e);
+		rc = lease_task_new(&l, &g, cache, &e);
 	if (rc) {
 		if (rc == -EAGAIN)
 			send_lease_deferred(a, &g.key, e.text);
@@ -199,12 +199,12 @@ static void handle_grant(struct agent *a, const Farm__LeaseGrant *m, const unsig
 		grant_fini(&g);
 		return;
 	}
-	b->last_used = ++a->use_counter;
+	cache->last_used = ++a->use_counter;
 	struct lease_task **end = &a->leases; /* appended, so that rounds complete in order */
 	while (*end)
 		end = &(*end)->next;
 	*end = l;
-	if (b->state == JOB_CACHE_READY)
+	if (cache->state == JOB_CACHE_READY)
 		start_lease(a, l);
 	scene_limit_drop_unused(a);
 }
@@ -219,10 +219,10 @@ static void handle_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = lease_list_find(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_value_from_u64(k.job),
-			  LEASE_VALUES(&k), log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64_arg(k.job), LEASE_VALUES(&k),
+			  log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
-		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_value_from_u64(k.job),
+		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_u64_arg(k.job),
 			  LEASE_VALUES(&k), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		lease_list_drop(a, l);
@@ -243,15 +243,15 @@ static void handle_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 
 static void handle_job_end(struct agent *a, uint64_t job)
 {
-	struct job_cache *b = job_cache_find(a->job_caches, job);
-	if (!b)
+	struct job_cache *cache = job_cache_find(a->job_caches, job);
+	if (!cache)
 		return;
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->job_cache == b && !l->is_unwanted)
+		if (l->job_cache == cache && !l->is_unwanted)
 			lease_list_forget(a, l);
 	}
-	b->has_ended = true;
+	cache->has_ended = true;
 	lease_list_update_backlog(a);
 	scene_limit_drop_unused(a);
 }
@@ -259,39 +259,39 @@ static void handle_job_end(struct agent *a, uint64_t job)
 /* The coordinator has started with an empty spool and given the number to another job: results of the old job are
  * useless. All its leases are returned. Some may have been granted for the new job in the meantime; the coordinator
  * ignores the return of the others. */
-static void drop_old_job(struct agent *a, struct job_cache *b)
+static void drop_old_job(struct agent *a, struct job_cache *cache)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"",
-		  log_value_from_u64(b->job));
+		  log_u64_arg(cache->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->job_cache != b || l->is_unwanted)
+		if (l->job_cache != cache || l->is_unwanted)
 			continue;
 		send_lease_failed(a, &l->grant.key, "", false);
 		lease_list_forget(a, l);
 	}
 	lease_list_update_backlog(a);
-	b->has_ended = true;
-	b->job = 0;
+	cache->has_ended = true;
+	cache->job = 0;
 	scene_limit_drop_unused(a);
 }
 
 static void handle_job_info(struct agent *a, struct envelope *env)
 {
-	struct job_cache *b = job_cache_find(a->job_caches, env->message->job_info->job);
+	struct job_cache *cache = job_cache_find(a->job_caches, env->message->job_info->job);
 	struct error e;
-	if (!b)
+	if (!cache)
 		return;
-	if (!job_cache_matches(b, env->message->job_info)) {
-		drop_old_job(a, b);
+	if (!job_cache_matches(cache, env->message->job_info)) {
+		drop_old_job(a, cache);
 		return;
 	}
-	b->is_confirmed = true;
-	if (b->state == JOB_CACHE_REQUESTED && job_cache_set_info(b, env, &e))
-		fail_job_cache(a, b, &e);
-	fetch_or_build(a, b);
+	cache->is_confirmed = true;
+	if (cache->state == JOB_CACHE_REQUESTED && job_cache_set_info(cache, env, &e))
+		fail_job_cache(a, cache, &e);
+	fetch_or_build(a, cache);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job still runs: send results of it */
-		if (l->job_cache == b && l->state == LEASE_RENDERED)
+		if (l->job_cache == cache && l->state == LEASE_RENDERED)
 			send_result(a, l);
 	scene_limit_drop_unused(a);
 }
@@ -308,20 +308,20 @@ static void handle_blob_chunk(struct agent *a, const Farm__BlobChunk *c, const u
 	}
 	const struct blob_hash hash = f->hash;
 	struct job_cache *first = scene_limit_find_waiting(a, &hash);
-	enum fetch_outcome end = FETCH_MORE;
+	enum fetch_outcome outcome = FETCH_MORE;
 	if (first && !f->writer && cache_restore_folder(&a->cache, &e))
-		end = FETCH_NOT_STORED;
+		outcome = FETCH_NOT_STORED;
 	else if (first)
-		end = fetch_store_chunk(f, a->cache.blobs, c, payload, size, &e);
-	if (end != FETCH_MORE)
+		outcome = fetch_store_chunk(f, a->cache.blobs, c, payload, size, &e);
+	if (outcome != FETCH_MORE)
 		fetch_drop(a, f);
-	if (end == FETCH_FAILED || end == FETCH_NOT_STORED) {
-		first->is_worker_at_fault = end == FETCH_NOT_STORED;
+	if (outcome == FETCH_FAILED || outcome == FETCH_NOT_STORED) {
+		first->is_worker_at_fault = outcome == FETCH_NOT_STORED;
 		fail_job_cache(a, first, &e);
 		scene_limit_drop_unused(a);
 	}
 	fetch_or_build_all(a);
-	if (end == FETCH_COMPLETE)
+	if (outcome == FETCH_COMPLETE)
 		blob_release(a->cache.blobs, &hash);
 	scene_limit_drop_unused(a);
 }
@@ -391,10 +391,10 @@ void lease_queue_on_connect(struct agent *a)
 	report_lost_leases(a);
 	fetch_reset_requests(a);
 	/* Ask whether the jobs still exist. The answers resume unfinished fetches and send unsent results. */
-	for (struct job_cache *b = a->job_caches; b; b = b->next) {
-		b->is_confirmed = false;
-		if (!b->has_ended)
-			send_job_get(a, b->job);
+	for (struct job_cache *cache = a->job_caches; cache; cache = cache->next) {
+		cache->is_confirmed = false;
+		if (!cache->has_ended)
+			send_job_get(a, cache->job);
 	}
 	send_lease_request(a);
 }
@@ -425,8 +425,8 @@ bool lease_queue_is_idle(const struct agent *a)
 	for (const struct lease_task *l = a->leases; l; l = l->next, excluded++)
 		if (!l->task.is_hung)
 			return false;
-	for (const struct job_cache *b = a->job_caches; b; b = b->next)
-		excluded += b->state == JOB_CACHE_BUILDING;
+	for (const struct job_cache *cache = a->job_caches; cache; cache = cache->next)
+		excluded += cache->state == JOB_CACHE_BUILDING;
 	return thread_pool_pending(a->thread_pool) == excluded;
 }
 

@@ -6,15 +6,15 @@
 
 #include <string.h>
 
-int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b, struct error *e)
+int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *cache, struct error *e)
 {
 	struct lease_task *l = mem_alloc(1, sizeof *l);
 	if (!l)
 		return error_set(e, ENOMEM, "no memory for a lease");
 	l->grant = *g;
 	memset(g, 0, sizeof *g);
-	l->job_cache = b;
-	b->lease_count++;
+	l->job_cache = cache;
+	cache->lease_count++;
 	atomic_init(&l->stop_requested, false);
 	*out = l;
 	return 0;
@@ -43,8 +43,8 @@ static void render_task(struct task *t)
 	if (!atomic_load(&l->stop_requested))
 		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop_requested, &l->outcome,
 				     &batch, &l->error);
-	if (!l->rc &&
-	    l->outcome == LEASE_DONE) /* the coordinator would refuse such a result: report a failure instead */
+	/* The coordinator would refuse such a result: report a failure instead. */
+	if (!l->rc && l->outcome == LEASE_DONE)
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
 		error_prefix(&l->error, l->rc, "%s", l->job_cache->info.message->job_info->scene);

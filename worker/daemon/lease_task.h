@@ -38,7 +38,7 @@ struct lease_task {
 };
 
 /* Creates a lease, which then owns the contents of *g. Returns 0 or -ENOMEM. */
-int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b, struct error *e);
+int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *cache, struct error *e);
 void lease_task_free(struct lease_task *l); /* must not be called while a thread has the lease */
 void lease_task_start(struct lease_task *l, struct thread_pool *c);
 

@@ -45,8 +45,8 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	}
 	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
 	if (*text && fault != FAULT_NONE)
-		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_value_from_u64(k->job),
-			  LEASE_VALUES(k), log_quote(text).text);
+		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64_arg(k->job), LEASE_VALUES(k),
+			  log_quote(text).text);
 }
 
 void send_lease_failed(struct agent *a, const struct lease_key *k, const char *text, bool worker_at_fault)

@@ -16,20 +16,20 @@
 #include "worker/daemon/fetch.h"
 #include "worker/daemon/crash_record.h"
 
-void scene_limit_drop(struct agent *a, struct job_cache *b)
+void scene_limit_drop(struct agent *a, struct job_cache *cache)
 {
-	struct job_cache **at = &a->job_caches;
-	while (*at != b)
-		at = &(*at)->next;
-	*at = b->next;
-	job_cache_free(b);
+	struct job_cache **link = &a->job_caches;
+	while (*link != cache)
+		link = &(*link)->next;
+	*link = cache->next;
+	job_cache_free(cache);
 }
 
 struct job_cache *scene_limit_find_waiting(const struct agent *a, const struct blob_hash *h)
 {
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted_file, h))
-			return b;
+	for (struct job_cache *cache = a->job_caches; cache; cache = cache->next)
+		if (cache->state == JOB_CACHE_FETCHING && blob_hash_equal(&cache->wanted_file, h))
+			return cache;
 	return NULL;
 }
 
@@ -44,9 +44,9 @@ static void drop_unwanted_fetches(struct agent *a)
 	}
 }
 
-static bool is_in_use(const struct job_cache *b)
+static bool is_in_use(const struct job_cache *cache)
 {
-	return b->lease_count || b->state == JOB_CACHE_BUILDING || b->reading.check;
+	return cache->lease_count || cache->state == JOB_CACHE_BUILDING || cache->reading.check;
 }
 
 void scene_limit_drop_unused(struct agent *a)
@@ -54,14 +54,14 @@ void scene_limit_drop_unused(struct agent *a)
 	for (;;) {
 		struct job_cache *oldest = NULL, *ended = NULL;
 		unsigned idle = 0;
-		for (struct job_cache *b = a->job_caches; b; b = b->next) {
-			if (is_in_use(b))
+		for (struct job_cache *cache = a->job_caches; cache; cache = cache->next) {
+			if (is_in_use(cache))
 				continue;
 			idle++;
-			if (b->has_ended || b->state == JOB_CACHE_FAILED)
-				ended = b;
-			if (!oldest || b->last_used < oldest->last_used)
-				oldest = b;
+			if (cache->has_ended || cache->state == JOB_CACHE_FAILED)
+				ended = cache;
+			if (!oldest || cache->last_used < oldest->last_used)
+				oldest = cache;
 		}
 		if (ended)
 			scene_limit_drop(a, ended);
@@ -75,18 +75,18 @@ void scene_limit_drop_unused(struct agent *a)
 
 /* Returns whether a scene is in use only by threads that have been told to stop, because its leases were revoked or its
  * job has ended. */
-static bool is_ending(const struct agent *a, const struct job_cache *b)
+static bool is_ending(const struct agent *a, const struct job_cache *cache)
 {
 	for (const struct lease_task *l = a->leases; l; l = l->next)
-		if (l->job_cache == b && !l->is_unwanted)
+		if (l->job_cache == cache && !l->is_unwanted)
 			return false;
-	return b->lease_count && b->state != JOB_CACHE_BUILDING && !b->reading.check;
+	return cache->lease_count && cache->state != JOB_CACHE_BUILDING && !cache->reading.check;
 }
 
-bool scene_limit_must_wait(const struct agent *a, const struct job_cache *b)
+bool scene_limit_must_wait(const struct agent *a, const struct job_cache *cache)
 {
 	for (const struct job_cache *o = a->job_caches; o; o = o->next)
-		if (o != b && is_ending(a, o))
+		if (o != cache && is_ending(a, o))
 			return crash_record_is_memory_short(clock_seconds());
 	return false;
 }
@@ -96,13 +96,13 @@ bool scene_limit_must_wait(const struct agent *a, const struct job_cache *b)
 static struct job_cache *keep_one_scene(struct agent *a, struct job_cache *next)
 {
 	struct job_cache *kept = NULL;
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		kept = is_in_use(b) && !is_ending(a, b) ? b : kept;
+	for (struct job_cache *cache = a->job_caches; cache; cache = cache->next)
+		kept = is_in_use(cache) && !is_ending(a, cache) ? cache : kept;
 	kept = kept ? kept : next;
-	for (struct job_cache *b = a->job_caches, *following; b; b = following) {
-		following = b->next;
-		if (b != kept && !is_in_use(b))
-			scene_limit_drop(a, b);
+	for (struct job_cache *cache = a->job_caches, *following; cache; cache = following) {
+		following = cache->next;
+		if (cache != kept && !is_in_use(cache))
+			scene_limit_drop(a, cache);
 	}
 	drop_unwanted_fetches(a);
 	return kept;
@@ -120,12 +120,12 @@ static int refuse_until_turn(struct agent *a, uint64_t job, double now, struct e
 		log_event(
 			LOG_JOB_NOTE,
 			"job=j%llu text=\"waits: memory ran short, so this worker holds one scene at a time, now that of j%llu\"",
-			log_value_from_u64(job), log_value_from_u64(t->job));
+			log_u64_arg(job), log_u64_arg(t->job));
 	t->waiting_since = t->has_waiter ? t->waiting_since : now;
 	t->has_waiter = true;
 	t->last_refused_at = now;
 	return error_set(e, EAGAIN, "memory ran short, so it holds one scene at a time, now that of j%llu",
-			 log_value_from_u64(t->job));
+			 log_u64_arg(t->job));
 }
 
 int scene_limit_admit(struct agent *a, uint64_t job, struct error *e)

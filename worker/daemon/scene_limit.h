@@ -9,7 +9,7 @@
 
 #include "worker/daemon/agent_state.h"
 
-void scene_limit_drop(struct agent *a, struct job_cache *b); /* removes and frees a job */
+void scene_limit_drop(struct agent *a, struct job_cache *cache); /* removes and frees a job */
 /* Returns the first job that waits for this file; NULL if none does. */
 struct job_cache *scene_limit_find_waiting(const struct agent *a, const struct blob_hash *h);
 /* Drops unused scenes of jobs that have ended or failed, the least recently used ones beyond IDLE_WORLDS_MAX, and
@@ -21,6 +21,6 @@ void scene_limit_drop_unused(struct agent *a);
 int scene_limit_admit(struct agent *a, uint64_t job, struct error *e);
 /* Returns whether the scene of an admitted job must not be built yet: memory has run short, and threads that have been
  * told to stop still use another scene. */
-bool scene_limit_must_wait(const struct agent *a, const struct job_cache *b);
+bool scene_limit_must_wait(const struct agent *a, const struct job_cache *cache);
 
 #endif

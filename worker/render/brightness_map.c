@@ -24,8 +24,9 @@ enum {
 	SECOND_SAMPLES_MIN = 1 << 12,
 	SECOND_SAMPLES_MAX = 1 << 17,
 	FIRST_DIVISOR = 4, /* the first map has a quarter of the samples */
-	/* A bootstrap has 1/64 of the render's samples, but no more than LONG_BOOTSTRAP_SAMPLES (plan.c). So a map has
-	 * 1/32 of the samples of a short render; of a longer one at most 1/16, or one sample per pixel. */
+	/* A bootstrap has 1/64 of the render's samples, but no more than BOOTSTRAP_MIN (plan.c), which
+	 * LONG_BOOTSTRAP_SAMPLES repeats. So a map has 1/32 of the samples of a short render; of a longer one at most
+	 * 1/16, or one sample per pixel. */
 	LONG_BOOTSTRAP_SAMPLES = 1 << 14,
 	SHORT_BOOTSTRAP_FACTOR = 2,
 	LONG_BOOTSTRAP_FACTOR = 4,
@@ -85,7 +86,7 @@ static int make_second(struct map_maker *m, struct brightness *map, uint64_t see
 	return rc;
 }
 
-static int make_maps(struct map_maker *m, struct brightness *map, const struct plan *p, uint32_t light_every,
+static int make_maps(struct map_maker *m, struct brightness *map, const struct plan *p, uint32_t light_subpath_interval,
 		     struct error *e)
 {
 	jmp_buf jump;
@@ -98,7 +99,7 @@ static int make_maps(struct map_maker *m, struct brightness *map, const struct p
 	int rc = brightness_init_from_samples(&m->first_map, &m->context, path_trace_bidirectional, p->seed,
 					      RNG_BRIGHTNESS, STEP_FIRST,
 					      first < FIRST_SAMPLES_MIN ? FIRST_SAMPLES_MIN : first, e);
-	m->context.light_subpath_interval = light_every;
+	m->context.light_subpath_interval = light_subpath_interval;
 	if (!rc)
 		rc = make_second(m, map, p->seed, n, e);
 	fptrap_catch(previous_jump);

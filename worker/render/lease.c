@@ -47,9 +47,8 @@ struct lease_job {
 };
 
 enum { STOP_INTERVAL = 16 }; /* samples or mutations between checks of the stop flag; one sample may take 10 ms */
-enum {
-	OVERLONG_INTERVAL = 16
-}; /* one in this many bootstrap samples also estimates paths that are too long to simulate */
+/* One in this many bootstrap samples also estimates paths that are too long to simulate. */
+enum { OVERLONG_INTERVAL = 16 };
 
 static bool is_stopped(const struct lease_job *j)
 {

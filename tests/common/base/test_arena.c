@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Arenas: arena_share() returns the same copy for equal bytes, and the limit of the arena applies to these copies as
+/* Arenas: arena_intern() returns the same copy for equal bytes, and the limit of the arena applies to these copies as
  * well. */
 #include "common/base/arena.h"
 

@@ -23,8 +23,8 @@ struct accuracy_figures {
 	struct interval error_at_equal_mutations; /* error after as many mutations as the default's */
 	struct interval error_at_equal_time;	  /* error after as much CPU time as the default's */
 	struct interval bias_mean;		  /* of the image's mean, relative to the reference */
-	struct interval
-		bias_worst_block;   /* of the block that differs most significantly; 95 % for all blocks together */
+	/* Of the block that differs most significantly; 95 % for all blocks together. */
+	struct interval bias_worst_block;
 	unsigned worst_block_index; /* its index: column + row * blocks_across */
 	double bias_lower_joint;    /* lower bound of the bias, all settings and blocks tested together; 0: none */
 	double bias_upper;	    /* upper bound of the bias of the mean or of any block */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Draws the plots of the HTML report, as SVG inside the page. If one cannot be drawn, the reason is printed in its
  * place. One thread. */
-#ifndef WORKER_CLI_ACCURACY_PLOTS_H
-#define WORKER_CLI_ACCURACY_PLOTS_H
+#ifndef WORKER_CLI_ACCURACY_ACCURACY_PLOTS_H
+#define WORKER_CLI_ACCURACY_ACCURACY_PLOTS_H
 
 #include "worker/cli/accuracy/accuracy.h"
 #include "worker/cli/base/text_file.h"

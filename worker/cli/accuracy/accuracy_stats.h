@@ -3,8 +3,8 @@
  * Computes intervals, and which settings are on the Pareto front of error and bias. Pure; any thread; allocates
  * nothing.
  */
-#ifndef WORKER_CLI_ACCURACY_STATS_H
-#define WORKER_CLI_ACCURACY_STATS_H
+#ifndef WORKER_CLI_ACCURACY_ACCURACY_STATS_H
+#define WORKER_CLI_ACCURACY_ACCURACY_STATS_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -56,9 +56,8 @@ static struct pixel_error compute_pixel_error(const struct picture *a, const str
 	for (int k = 0; k < 3; k++) {
 		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
 		r.squared += d * d / 3;
-		r.relative += d == 0 ? 0
-				     : d * d / (reference * reference + min_denominator) /
-					       3; /* avoids 0 / 0 for a black image */
+		/* Avoids 0 / 0 for a black image. */
+		r.relative += d == 0 ? 0 : d * d / (reference * reference + min_denominator) / 3;
 	}
 	if (!isfinite(r.squared))
 		r = (struct pixel_error){INFINITY, INFINITY};

@@ -16,8 +16,8 @@ struct compare_result {
 	double rel_mse, rel_error, rmse; /* rel_error: square root of rel_mse */
 	double psnr, peak; /* dB, infinite for equal images; 99.5th percentile of B's values, the peak of the PSNR */
 	double mean_a[3], mean_b[3], ratio[3], luminance_ratio; /* ratios of A to B */
-	size_t pixel_count, trimmed_count,
-		not_finite_count; /* pixels in all; omitted; of A with values that are not finite */
+	/* Pixels in all; omitted; of A with values that are not finite. */
+	size_t pixel_count, trimmed_count, not_finite_count;
 };
 
 /* Compares two images of equal size. trim: the share of pixels to omit, in [0,1). Returns -EINVAL if the sizes differ

@@ -3,8 +3,8 @@
  * Draws plots with gnuplot, in a process of its own, without a shell. If gnuplot is not installed, the functions return
  * -ENOENT with a sentence that says what to install; callers continue without a plot. One thread.
  */
-#ifndef WORKER_CLI_PLOT_H
-#define WORKER_CLI_PLOT_H
+#ifndef WORKER_CLI_PLOT_PLOT_H
+#define WORKER_CLI_PLOT_PLOT_H
 
 #include "common/base/error.h"
 #include "worker/cli/plot/plot_data.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The contents of a plot. */
-#ifndef WORKER_CLI_PLOT_DATA_H
-#define WORKER_CLI_PLOT_DATA_H
+#ifndef WORKER_CLI_PLOT_PLOT_DATA_H
+#define WORKER_CLI_PLOT_PLOT_DATA_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -12,7 +12,7 @@ double eta_seconds(const struct plan *plan, const struct local_progress *p, doub
 	if (forecast > 0)
 		remaining = fmin(remaining, fmax(forecast - p->seconds, 0));
 	if (plan->seconds > 0)
-		remaining = fmin(remaining,
-				 merge_seconds_remaining(plan, p->seconds, p->rounds, speed)); /* fmin ignores a NAN */
+		/* fmin ignores a NAN. */
+		remaining = fmin(remaining, merge_seconds_remaining(plan, p->seconds, p->rounds, speed));
 	return isfinite(remaining) ? remaining : NAN;
 }

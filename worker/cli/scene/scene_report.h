@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The reports of hslt-scene: the problems of a scene file, or what was read from it. Renders nothing. */
-#ifndef WORKER_CLI_SCENE_REPORT_H
-#define WORKER_CLI_SCENE_REPORT_H
+#ifndef WORKER_CLI_SCENE_SCENE_REPORT_H
+#define WORKER_CLI_SCENE_SCENE_REPORT_H
 
 #include "worker/cli/base/options.h"
 

@@ -352,7 +352,7 @@ static void copy_looks(const Farm__JobStatus *s, struct submit_outcome *outcome)
 	}
 }
 
-/* Shows a status and stores its contents in *end. *ended: the job has ended. */
+/* Shows a status and stores its contents in *outcome. *ended: the job has ended. */
 static int apply_status(struct progress *p, const Farm__JobStatus *s, const struct submitted_job *job,
 			struct submit_outcome *outcome, bool *ended, struct error *e)
 {

@@ -3,8 +3,8 @@
  * The steps of hslt-submit: collects a scene's files and their hashes, sends the job and the files that the coordinator
  * lacks, and waits for its end. One thread.
  */
-#ifndef WORKER_CLI_SUBMIT_H
-#define WORKER_CLI_SUBMIT_H
+#ifndef WORKER_CLI_SUBMIT_SUBMIT_H
+#define WORKER_CLI_SUBMIT_SUBMIT_H
 
 #include "common/estimate/forecast.h"
 #include "common/blob/blob.h"

@@ -44,7 +44,7 @@ struct asset_folders {
 
 /* Returns `scene_folder` followed by the first ASSET_FOLDERS_MAX - 1 of `extra_folders`. */
 struct asset_folders asset_folders_make(const char *scene_folder, const char *const *extra_folders, size_t count);
-struct asset_source
-asset_source_for_folders(const struct asset_folders *folders); /* the folders must outlive the source */
+/* The folders must outlive the source. */
+struct asset_source asset_source_for_folders(const struct asset_folders *folders);
 
 #endif

@@ -37,7 +37,7 @@ spectrum blend_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, v
 double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 spectrum blend_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			  double *chance);
+			  double *probability);
 bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 		  struct bsdf_sample *out);
 

@@ -58,10 +58,10 @@ struct bsdf_build {
 	double min_roughness;		    /* metal and glass with a roughness below this one are created as smooth */
 	struct attribute_table *attributes; /* of the mesh that has this BSDF; NULL: none */
 	bool has_black_backs;		    /* opaque materials without `twosided` reflect nothing on their back */
-	struct boundary_table *
-		*boundary_tables;	    /* list of the tables that the scene's materials share; NULL: no sharing */
+	/* List of the tables that the scene's materials share; NULL: no sharing. */
+	struct boundary_table **boundary_tables;
 	struct relief_map **relief_maps;    /* likewise, the bump and normal maps of one material */
-	const struct relief *under;	    /* of the bump or normal map around this BSDF; NULL: none */
+	const struct relief *base_relief;   /* of the bump or normal map around this BSDF; NULL: none */
 	const struct volume_build *volumes; /* NULL: none */
 };
 

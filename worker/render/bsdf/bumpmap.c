@@ -29,8 +29,8 @@ enum { NESTED_MAX = 8 };
  */
 struct shadowed {
 	struct bsdf inner;
-	const struct relief *low,
-		*high; /* before and after bending; low NULL: no relief, high NULL: the inner BSDF's */
+	/* Before and after bending; low NULL: no relief, high NULL: the inner BSDF's. */
+	const struct relief *low, *high;
 };
 
 static double tangent_squared(double cosine)
@@ -106,7 +106,7 @@ static int add_shadowing(struct bsdf *b, const struct relief *r, const struct sc
 	struct shadowed *s = arena_alloc(build->arena, 1, sizeof *s);
 	if (!s)
 		return node_error(n, e, ENOMEM, "out of memory");
-	*s = (struct shadowed){.inner = *b, .low = r->under, .high = b->relief == r ? NULL : r};
+	*s = (struct shadowed){.inner = *b, .low = r->base, .high = b->relief == r ? NULL : r};
 	b->uses_relief_frames = true;
 	b->ops = &shadowed_ops;
 	b->data = s;
@@ -167,7 +167,7 @@ static const struct relief_map *find_relief_map(const struct relief_map *wanted,
 		if (b->relief.kind == wanted->relief.kind &&
 		    b->relief.uses_handedness == wanted->relief.uses_handedness &&
 		    b->relief.flips_invalid_normals == wanted->relief.flips_invalid_normals &&
-		    b->relief.under == wanted->relief.under && b->scale == wanted->scale && has_same_texture(b, wanted))
+		    b->relief.base == wanted->relief.base && b->scale == wanted->scale && has_same_texture(b, wanted))
 			return b;
 	return NULL;
 }
@@ -181,9 +181,9 @@ static int get_relief_map(const struct scene_node *n, const struct scene_node *t
 		.relief = {.kind = kind,
 			   .eval = kind == RELIEF_HEIGHT ? eval_height : eval_normal,
 			   .flips_invalid_normals =
-				   !build->under && node_bool(n, "flip_invalid_normals", build->is_dialect_3),
+				   !build->base_relief && node_bool(n, "flip_invalid_normals", build->is_dialect_3),
 			   .uses_handedness = node_bool(n, "handedness", false),
-			   .under = build->under},
+			   .base = build->base_relief},
 		.node = texture,
 		.scale = node_float(n, "scale", 1),
 		.next = build->relief_maps ? *build->relief_maps : NULL};
@@ -209,7 +209,7 @@ static int get_relief_map(const struct scene_node *n, const struct scene_node *t
 static unsigned nesting_of(const struct relief *r)
 {
 	unsigned depth = 0;
-	for (; r; r = r->under)
+	for (; r; r = r->base)
 		depth++;
 	return depth;
 }
@@ -223,13 +223,13 @@ static int create_relief_bsdf(struct bsdf *b, const struct scene_node *n, const 
 		texture = node_ref(n, "normalmap");
 	if (!inner || !(texture || node_find_property(n, "normalmap")) || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
-	if (nesting_of(build->under) == NESTED_MAX)
+	if (nesting_of(build->base_relief) == NESTED_MAX)
 		return node_error(n, e, ENOTSUP, "more than %d bump or normal maps in each other", NESTED_MAX);
 	int code = get_relief_map(n, texture, kind, build, &map, e);
 	if (code)
 		return code;
 	struct bsdf_build inside = *build;
-	inside.under = &map->relief;
+	inside.base_relief = &map->relief;
 	code = bsdf_create(b, inner, &inside, e);
 	if (code)
 		return code;

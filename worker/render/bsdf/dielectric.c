@@ -7,7 +7,7 @@
 #include <float.h>
 
 /* Returns f |wi.z| of one lobe, given the Fresnel terms f at its angle. eta: index beyond over index on wo's side.
- * *chance is 0 if there is no such lobe. */
+ * *probability is 0 if there is no such lobe. */
 static spectrum eval_lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
 			  const struct fresnel *f, vec3 *wi, double *probability)
 {

@@ -58,8 +58,8 @@ struct hair {
 	struct color eumelanin, pheomelanin; /* coefficients times concentrations */
 	struct texture sigma_a;
 	double scale; /* factor of sigma_a */
-	spectrum
-		probe_absorption; /* absorption at the wavelengths `probe_wavelengths`; unused if sigma_a is textured */
+	/* Absorption at the wavelengths `probe_wavelengths`; unused if sigma_a is textured. */
+	spectrum probe_absorption;
 };
 
 /* The wavelengths at which lobes are weighted. They are fixed: a density that depended on the wavelengths of the path

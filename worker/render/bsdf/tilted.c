@@ -116,9 +116,9 @@ int bsdf_share_relief(struct bsdf *b, struct bsdf *part, uint32_t count, const s
 {
 	for (uint32_t k = 0; k < count; k++)
 		if (!part[k].relief)
-			part[k].relief = build->under;
+			part[k].relief = build->base_relief;
 	const struct bsdf *first = narrowest_part(part, count);
-	b->relief = first ? first->relief : build->under;
+	b->relief = first ? first->relief : build->base_relief;
 	for (uint32_t k = 0; k < count; k++) {
 		b->uses_relief_frames |= part[k].uses_relief_frames;
 		if (part[k].relief == b->relief || !needs_normal(&part[k]))

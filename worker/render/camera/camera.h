@@ -34,7 +34,8 @@ struct camera {
 	bool has_lens; /* x_k is sampled and mutated: the radius is above 0, or camera_force_aperture was used */
 	double aperture_radius, focus_distance;	    /* focus_distance: of the plane of focus, along the axis */
 	const struct camera_projection *projection; /* NULL: onto a plane */
-	double kc[2], fold_slope_squared;	    /* for perspective_rdist; fold: the slope at which the image ends */
+	double kc[2], fold_slope_squared; /* for perspective_rdist; fold_slope_squared: of the slope at which the image
+					     ends */
 	const struct motion *motion; /* motion of the camera, to the rescaled world; NULL: none. With one, position and
 				       axes are those at the opening of the shutter */
 };

@@ -6,13 +6,13 @@
  * Light Transport Simulation).
  *
  * For a path x, let C(x) = I(x) / sum of the densities of all techniques of bdpt, where I = X+Y+Z of its contribution.
- * (If only one in light_every samples has a light sub-path, the densities of techniques that need one are divided by
- * light_every.) Let u(x) = w C(x), with 1/w the brightness of the path's place on the film (path/brightness.h). The
- * film gets the fraction a(x) = min(1, T / u(x)) of the contribution, which depends on the path alone. The rest is the
- * weight of a chain that begins at x, has the target h = w (1 - a) I and only local mutations, which leave h invariant.
- * Because x is sampled with density sum_j p_j and has weight h(x) / sum_j p_j(x), every state of the chain represents
- * h, and splats of I (1 - a) / h = 1 / w add up to the rest of the image: without normalisation, without start-up bias,
- * for chains of any length.
+ * (If only one in light_subpath_interval samples has a light sub-path, the densities of techniques that need one are
+ * divided by light_subpath_interval.) Let u(x) = w C(x), with 1/w the brightness of the path's place on the film
+ * (path/brightness.h). The film gets the fraction a(x) = min(1, T / u(x)) of the contribution, which depends on the
+ * path alone. The rest is the weight of a chain that begins at x, has the target h = w (1 - a) I and only local
+ * mutations, which leave h invariant. Because x is sampled with density sum_j p_j and has weight h(x) / sum_j p_j(x),
+ * every state of the chain represents h, and splats of I (1 - a) / h = 1 / w add up to the rest of the image: without
+ * normalisation, without start-up bias, for chains of any length.
  *
  * All chains have the same length of L mutations: if those that begin at bright paths were longer, light would flow
  * away from there and not come back. Energy is measured relative to the brightness of the place. If the rest of a
@@ -41,9 +41,9 @@ extern const struct redistribution_rule redistribution_default_rule;
 
 enum { REDISTRIBUTION_CHAINS_MAX = 64 }; /* most chains for one contribution */
 
-/* c: the context of the samples, from which world, window, depths, light_every and counters are taken. target: where
- * the chains splat. classes: gets the sums of the energy that is spread, I by path class. Returns -ENOMEM if out of
- * memory. */
+/* c: the context of the samples, from which world, window, depths, light_subpath_interval and counters are taken.
+ * target: where the chains splat. classes: gets the sums of the energy that is spread, I by path class. Returns -ENOMEM
+ * if out of memory. */
 int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
 		       const struct path_context *c, const struct brightness *map, uint64_t seed,
 		       struct splat_target *target, double classes[PATH_CLASSES], struct error *e);

@@ -69,8 +69,8 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 	return spectrum_scale(m->scale, color_eval_rgb_illuminant(rgb, wl));
 }
 
-static double row_edge_angle(const struct envmap *m,
-			     uint32_t row) /* angle of the upper edge of the row from the pole */
+/* Angle of the upper edge of the row from the pole. */
+static double row_edge_angle(const struct envmap *m, uint32_t row)
 {
 	if (m->has_rows_at_poles)
 		return M_PI * row / m->rows;
@@ -277,7 +277,7 @@ int envmap_read_axes(const struct scene_node *n, struct envmap_axes *a, struct e
 	return 0;
 }
 
-int envmap_init(struct emitter *em, const struct raster *picture, bool rows_reach_poles, double scale,
+int envmap_init(struct emitter *em, const struct raster *picture, bool has_rows_at_poles, double scale,
 		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,
 		struct error *e)
 {
@@ -288,7 +288,7 @@ int envmap_init(struct emitter *em, const struct raster *picture, bool rows_reac
 	m->raster.wrap_v = RASTER_CLAMP;
 	m->scale = scale;
 	m->columns = m->raster.image.width;
-	m->has_rows_at_poles = rows_reach_poles && m->raster.image.height > 1;
+	m->has_rows_at_poles = has_rows_at_poles && m->raster.image.height > 1;
 	m->rows = m->has_rows_at_poles ? m->raster.image.height - 1 : m->raster.image.height + 1;
 	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
 	m->cell_cdf = arena_alloc(build->arena, (size_t)m->rows * ((size_t)m->columns + 1), sizeof *m->cell_cdf);

@@ -29,7 +29,7 @@ struct envmap {
 int envmap_read_axes(const struct scene_node *n, struct envmap_axes *a, struct error *e);
 /* Makes em an environment map of the image, times scale. has_rows_at_poles: the first and last rows are the poles. The
  * pixels must outlive em. -ENOMEM. */
-int envmap_init(struct emitter *em, const struct raster *picture, bool rows_reach_poles, double scale,
+int envmap_init(struct emitter *em, const struct raster *picture, bool has_rows_at_poles, double scale,
 		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,
 		struct error *e);
 

@@ -63,8 +63,8 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 			const struct emitter_build *build, struct error *e)
 {
 	const struct property *property = node_find_property(n, "texture");
-	s->has_texture = property && (build->is_dialect_3 ||
-				      property->value.type == VALUE_NODE); /* 0.6 ignores a colour or a number */
+	/* 0.6 ignores a colour or a number. */
+	s->has_texture = property && (build->is_dialect_3 || property->value.type == VALUE_NODE);
 	if (!s->has_texture)
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))

@@ -555,7 +555,8 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	return n;
 }
 
-/* Finds the flat parts of shared meshes. *moved: the number of their triangles over all instances that do not move. */
+/* Finds the flat parts of shared meshes. *instanced: the number of their triangles over all instances that do not move.
+ */
 static int find_flat_parts(struct search *f, uint32_t count, size_t *instanced)
 {
 	*instanced = 0;

@@ -83,11 +83,11 @@ static bool apply_relief(const struct relief *r, const struct relief_site *s, co
 static struct relief_site site_under(const struct relief *r, const struct relief_site *s, struct relief_derivatives *d)
 {
 	struct relief_site raised = *s;
-	if (!r->under)
+	if (!r->base)
 		return raised;
-	raised.n = relief_normal(r->under, s);
+	raised.n = relief_normal(r->base, s);
 	if (d)
-		d->dn = relief_normal_derivative(r->under, s, d);
+		d->dn = relief_normal_derivative(r->base, s, d);
 	return raised;
 }
 

@@ -62,8 +62,8 @@ static void surface_from_glossiness(struct gltf *g, const struct gltf_entry *mat
 	for (int i = 0; i < 3; i++) {
 		double base_from_diffuse = s->base_colour[i] * rest / (1 - dielectric_reflectance) / fmax(1 - m, 1e-6),
 		       base_from_specular = (specular[i] - dielectric_reflectance * (1 - m)) / fmax(m, 1e-6);
-		double b = base_from_diffuse +
-			   m * m * (base_from_specular - base_from_diffuse); /* m weights the better determined value */
+		/* m weights the better determined value. */
+		double b = base_from_diffuse + m * m * (base_from_specular - base_from_diffuse);
 		s->base_colour[i] = fmin(fmax(b, 0), 1);
 	}
 }
@@ -240,8 +240,8 @@ static bool put_dispersive_glass(struct gltf *g, const struct gltf_entry *materi
 	bool is_clear = s->metallic == 0 && !s->base_texture && !s->roughness_metallic_texture, is_white = true;
 	double boundary_colour[3];
 	for (int k = 0; k < 3; k++) {
-		boundary_colour[k] = s->base_colour[k] > 0 ? sqrt(s->base_colour[k])
-							   : s->base_colour[k]; /* negative values are refused later */
+		/* Negative values are refused later. */
+		boundary_colour[k] = s->base_colour[k] > 0 ? sqrt(s->base_colour[k]) : s->base_colour[k];
 		is_white &= s->base_colour[k] == 1;
 	}
 	if (!(strength > 0) || !is_clear || !t || gltf_number(g, material, t, "transmissionFactor", 0) != 1 ||

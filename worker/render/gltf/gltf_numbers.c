@@ -279,28 +279,29 @@ static void read_sparse(struct gltf *g, const struct gltf_entry *a, const struct
 	gltf_vectors_fini(&sparse_indices);
 }
 
-bool gltf_vectors_read(struct gltf *g, const struct gltf_entry *a, const char *purpose, unsigned components,
+bool gltf_vectors_read(struct gltf *g, const struct gltf_entry *accessor, const char *purpose, unsigned components,
 		       struct gltf_vectors *out)
 {
 	struct gltf_entry view;
-	unsigned type_components = type_component_count(gltf_string(g, a, a->json, "type", ""));
-	struct vector_layout p = {gltf_integer(g, a, a->json, "componentType", 0), 0,
-				  gltf_integer(g, a, a->json, "byteOffset", 0),
-				  json_is_true(json_object_get(a->json, "normalized"))};
-	*out = (struct gltf_vectors){NULL, gltf_integer(g, a, a->json, "count", 0), type_components};
+	unsigned type_components = type_component_count(gltf_string(g, accessor, accessor->json, "type", ""));
+	struct vector_layout p = {gltf_integer(g, accessor, accessor->json, "componentType", 0), 0,
+				  gltf_integer(g, accessor, accessor->json, "byteOffset", 0),
+				  json_is_true(json_object_get(accessor->json, "normalized"))};
+	*out = (struct gltf_vectors){NULL, gltf_integer(g, accessor, accessor->json, "count", 0), type_components};
 	if (!type_components || (components && type_components != components) || !component_size(p.component_type))
-		gltf_fail(g, a, EINVAL, "of a type that %s cannot have", purpose);
+		gltf_fail(g, accessor, EINVAL, "of a type that %s cannot have", purpose);
 	if (out->count > NUMBERS_MAX / COMPONENTS_MAX)
-		gltf_fail(g, a, E2BIG, "more than %llu vectors", (unsigned long long)NUMBERS_MAX / COMPONENTS_MAX);
+		gltf_fail(g, accessor, E2BIG, "more than %llu vectors",
+			  (unsigned long long)NUMBERS_MAX / COMPONENTS_MAX);
 	if (!g->error_code && !(out->values = mem_alloc(out->count * type_components + 1, sizeof *out->values)))
-		gltf_fail(g, a, ENOMEM, "out of memory");
-	if (!g->error_code && gltf_resolve(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) > 0) {
+		gltf_fail(g, accessor, ENOMEM, "out of memory");
+	if (!g->error_code && gltf_resolve(g, accessor, accessor->json, "bufferView", GLTF_BUFFER_VIEWS, &view) > 0) {
 		p.stride = gltf_integer(g, &view, view.json, "byteStride",
 					(uint64_t)component_size(p.component_type) * type_components);
-		read_vectors(g, a, &view, &p, out->count, NULL, out);
+		read_vectors(g, accessor, &view, &p, out->count, NULL, out);
 	}
 	if (!g->error_code)
-		read_sparse(g, a, &p, out);
+		read_sparse(g, accessor, &p, out);
 	if (g->error_code)
 		gltf_vectors_fini(out);
 	return !g->error_code;

@@ -84,8 +84,8 @@ struct gltf {
 	struct gltf_range *buffers, *images; /* embedded data located so far, by entry */
 	unsigned embedded_count, primitive_count;
 	unsigned char *is_material_made; /* by material: made for these bits 1 << enum gltf_vertex_colours */
-	struct gltf_open_buffer *open_file,
-		*decoded_buffers;		   /* open buffers: the last one in a file; a list of those in base64 */
+	/* Open buffers: the last one in a file; a list of those in base64. */
+	struct gltf_open_buffer *open_file, *decoded_buffers;
 	struct gltf_unpacked_view *unpacked_views; /* by view; NULL: no compressed view was needed so far */
 	uint64_t unpacked_bytes;		   /* total size of these */
 	size_t *parents;			   /* by node (gltf_node.h); NULL: not needed so far */

@@ -44,9 +44,9 @@ vec2 halfvec_of(const struct full_path *x, unsigned j)
 }
 
 /* Returns the derivative of a unit direction that turns at `turn_rate` as one of its ends moves along d. */
-static inline vec3 direction_derivative(vec3 w, vec3 d, double rate)
+static inline vec3 direction_derivative(vec3 w, vec3 d, double turn_rate)
 {
-	return vec3_scale(rate, vec3_madd(d, -vec3_dot(w, d), w));
+	return vec3_scale(turn_rate, vec3_madd(d, -vec3_dot(w, d), w));
 }
 
 /* Returns the derivative of the slopes as the half vector changes by d, in a fixed frame. */

@@ -28,7 +28,7 @@ struct relief {
 	bool uses_handedness;
 	bool flips_invalid_normals; /* normals that face away from the camera's side of a path are turned round, see
 				       path_point_facing_camera() */
-	const struct relief *under; /* the relief whose normals this one bends further; NULL: none */
+	const struct relief *base;  /* the relief whose normals this one bends further; NULL: none */
 };
 
 /*

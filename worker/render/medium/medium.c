@@ -234,8 +234,8 @@ static spectrum depth_from_integrals(const struct medium_lanes *m, const double 
 	spectrum depth = spectrum_constant(0);
 	for (int k = 0; k < m->channels; k++)
 		for (int i = 0; i < SPECTRUM_LANES; i++)
-			depth.v[i] +=
-				m->sigma_t[k].v[i] > 0 ? m->sigma_t[k].v[i] * sum[k] : 0; /* avoids 0 times infinity */
+			/* Avoids 0 times infinity. */
+			depth.v[i] += m->sigma_t[k].v[i] > 0 ? m->sigma_t[k].v[i] * sum[k] : 0;
 	return depth;
 }
 

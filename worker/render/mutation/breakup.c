@@ -314,9 +314,8 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 		return 0;
 	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
-	if (c_end > 0 &&
-	    full_path_is_turned(x,
-				c_end)) /* x_c does not move, but may use its own normal in x and the turned one in y */
+	/* x_c does not move, but may use its own normal in x and the turned one in y. */
+	if (c_end > 0 && full_path_is_turned(x, c_end))
 		log_g += log(full_path_cosine_to_light(x, c_end) /
 			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
 	struct camera storage;

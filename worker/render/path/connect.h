@@ -38,7 +38,7 @@ struct joined_path {
  * made it; 0 where j cannot make the path or has more than max_s light vertices. */
 void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
 /* Returns the weight of the balance heuristic divided by the fraction of samples that try the technique: 1 / sum of the
- * ratios, where the ratios of techniques that need a light sub-path are divided by light_every. */
+ * ratios, where the ratios of techniques that need a light sub-path are divided by light_subpath_interval. */
 double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s);
 
 /* Computes joined_path.mismatched_edge. Only where media scatter. */

@@ -3,9 +3,9 @@
  * A whole path from an emitter to the camera: the state of chains in path space.
  *
  * v[0] is x_0 on the emitter (or the direction towards it, at infinity), v[edges] is x_k on the camera's aperture. A
- * whole path uses these members of struct path_vertex: kind, mode (inner vertices: how they scatter), delta, emitter,
- * bsdf, x, to_prev (the unit direction towards v[i + 1], on the camera's side) and, as caches, pdf and pdf_rev (the
- * densities of the vertex as generated from the camera's side and from the light's side).
+ * whole path uses these members of struct path_vertex: kind, mode (inner vertices: how they scatter), is_delta,
+ * emitter, bsdf, x, to_prev (the unit direction towards v[i + 1], on the camera's side) and, as caches, pdf and pdf_rev
+ * (the densities of the vertex as generated from the camera's side and from the light's side).
  *
  * i_j is the unit direction from v[j] to v[j - 1], o_j the one to v[j + 1]. The contribution is measured as in path.h:
  * per area, per solid angle at infinity, without the delta distributions, which are the same for all paths with the
@@ -98,7 +98,7 @@ spectrum full_path_eval_fh(const struct path_context *c, struct full_path *x, un
 void full_path_invalidate(struct full_path *x, unsigned first, unsigned last);
 /* Returns the weight of the exactly specular lobe of v[j]'s mode as seen along o_j (see bsdf_eval_delta). Sets its
  * direction in the shading frame and the probability with which it is chosen. */
-spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *chance);
+spectrum full_path_specular_weight(const struct full_path *x, unsigned j, vec3 *wi, double *probability);
 /* Returns the distance between i_j and the unit direction into which the exactly specular lobe of v[j]'s mode sends
  * o_j; INFINITY if there is no such lobe. */
 double full_path_specular_error(const struct full_path *x, unsigned j);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The evaluation function of bdpt, for integrators that build on it. path_context.light_every sets the fraction of
- * samples that have a light sub-path. */
+/* The evaluation function of bdpt, for integrators that build on it. path_context.light_subpath_interval sets the
+ * fraction of samples that have a light sub-path. */
 #ifndef WORKER_RENDER_PATH_INTEGRATE_BDPT_H
 #define WORKER_RENDER_PATH_INTEGRATE_BDPT_H
 

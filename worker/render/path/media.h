@@ -72,7 +72,7 @@ bool path_extend_without_events(struct path_context *c, const struct path_vertex
 /* Makes `to` an event at that distance from `from` along d. Its edge is not set. */
 void path_make_medium_vertex(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d);
 /* Whether z (an end of the camera's sub-path, not at infinity) and y see each other through faces of `null`. Fills in
- * the edge to y, whose `before` is the medium at z, and sets *transmittance. Counts rays. */
+ * the edge to y, whose `previous_medium` is the medium at z, and sets *transmittance. Counts rays. */
 bool path_is_visible_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 			      struct path_edge *edge, spectrum *transmittance);
 

@@ -14,8 +14,8 @@ enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
 enum { SAMPLER_BLOCK_SIZE = 8 };
 
 /* The uses of the numbers in a block. Block 0 of the camera: film x and y, wavelength, distance to the first event in a
- * medium, point of the aperture, whether there is a light sub-path (path_context.light_every), and which faint
- * connections are made (path_context.faint_threshold). Block 0 of the light: point, direction and choice of the
+ * medium, point of the aperture, whether there is a light sub-path (path_context.light_subpath_interval), and which
+ * faint connections are made (path_context.faint_threshold). Block 0 of the light: point, direction and choice of the
  * emitter, and the time of both sub-paths. All other blocks: one vertex, including the distance to the next vertex
  * where media scatter. Block e - 1 of the light also holds the position on edge e of the camera's sub-path at which the
  * emission of media is evaluated. Numbers that are used together lie in the same half of the block: low-discrepancy

@@ -51,8 +51,8 @@ const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plug
 	for (const struct plugin_decl *d = decls; d->type; d++) {
 		if (d->cls != cls)
 			continue;
-		if (strcasecmp(d->type, type) ==
-		    0) /* Mitsuba opens a file of this name, so "Sphere" works on Windows */
+		/* Mitsuba opens a file of this name, so "Sphere" works on Windows. */
+		if (strcasecmp(d->type, type) == 0)
 			return d;
 		if (is_wildcard(d->type))
 			wildcard = d;

@@ -164,9 +164,8 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 
 const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX])
 {
-	enum {
-		NAME_LENGTH_MAX = NODE_PLACE_MAX - 16
-	}; /* leaves room for "...", ":", a line number and the terminating 0 */
+	/* Leaves room for "...", ":", a line number and the terminating 0. */
+	enum { NAME_LENGTH_MAX = NODE_PLACE_MAX - 16 };
 	size_t length = strlen(n->file);
 	const char *end = n->file + (length > NAME_LENGTH_MAX ? length - NAME_LENGTH_MAX : 0);
 	while (end > n->file && ((unsigned char)*end & 0xC0) == 0x80) /* in the middle of a UTF-8 character */

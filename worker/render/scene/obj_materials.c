@@ -58,7 +58,7 @@ struct obj_shape {
 	struct asset contents;
 	struct child *children;
 	size_t child_count, unnamed_count, named_count; /* unnamed_count, named_count: of BSDFs */
-	/* The shape asks for the .mtl file; it emits light, or states itself which faces it wants. */
+	/* The shape asks for the .mtl file; it states itself which faces it wants. */
 	bool loads_library, is_fixed;
 	int64_t mesh_index;	    /* shape_index; negative: all meshes */
 	struct material *materials; /* [OBJ_MATERIALS_MAX] */

@@ -13,17 +13,17 @@ struct picture_entry;
 struct scene_node;
 
 /* The images with a pixel below the range to which they were clamped. */
-struct pictures_raised {
+struct raised_pictures {
 	const struct scene_node *first; /* the object that read the first of them; NULL: there is none */
-	uint64_t pixels;		/* such pixels of the first image */
-	bool others;			/* there are more images */
+	uint64_t pixel_count;		/* such pixels of the first image */
+	bool has_others;		/* there are more images */
 };
 
 /* A hash table by key: a scene may read one image in 10^5 different ways. */
 enum { PICTURE_BUCKETS = 1 << 10 };
 struct picture_cache {
 	const struct arena *arena; /* images in other arenas are not shared */
-	struct pictures_raised raised;
+	struct raised_pictures raised;
 	struct picture_entry *bucket[PICTURE_BUCKETS];
 };
 

@@ -51,16 +51,16 @@ static uint64_t count_pixels_below(const struct indexed_image *i, double min)
 }
 
 /* Notes that node n has read an image with so many pixels below its range. One file may be read in several ways. */
-static void note_raised(struct pictures_raised *all, const struct scene_node *n, uint64_t pixels)
+static void note_raised(struct raised_pictures *all, const struct scene_node *n, uint64_t pixels)
 {
 	if (pixels == 0)
 		return;
 	if (!all->first) {
 		all->first = n;
-		all->pixels = pixels;
+		all->pixel_count = pixels;
 		return;
 	}
-	all->others |= strcmp(node_string(all->first, "filename", ""), node_string(n, "filename", "")) != 0;
+	all->has_others |= strcmp(node_string(all->first, "filename", ""), node_string(n, "filename", "")) != 0;
 }
 
 /* Applies the threshold, if there is one, and clamps to the range. Returns whether a pixel was outside the range. */

@@ -25,8 +25,8 @@ struct raster {
 struct raster_options {
 	double min, max;	/* pixels outside are clamped */
 	bool is_raw_by_default; /* default of the parameter `raw`, unless `gamma` is given */
-	enum image_channel
-		default_channel; /* default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
+	/* Default of the parameter `channel`: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN. */
+	enum image_channel default_channel;
 };
 
 /* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only this

@@ -380,7 +380,7 @@ static void compute_corner_area(struct grid_walk *c, vec3 d)
 }
 
 /* Computes the integral of each channel over the cell, from the current t to `t_end`. */
-static void integrate_cell(const struct grid_walk *c, const float *const corner[8], double end,
+static void integrate_cell(const struct grid_walk *c, const float *const corner[8], double t_end,
 			   double part[GRID_CHANNELS_MAX])
 {
 	for (int k = 0; k < c->g->channels; k++) {
@@ -390,7 +390,7 @@ static void integrate_cell(const struct grid_walk *c, const float *const corner[
 			v[i] = (double)corner[i][k];
 			empty = empty && v[i] == 0;
 		}
-		part[k] = empty ? 0 : integral(c, v, c->t, end);
+		part[k] = empty ? 0 : integral(c, v, c->t, t_end);
 	}
 }
 

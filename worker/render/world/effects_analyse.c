@@ -320,8 +320,8 @@ static bool add_material_line(struct effect_report *r, enum effect effect, const
 static void decide_lobes(struct effect_report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
-	struct effect_line *half_vector_line =
-		&fx->effect_lines[fx->effect_line_count++]; /* half vectors: filled in below */
+	/* Half vectors are filled in below. */
+	struct effect_line *half_vector_line = &fx->effect_lines[fx->effect_line_count++];
 	if (!c->specular.count && c->hidden_specular.count) {
 		char text[NAMES_MAX];
 		fx->specular = add_line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s",

@@ -86,16 +86,16 @@ void world_note_nothing_visible(struct world *w, const struct box *boxes)
 						    : "all are beside the image or behind it");
 }
 
-void world_note_negative_pixels(struct world *w, const struct pictures_raised *images)
+void world_note_negative_pixels(struct world *w, const struct raised_pictures *images)
 {
 	char place[NODE_PLACE_MAX], file[129];
 	if (!images->first)
 		return;
 	snprintf(w->notes.negative_pixels, sizeof w->notes.negative_pixels,
 		 "%s: %llu pixel%s of %s ha%s a negative value, which counts as 0%s", node_place(images->first, place),
-		 (unsigned long long)images->pixels, images->pixels == 1 ? "" : "s",
+		 (unsigned long long)images->pixel_count, images->pixel_count == 1 ? "" : "s",
 		 asset_name_display(node_string(images->first, "filename", ""), file, sizeof file),
-		 images->pixels == 1 ? "s" : "ve", images->others ? "; and of other images, too" : "");
+		 images->pixel_count == 1 ? "s" : "ve", images->has_others ? "; and of other images, too" : "");
 }
 
 void world_note_no_light(struct world *w, bool dropped_emitter)
@@ -116,7 +116,10 @@ void world_note_no_light(struct world *w, bool dropped_emitter)
 
 /* ---- backs ---- */
 
-enum { GRID_SIDE = 32, BACK_FRACTION_DIVISOR = 20 }; /* the note appears from a fraction of 1 / LEAST on */
+enum {
+	GRID_SIDE = 32,
+	BACK_FRACTION_DIVISOR = 20
+}; /* the note appears from a fraction of 1 / BACK_FRACTION_DIVISOR on */
 
 /* Whether a ray meets the back of an opaque material that `twosided` does not cover, black or lit by the setting
  * `backs`. */

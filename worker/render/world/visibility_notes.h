@@ -18,7 +18,7 @@ void world_note_nothing_visible(struct world *w, const struct box *boxes);
 void world_note_no_light(struct world *w, bool dropped_emitter);
 
 /* Sets w->notes.negative_pixels if an image has pixels with a value that is negative where none may be. */
-void world_note_negative_pixels(struct world *w, const struct pictures_raised *images);
+void world_note_negative_pixels(struct world *w, const struct raised_pictures *images);
 
 /* Sets w->notes.black_backs if at least one in twenty of the camera rays that meet a surface meets the back of an
  * opaque material without `twosided`. black: the scene's dialect makes backs black, a surprise where a mesh is inside

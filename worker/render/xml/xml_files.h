@@ -17,8 +17,8 @@ struct xml_files {
 	const struct asset_source *assets;
 	struct arena *arena;
 	const char *naming_file; /* the scene file that names the file */
-	const struct xml_element
-		*include;		 /* the <include> by which that scene file is read; NULL: it is the main file */
+	/* The <include> by which that scene file is read; NULL: it is the main file. */
+	const struct xml_element *include;
 	const char *const *search_paths; /* values of <path> */
 	uint32_t path_count;
 	/* Result: the file's name if it was found only by the end of its path; otherwise NULL. */

@@ -170,9 +170,9 @@ static void test_nesting(void **state)
 	node_add_child(&a, outer, both);
 	const struct bsdf_build build = {.arena = &a};
 	assert_int_equal(bsdf_create(&b, outer, &build, &e), 0);
-	assert_non_null(b.relief->under);
-	assert_null(b.relief->under->under);
-	assert_true(b.relief->under->flips_invalid_normals && !b.relief->flips_invalid_normals);
+	assert_non_null(b.relief->base);
+	assert_null(b.relief->base->base);
+	assert_true(b.relief->base->flips_invalid_normals && !b.relief->flips_invalid_normals);
 	assert_int_equal(make_blend(inner, outer, &a, &b, &e), -ENOTSUP);
 	assert_non_null(strstr(e.text, "bend normals differently"));
 	assert_int_equal(make_blend(outer, outer, &a, &b, &e), 0);
@@ -181,7 +181,7 @@ static void test_nesting(void **state)
 	node_add_child(&a, same, node_make(&a, PLUGIN_TEXTURE, tiles));
 	node_add_child(&a, same, node_with_normalmap(&a, "bumpmap scale=0.5", tiles, "conductor"));
 	assert_int_equal(make_blend(same, same, &a, &b, &e), 0);
-	assert_non_null(b.relief->under);
+	assert_non_null(b.relief->base);
 	for (int depth = 2; depth <= 9; depth++) {
 		struct scene_node *around = node_make(&a, PLUGIN_BSDF, map);
 		node_add_child(&a, around, node_make(&a, PLUGIN_TEXTURE, tiles));

@@ -100,10 +100,10 @@ static const struct relief reliefs[RELIEFS] = {
 	{.kind = RELIEF_HEIGHT, .eval = wave_height, .data = wave_parameters},
 	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters},
 	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters, .uses_handedness = true},
-	{.kind = RELIEF_HEIGHT, .eval = wave_height, .data = wave_parameters, .under = &reliefs[1]},
-	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters, .under = &reliefs[0]},
-	{.kind = RELIEF_HEIGHT, .eval = wave_height, .data = wave_parameters, .under = &reliefs[0]},
-	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters, .under = &reliefs[3]},
+	{.kind = RELIEF_HEIGHT, .eval = wave_height, .data = wave_parameters, .base = &reliefs[1]},
+	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters, .base = &reliefs[0]},
+	{.kind = RELIEF_HEIGHT, .eval = wave_height, .data = wave_parameters, .base = &reliefs[0]},
+	{.kind = RELIEF_NORMAL, .eval = wave_normal, .data = wave_parameters, .base = &reliefs[3]},
 };
 
 static struct geom_shape shape_with_relief(struct geom_shape s, struct dice *d, int kind)
@@ -373,9 +373,9 @@ static void test_one_relief_on_another(void **state)
 	static const vec3 lean = {0.3, -0.2, 0.9}, lean2 = {-0.1, 0.5, 0.6};
 	const struct relief low = {.kind = RELIEF_HEIGHT, .eval = slope, .data = &a};
 	const struct relief low_normal = {.kind = RELIEF_NORMAL, .eval = tilted_normal, .data = &lean};
-	const struct relief high = {.kind = RELIEF_HEIGHT, .eval = slope, .data = &b, .under = &low};
+	const struct relief high = {.kind = RELIEF_HEIGHT, .eval = slope, .data = &b, .base = &low};
 	const struct relief high_normal = {
-		.kind = RELIEF_NORMAL, .eval = tilted_normal, .data = &lean2, .under = &low_normal};
+		.kind = RELIEF_NORMAL, .eval = tilted_normal, .data = &lean2, .base = &low_normal};
 	struct geom_shape s = {.vertex_count = 3,
 			       .triangle_count = 1,
 			       .position = corners,
