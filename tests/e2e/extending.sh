@@ -101,7 +101,7 @@ cat >"$TREE/worker/render/mutation/again.c" <<'TEXT'
 /* Traces a path anew from the vertex that the heuristic chooses. */
 #include "worker/render/mutation/strategy.h"
 
-static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, STRATEGY_DRAWN, .halfvecs = false};
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, STRATEGY_DRAWN, .moves_halfvecs = false};
 
 const struct mutation_ops mutation_again = {
 	.name = "again",
@@ -116,7 +116,7 @@ echo 'MUTATION(again)' | added worker/render/mutation/mutation_list.h
 # An option: a field and a row, in one file.
 echo '	bool quiet;' | inserted coordinator/ctl/hslt_status.c '^struct arguments {'
 echo '	{"quiet", 0, NULL, "Print nothing", OPTION_FLAG(struct arguments, quiet)},' |
-	inserted coordinator/ctl/hslt_status.c '^static const struct option_row rows'
+	inserted coordinator/ctl/hslt_status.c '^static const struct option_row option_rows'
 
 # A message from a client: the message and its number, and the code that answers it.
 echo '    Echo echo = 60;' | inserted proto/farm.proto ' Control control = '
@@ -130,7 +130,7 @@ echo 'message Echo { string text = 1; }' | added proto/farm.proto
 # A counter of a job: a line of the list, its number in stored messages, and the line that counts.
 printf '	COUNTER(unique, "unique", NOWHERE) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('
 echo '  uint64 unique = 99;' | inserted proto/stored.proto '^message Counts'
-echo '		j->counts.unique += v == REPEAT;' | inserted coordinator/core/answer.c 'j->counts.repeats +='
+echo '		j->counts.unique += v == VERDICT_REPEAT;' | inserted coordinator/core/answer.c 'j->counts.repeats +='
 
 # A field of a job: a line of the list, the line that computes it in the core, and its number in messages to clients.
 printf '	NUMBER(u32, slots, IN_RECORD, BY_CORE, "slots", "slots", AT(slots)) \\\n' | inserted coordinator/core/job_fields.h '#define JOB_FIELDS('

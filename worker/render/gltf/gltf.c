@@ -119,17 +119,6 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
-static bool is_required(const struct gltf *g, const char *extension)
-{
-	const json_t *required = json_object_get(g->root, "extensionsRequired");
-	for (size_t i = 0; i < json_array_size(required); i++) {
-		const char *name = json_string_value(json_array_get(required, i));
-		if (name && strcmp(name, extension) == 0)
-			return true;
-	}
-	return false;
-}
-
 /* Notes the extensions that the file uses but does not require, and that the reader does not know: their effect is
  * missing. */
 static void note_unknown_extensions(struct gltf *g)
@@ -139,7 +128,7 @@ static void note_unknown_extensions(struct gltf *g)
 	struct text t = {text, sizeof text};
 	for (size_t i = 0; i < json_array_size(used); i++) {
 		const char *name = json_string_value(json_array_get(used, i));
-		if (name && !gltf_is_known_extension(name) && !is_required(g, name))
+		if (name && !gltf_is_known_extension(name) && !gltf_lists_extension(g, "extensionsRequired", name))
 			text_appendf(&t, "%s%.64s",
 				     *text ? ", " : "these extensions are not supported and ignored: ", name);
 	}
@@ -285,12 +274,35 @@ static void visit_node(struct node_walk *w, uint64_t index, const mat4 *parent_t
 	w->is_ancestor[index] = false;
 }
 
-/* Visits the root nodes of a file without scenes, which is a library of meshes: most viewers show all of it. */
+/* Returns for each node whether it is a level of less detail of another one (MSFT_lod); NULL if out of memory. */
+static bool *find_detail_levels(struct gltf *g, size_t node_count)
+{
+	const json_t *nodes = json_object_get(g->root, "nodes");
+	bool *is_level = arena_alloc(g->arena, node_count + 1, sizeof *is_level);
+	for (size_t i = 0; i < node_count && is_level; i++) {
+		const json_t *extensions = json_object_get(json_array_get(nodes, i), "extensions"),
+			     *ids = json_object_get(json_object_get(extensions, "MSFT_lod"), "ids");
+		for (size_t k = 0; k < json_array_size(ids); k++) {
+			json_int_t id = json_integer_value(json_array_get(ids, k));
+			if (json_is_integer(json_array_get(ids, k)) && id >= 0 && (size_t)id < node_count)
+				is_level[id] = true;
+		}
+	}
+	return is_level;
+}
+
+/* Visits the root nodes of a file without scenes, which is a library of meshes: most viewers show all of it, but not
+ * the levels of less detail. */
 static void visit_root_nodes(struct gltf *g, struct node_walk *w, const mat4 *world)
 {
+	const bool *is_level = find_detail_levels(g, w->node_count);
+	if (!is_level) {
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+		return;
+	}
 	gltf_note(g, "it has no scenes: all of its nodes are shown");
 	for (size_t i = 0; i < w->node_count && !g->error_code; i++) {
-		if (gltf_node_is_root(g, i))
+		if (!is_level[i] && gltf_node_is_root(g, i))
 			visit_node(w, i, world, 0, false);
 		gltf_record_failure(g);
 	}

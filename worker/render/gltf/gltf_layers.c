@@ -27,20 +27,6 @@ static void note_unsupported_members(struct gltf *g, const json_t *extension, co
 		}
 }
 
-/* Only this many entries are checked for each material; an extension listed later may be reported twice. */
-enum { LISTED_MAX = 64 };
-
-static bool is_listed(const struct gltf *g, const char *list, const char *extension)
-{
-	const json_t *used = json_object_get(g->root, list);
-	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MAX; i++) {
-		const char *name = json_string_value(json_array_get(used, i));
-		if (name && strcmp(name, extension) == 0)
-			return true;
-	}
-	return false;
-}
-
 /* Sets the boundary's reflectance. In the format it is f (F0 + (1 - F0) (1 - cos)^5) with F0 = min(r^2 c, 1), where r^2
  * is the reflectance of the index at normal incidence, f a strength and c a colour. Here f is `specular_strength` and c
  * `specular_color`. If c's factor has a component above 1, the largest is included in the index, and the colour is
@@ -133,7 +119,7 @@ static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_
 	const char *name = "KHR_materials_unlit";
 	if (!gltf_extension(g, material, material->json, name))
 		return;
-	if (is_listed(g, "extensionsRequired", name))
+	if (gltf_lists_extension(g, "extensionsRequired", name))
 		gltf_put_string(g, el, material, name, ELEMENT_UNSUPPORTED);
 	else
 		gltf_note(g, "surfaces of KHR_materials_unlit are lit like others");
@@ -149,7 +135,7 @@ static void note_iridescence(struct gltf *g, const struct gltf_entry *material)
 /* Leaves out the dispersion of materials other than clear glass: `principled` has a single index of refraction. */
 static void put_dispersion(struct gltf *g, struct xml_element *el, const struct gltf_entry *material)
 {
-	if (is_listed(g, "extensionsRequired", "KHR_materials_dispersion"))
+	if (gltf_lists_extension(g, "extensionsRequired", "KHR_materials_dispersion"))
 		gltf_put_string(g, el, material, "dispersion", ELEMENT_UNSUPPORTED);
 	else
 		gltf_note(g, "only clear glass without textures disperses light: KHR_materials_dispersion of other "
@@ -175,7 +161,7 @@ void gltf_note_unlisted_extensions(struct gltf *g, const struct gltf_entry *mate
 	for (void *i = json_object_iter(all); i; i = json_object_iter_next(all, i)) {
 		const char *name = json_object_iter_key(i);
 		char text[160];
-		if (gltf_is_known_extension(name) || is_listed(g, "extensionsUsed", name))
+		if (gltf_is_known_extension(name) || gltf_lists_extension(g, "extensionsUsed", name))
 			continue;
 		snprintf(
 			text, sizeof text,

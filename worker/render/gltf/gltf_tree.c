@@ -280,6 +280,18 @@ void gltf_note(struct gltf *g, const char *text)
 		gltf_fail(g, NULL, ENOMEM, "out of memory");
 }
 
+bool gltf_lists_extension(const struct gltf *g, const char *list, const char *extension)
+{
+	enum { LISTED_MAX = 64 };
+	const json_t *names = json_object_get(g->root, list);
+	for (size_t i = 0; i < json_array_size(names) && i < LISTED_MAX; i++) {
+		const char *name = json_string_value(json_array_get(names, i));
+		if (name && strcmp(name, extension) == 0)
+			return true;
+	}
+	return false;
+}
+
 bool gltf_is_known_extension(const char *extension)
 {
 	static const char *const known_extensions[] = {
@@ -292,7 +304,7 @@ bool gltf_is_known_extension(const char *extension)
 		"KHR_meshopt_compression", "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform",
 		"MSFT_texture_dds",
 		/* These do not change light: polygons of triangles, alternative looks, metadata, and levels of less
-		   detail, which are not in the scene. */
+		   detail, which are left out. */
 		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld", "MSFT_lod"};
 	return text_is_among(extension, known_extensions, sizeof known_extensions / sizeof *known_extensions);
 }

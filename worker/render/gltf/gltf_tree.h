@@ -153,6 +153,9 @@ void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_e
 void gltf_extend_bounds(struct gltf *g, vec3 p); /* extends the box by a vertex */
 /* Adds a note, only once per file. */
 void gltf_note(struct gltf *g, const char *text);
+/* Returns whether one of the first 64 entries of the file's `list`, extensionsUsed or extensionsRequired, is this
+ * extension. The bound keeps the time of a hostile file linear; what is listed later may be reported twice. */
+bool gltf_lists_extension(const struct gltf *g, const char *list, const char *extension);
 /* Returns whether the reader knows the extension, supported or not. */
 bool gltf_is_known_extension(const char *extension);
 

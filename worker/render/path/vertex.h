@@ -110,7 +110,7 @@ struct path_context {
 	bool joins_emitters_to_lens;
 	/* Connections do not look through surfaces, even if the world's effects allow it. */
 	bool joints_are_opaque;
-	/* A vertex that has been removed from the front of the camera sub-path dispersed the light (path/overlong.c). */
+	/* A vertex removed from the front of the camera sub-path dispersed the light (path/overlong.c). */
 	bool is_dispersed;
 	/* Only one in light_subpath_interval samples has a light sub-path, whose contributions are multiplied by
 	 * light_subpath_interval. 0 or 1: every sample has one. */

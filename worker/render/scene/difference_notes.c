@@ -177,6 +177,27 @@ static int remark_on_metal(struct report *r, const struct scene_node *n, struct 
 	return 0;
 }
 
+static bool is_relief(const struct scene_node *n)
+{
+	return strcmp(n->type, "bumpmap") == 0 || strcmp(n->type, "normalmap") == 0;
+}
+
+/* n: a bump or normal map. Notes that it has another inside, if one of them asks for normals to be flipped. What lies
+ * between them may be `twosided` or a mask. */
+static int remark_on_relief(struct report *r, const struct scene_node *n, struct error *e)
+{
+	bool flips = false;
+	uint32_t count = 0;
+	for (const struct scene_node *inner = n; inner; inner = node_child(inner, PLUGIN_BSDF, 0))
+		if (is_relief(inner)) {
+			count++;
+			flips |= node_bool(inner, "flip_invalid_normals", false);
+		}
+	if (count < 2 || !flips)
+		return 0;
+	return add_difference_note(r, n, e, "flip_invalid_normals has no effect on maps inside others and around them");
+}
+
 /* Notes how a rolling shutter is understood, if the shutter is open for some time. */
 static int remark_on_sensor(struct report *r, const struct scene_node *n, struct error *e)
 {
@@ -232,7 +253,7 @@ int note_object_differences(const struct scene_node *n, struct report *r, struct
 {
 	switch (n->cls) {
 	case PLUGIN_BSDF:
-		return remark_on_metal(r, n, e);
+		return is_relief(n) ? remark_on_relief(r, n, e) : remark_on_metal(r, n, e);
 	case PLUGIN_SENSOR:
 		return remark_on_sensor(r, n, e);
 	case PLUGIN_SHAPE:

@@ -229,9 +229,10 @@ const struct param *lenient_old_param(const struct plugin_decl *d, bool is_stand
 		return NULL;
 	snake_case_from_camel(name, snake);
 	const char *new_name = plugin_current_param_name(d, snake);
-	bool picture =
-		d->cls == PLUGIN_EMITTER && strcmp(d->type, "projector") == 0 && strcmp(new_name, "texture") == 0;
-	const struct param *p = plugin_find_param(d, picture	   ? "irradiance"
+	bool is_picture = d->cls == PLUGIN_EMITTER && strcmp(d->type, "projector") == 0 &&
+			  strcmp(new_name, "texture") == 0 &&
+			  (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
+	const struct param *p = plugin_find_param(d, is_picture	   ? "irradiance"
 						     : is_stand_in ? lenient_param_name(d->type, new_name)
 								   : new_name);
 	return p && !is_given_otherwise(el, p->name, name) ? p : NULL;

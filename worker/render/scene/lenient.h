@@ -39,9 +39,9 @@ const char *lenient_param_name(const char *stand_in, const char *name);
  * `owner`, says the same. */
 bool lenient_is_redundant_param(const char *stand_in, const char *name, const struct xml_element *owner);
 
-/* Returns the parameter that `name`, written as in 0.6 or by forks, means in a file of 3.x. is_stand_in: d replaces the
- * plug-in of the object. NULL if there is none, or if the object of the element `el` is also given it by its own name,
- * or earlier by this one. */
+/* Returns the parameter that `name` means: as 0.6 writes it in a file of 3.x, or as forks write it in any file.
+ * is_stand_in: d replaces the plug-in of the object. NULL if there is none, or if the object of the element `el` is
+ * also given it by its own name, or earlier by this one. */
 const struct param *lenient_old_param(const struct plugin_decl *d, bool is_stand_in, const struct xml_element *el,
 				      const char *name);
 

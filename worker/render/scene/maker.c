@@ -266,6 +266,12 @@ static int add_child(struct maker *m, struct draft *d, const struct xml_element 
 	return 0;
 }
 
+/* Mitsuba 3 ignores the media of a shape that are not parameters. */
+static bool is_unused_medium(const struct maker *m, const struct draft *d, enum plugin_class cls)
+{
+	return cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_SHAPE && m->tree->is_dialect_3;
+}
+
 /* Reads an object nested in another or referred to there: a parameter if the table has its name, or else a child. */
 static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
 		       struct xml_element *target)
@@ -283,6 +289,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		if (!name)
 			return maker_out_of_memory(m);
 		const struct param *found = plugin_find_param(d->decl, name);
+		if (!found && is_unused_medium(m, d, cls) && d->decl->status != PARAM_IGNORED)
+			return note_unused_medium(&m->notes, el);
 		if (found || !is_nested) {
 			int r = look_up_param(m, d, owner, el, name, &p);
 			if (r || !p)
@@ -293,7 +301,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!p && !is_nested) {
 		if (d->decl->status == PARAM_IGNORED)
 			return 0;
-		if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_SHAPE && m->tree->is_dialect_3)
+		if (is_unused_medium(m, d, cls))
 			return note_unused_medium(&m->notes, el);
 		if (m->is_lenient)
 			return note_left_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");

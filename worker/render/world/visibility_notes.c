@@ -95,7 +95,8 @@ void world_note_negative_pixels(struct world *w, const struct raised_pictures *i
 		 "%s: %llu pixel%s of %s ha%s a negative value, which counts as 0%s", node_place(images->first, place),
 		 (unsigned long long)images->pixel_count, images->pixel_count == 1 ? "" : "s",
 		 asset_name_display(node_string(images->first, "filename", ""), file, sizeof file),
-		 images->pixel_count == 1 ? "s" : "ve", images->has_others ? "; and of other images, too" : "");
+		 images->pixel_count == 1 ? "s" : "ve",
+		 images->has_others ? "; other images have such pixels, too" : "");
 }
 
 void world_note_no_light(struct world *w, bool dropped_emitter)

@@ -275,7 +275,7 @@ static void redistribution_keeps_the_sum_of_intensities(void **state)
 		taken += t.classes[k];
 	}
 	assert_true(taken > 0.5 * whole && fabs(taken - t.redistributed) < 1e-9 * taken);
-	assert_true(t.counters[COUNT_REDISTRIBUTION_RAYS] > 100 && t.counters[COUNT_REDISTRIBUTION_RAYS] < rays);
+	assert_true(t.counters[COUNT_REDISTRIBUTION_RAYS] > 50 && t.counters[COUNT_REDISTRIBUTION_RAYS] < rays);
 	assert_true(t.counters[COUNT_REDISTRIBUTED] > 100);
 	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
 	trial_end(&t);

@@ -427,7 +427,7 @@ static void test_ignored_extensions_are_noted(void **state)
 	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);
-	/* Levels of less detail are not in the scene. What is required, and therefore refused, is not said to be
+	/* Levels of less detail are left out. What is required, and therefore refused, is not said to be
 	 * ignored. */
 	gltf_files_make(&changed_files);
 	gltf_files_replace(&changed_files, "\"extensionsUsed\": [",
@@ -477,6 +477,23 @@ static void test_loose_files_are_accepted(void **state)
 	assert_true(scene_has_note(&s, "it has no scenes: all of its nodes are shown"));
 	scene_fini(&s);
 	scene_fini(&whole);
+	/* ... but not levels of less detail */
+#define TRIANGLE(levels)                                                                                                 \
+	"{\"asset\": {\"version\": \"2.0\"}, \"buffers\": [{\"byteLength\": 36, \"uri\": \"data:;base64,"                \
+	"AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": 36}], " \
+	"\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\"}], \"meshes\": "  \
+	"[{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], \"nodes\": [{\"mesh\": 0" levels                     \
+	"}, {\"mesh\": 0}]}"
+	static const char *const levels[] = {
+		TRIANGLE(""), TRIANGLE(", \"extensions\": {\"MSFT_lod\": {\"ids\": [1, -1, 7, \"x\"]}}")};
+	uint32_t object_counts[2];
+	for (int i = 0; i < 2; i++) {
+		const struct memory_file level_files[] = {{"s.gltf", levels[i], strlen(levels[i])}, {NULL, NULL, 0}};
+		assert_int_equal(gltf_files_read(level_files, false, &s, &(struct error){""}), 0);
+		object_counts[i] = (uint32_t)s.object_count;
+		scene_fini(&s);
+	}
+	assert_int_equal(object_counts[1], object_counts[0] - 1);
 	/* a picture with an absolute path, and one that the exporter lost */
 	struct error e;
 	const struct memory_file *files = gltf_files_make_changed(&f, "\"rgb.hdr\"", "\"file:///x/rgb.hdr\"");

@@ -455,6 +455,8 @@ static void test_picture_of_projector(void **state)
 				   "texture") "</emitter>\n"
 					      "<emitter type='directional' id='other'>" PICTURE(
 						      "texture") "</emitter></scene>";
+	static const char named[] = "<scene version='0.6.0'><emitter type='projector'>"
+				    "<string name='texture' value='a.png'/></emitter></scene>";
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -470,6 +472,12 @@ static void test_picture_of_projector(void **state)
 	assert_true(scene_has_note(
 		&s, "s.xml:1: <emitter type=\"projector\">: `texture` is read as `irradiance` (lenient)"));
 	assert_true(scene_has_note(&s, "s.xml:2: <texture>: the parameter `texture` is not supported and left out"));
+	scene_fini(&s);
+	const struct memory_file named_files[] = {{"s.xml", named, strlen(named)}, {NULL, NULL, 0}};
+	assets = memory_assets(named_files);
+	if (scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	assert_true(scene_has_note(&s, "`texture` is not known and is ignored"));
 	scene_fini(&s);
 }
 

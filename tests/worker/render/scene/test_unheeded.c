@@ -51,6 +51,13 @@ static void test_unsupported_parameters_are_noted(void **state)
 	check_note("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 	check_note("<shape type='sphere'><medium type='homogeneous'/></shape>",
 		   "s.xml:1: a medium in a shape is ignored");
+	check_note(
+		"<bsdf type='normalmap'><rgb name='normalmap' value='0.9,0.5,0.75'/><bsdf type='twosided'>"
+		"<bsdf type='bumpmap'><boolean name='flip_invalid_normals' value='true'/><texture type='checkerboard'/>"
+		"<bsdf type='diffuse'/></bsdf></bsdf></bsdf>",
+		"s.xml:1: <bsdf type=\"normalmap\">: flip_invalid_normals has no effect on maps inside others");
+	check_note("<shape type='sphere'><medium type='homogeneous' name='inner'/></shape>",
+		   "s.xml:1: a medium in a shape is ignored");
 	check_note("<medium type='homogeneous' id='m'/><shape type='sphere'><ref id='m'/></shape>",
 		   "s.xml:1: a medium in a shape is ignored");
 }

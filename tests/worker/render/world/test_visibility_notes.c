@@ -223,7 +223,7 @@ static void test_negative_texels(void **state)
 		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0"},
 		{SCENE(DIFFUSE("bad"),
 		       "<bsdf type='roughconductor'>" PICTURE("alpha", "worse") PICTURE("k", "bad") "</bsdf>"),
-		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0; and of other images, too"},
+		 "scene.xml:2: 1 pixel of bad.pfm has a negative value, which counts as 0; other images have such pixels, too"},
 		{SCENE("<bsdf type='bumpmap'>" PICTURE("height", "bad") "<bsdf type='diffuse'/></bsdf>", ""), ""},
 	};
 	static const float pixels[3][6] = {{0, 0.5f, 0, 1, 1, 1}, {0, 0.5f, 0, 1, -2, 1}, {-1, -1, -1, 1, -2, 1}};
