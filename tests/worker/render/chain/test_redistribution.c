@@ -263,7 +263,7 @@ static void redistribution_keeps_the_sum_of_intensities(void **state)
 	t.context.skips_classes = false;
 	double whole = 0, of_class[PATH_CLASSES] = {0}, taken = 0;
 	uint64_t rays = 0;
-	for (uint64_t i = 0; i < 512; i++) {
+	for (uint64_t i = 0; i < 1024; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
 		rays += batch_ray_count(t.counters);
 		whole += trial_sample_unspread(&t, stats_seed(__func__), i);
@@ -275,7 +275,7 @@ static void redistribution_keeps_the_sum_of_intensities(void **state)
 		taken += t.classes[k];
 	}
 	assert_true(taken > 0.5 * whole && fabs(taken - t.redistributed) < 1e-9 * taken);
-	assert_true(t.counters[COUNT_REDISTRIBUTION_RAYS] > 50 && t.counters[COUNT_REDISTRIBUTION_RAYS] < rays);
+	assert_true(t.counters[COUNT_REDISTRIBUTION_RAYS] > 100 && t.counters[COUNT_REDISTRIBUTION_RAYS] < rays);
 	assert_true(t.counters[COUNT_REDISTRIBUTED] > 100);
 	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
 	trial_end(&t);
